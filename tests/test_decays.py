@@ -34,7 +34,7 @@ READ = ("--channels", "x=pos [mm]")
 
 @pytest.mark.parametrize("method", ["thesis", "waveform", "all"])
 def test_the_command_answers_and_leaves_a_page(release, method):
-    answer = run(release, *READ, "--method", method, "--stiffness", "2 N/mm", "--output", "out")
+    answer = run(release, *READ, "--method", method, "--stiffness", "2 N/mm", "--output", "out", "--all")
     assert answer.exit_code == 0, answer.output
     assert "damping ratio" in answer.output
     assert "dry friction force" in answer.output
@@ -63,7 +63,7 @@ def test_json_alone_writes_nothing(release):
     assert len(bounds["m"]) == len(bounds["rate_worst"])
     assert bounds["best_m"] in bounds["m"]
     assert sorted(path.name for path in release.parent.iterdir()) == ["release.csv"]
-    spoken = run(release, *READ, "--method", "thesis", "--output", "out").output
+    spoken = run(release, *READ, "--method", "thesis", "--output", "out", "--all").output
     assert "state --stiffness or --mass" in " ".join(spoken.split())
 
 
@@ -83,7 +83,8 @@ def test_several_releases_of_one_rig_are_fitted_together(release):
     noisy = again + 5e-3 * np.random.default_rng(6).standard_normal(len(again)) + 0.7
     columns = np.column_stack([np.arange(len(again)) / fs, noisy])
     np.savetxt("again.csv", columns, delimiter=",", header="t [s],pos [mm]", comments="", fmt="%.6f")
-    answer = run(release, "again.csv", *READ, "--method", "waveform", "--stiffness", "2 N/mm", "--output", "out")
+    asked = ("--method", "waveform", "--stiffness", "2 N/mm", "--output", "out", "--all")
+    answer = run(release, "again.csv", *READ, *asked)
     assert answer.exit_code == 0, answer.output
     said = " ".join(answer.output.split())
     assert "The 2 records agree within their own intervals." in said

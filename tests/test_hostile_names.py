@@ -151,7 +151,7 @@ def test_json_stays_json_of_the_same_value(capsys: pytest.CaptureFixture[str]) -
 
 @pytest.mark.parametrize("encoding", ["ascii", "latin-1", "cp437", "utf-8"])
 def test_any_output_takes_any_text(encoding: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    from stickslip.cli.terminal import paragraph, print_table, say, say_json
+    from stickslip.cli.terminal import aligned, say, say_json, say_styled, wrapped
 
     out, err = io.BytesIO(), io.BytesIO()
     for name, stream in (("stdout", out), ("stderr", err)):
@@ -159,8 +159,9 @@ def test_any_output_takes_any_text(encoding: str, monkeypatch: pytest.MonkeyPatc
     told = "Größe µ² Ω \U0001f600 " + EVIL + BYTES
     say(told)
     say(told, err=True)
-    paragraph((told, "bold"), told)
-    print_table((told, "b"), [[told, "[/x]"]])
+    say_styled(told, bold=True)
+    for line in (*wrapped(told), *aligned((told, "b"), [[told, "[/x]"]])):
+        say(line)
     say_json({"a": told})
     shown = out.getvalue().decode(encoding)
     assert not hidden(shown + err.getvalue().decode(encoding))

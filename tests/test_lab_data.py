@@ -173,7 +173,9 @@ def test_the_answer_is_the_librarys_to_the_last_printed_digit(client: Client, tm
     findings = ss.analyze(ss.read_record(path))
     words = ss.summary(findings)
     assert told["state"] == "done", told["message"]
-    assert told["answer"]["lines"] == [[line.name, line.value, line.interval, line.status] for line in words.lines]
+    assert told["answer"]["lines"] == [
+        [line.name, line.value, line.interval, words.marks(line)] for line in words.lines
+    ]
     kept = client.get(f"/jobs/{job}/results.json").json()
     assert kept["estimates"] == json.loads(json.dumps(ss.summary(findings).data()["estimates"]))
     page = client.get(f"/jobs/{job}/report")

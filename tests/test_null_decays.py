@@ -50,9 +50,11 @@ def test_one_damping_ratio_is_quoted_and_the_others_are_folded() -> None:
 def test_a_terminal_says_how_many_are_folded(tmp_path: Path) -> None:
     values, fs, _ = null_decay(101, "white", dry=0.02)
     file = ss.write_record(ss.Record.of({"x": values}, fs=fs), tmp_path / "release.csv")
-    told = CliRunner().invoke(main, ["decay", str(file), "--output", str(tmp_path / "out")]).output
-    assert "The same by other ways: " in told
+    asked = ["decay", str(file), "--output", str(tmp_path / "out")]
+    told = CliRunner().invoke(main, asked).output
+    assert "More with --all" in told
     assert "by decrements" not in told
+    assert "by decrements" in CliRunner().invoke(main, [*asked, "--all"]).output
     assert "by decrements" in (tmp_path / "out" / "report.html").read_text("utf-8")
 
 

@@ -16,7 +16,7 @@ from click.testing import CliRunner, Result
 
 import stickslip as ss
 from stickslip.cli.program import main
-from stickslip.cli.terminal import print_table
+from stickslip.cli.terminal import aligned
 from stickslip.cli.words import spoken
 
 CONDITIONS = [("dry", 6.13), ("wet", 6.13), ("dry", 1.23), ("wet", 1.23)]
@@ -202,11 +202,14 @@ def test_a_record_of_silence_between_clicks_has_no_spectra() -> None:
 
 
 def test_names_of_a_usual_length_are_not_broken_in_the_terminal(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setenv("COLUMNS", "80")
-    print_table(["condition", *"abcdef"], [["sq_wet_6.13/sensors.csv", *["a cell of a table that is long"] * 6]] * 2)
-    assert capsys.readouterr().out.count("sq_wet_6.13/sensors.csv") == 2
+    lines = aligned(
+        ["condition", *"abcdef"], [["sq_wet_6.13/sensors.csv", *["a cell of a table that is long"] * 6]] * 2
+    )
+    assert sum("sq_wet_6.13/sensors.csv" in line for line in lines) == 2
+    assert max(map(len, lines)) <= 80
 
 
 # ---- coupling in words

@@ -12,7 +12,7 @@ import click
 
 import stickslip as ss
 from stickslip.cli.interrupted import INTERRUPTED
-from stickslip.cli.options import reading_options, result_options, usable
+from stickslip.cli.options import all_option, reading_options, result_options, usable
 from stickslip.cli.progress import progress
 from stickslip.cli.records import (
     answers,
@@ -68,7 +68,13 @@ twins_option = click.option(
 @result_options("FILE-stickslip")
 @reading_options
 def analyze(
-    files: tuple[str, ...], output: Path | None, as_json: bool, method: str, twins: int, **options: Any
+    files: tuple[str, ...],
+    output: Path | None,
+    as_json: bool,
+    everything: bool,
+    method: str,
+    twins: int,
+    **options: Any,
 ) -> None:
     """Find the friction in one record or several.
 
@@ -100,7 +106,7 @@ def analyze(
         tell("drawing and writing", 2 * len(groups))
         results, written = _sure(found, twins, told, folder if output or not as_json else None, tell)
     name_left_out(refused)
-    show(results, written, as_json=as_json)
+    show(results, written, as_json=as_json, everything=everything)
 
 
 def _sure(
@@ -149,8 +155,9 @@ def _tried(findings: Findings, twins: int, tell: Callable[..., None]) -> Finding
     help="Folder for the results.",
 )
 @click.option("--json", "as_json", is_flag=True, help="Print the results as JSON and nothing else.")
+@all_option
 @twins_option
-def demo(output: Path, as_json: bool, twins: int) -> None:
+def demo(output: Path, as_json: bool, everything: bool, twins: int) -> None:
     """Analyse the bundled record of a simulated rig, with the true answers beside the estimates."""
     with progress(3) as tell:
         tell("reading the bundled record", 0)
@@ -160,4 +167,4 @@ def demo(output: Path, as_json: bool, twins: int) -> None:
         findings = ss.analyze(record, **constants)
         tell("drawing and writing", 2)
         results, written = _sure([findings], twins, lambda found: found[0], output, tell)
-    show(results, written, as_json=as_json)
+    show(results, written, as_json=as_json, everything=everything)

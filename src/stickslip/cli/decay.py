@@ -50,7 +50,7 @@ from stickslip.cli.show import show
 @click.option("--channel", metavar="NAME", help="x, theta, v or a; the first of these that the file has unless given.")
 @result_options("FILE-stickslip")
 @reading_options
-def decay(files: tuple[str, ...], output: Path | None, as_json: bool, **options: Any) -> None:
+def decay(files: tuple[str, ...], output: Path | None, as_json: bool, everything: bool, **options: Any) -> None:
     """Tell viscous from dry friction by how a released mass dies away.
 
     FILES hold free decays: displacement, angle, velocity or acceleration of something that was let go. Several
@@ -80,4 +80,4 @@ def decay(files: tuple[str, ...], output: Path | None, as_json: bool, **options:
         results = with_left_out(ss.answers.compare_decays(found) if len(found) > 1 else found[0], refused)
         written = ss.publish(results, folder=folder) if output or not as_json else None
     name_left_out(refused)
-    show(results, written, as_json=as_json)
+    show(results, written, as_json=as_json, everything=everything)

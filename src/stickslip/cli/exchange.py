@@ -8,9 +8,9 @@ from typing import Any
 import click
 
 import stickslip as ss
-from stickslip.cli.options import reading_options
+from stickslip.cli.options import all_option, reading_options
 from stickslip.cli.records import collected, groups_of, read, rig_of
-from stickslip.cli.terminal import complain, say
+from stickslip.cli.terminal import aligned, complain, say
 from stickslip.cli.words import spoken
 
 
@@ -52,12 +52,18 @@ def convert(file: str, out: Path, force: bool, **options: Any) -> None:
 
 @click.command()
 @click.argument("name", required=False)
-def datasets(name: str | None) -> None:
+@all_option
+def datasets(name: str | None, everything: bool) -> None:
     """List the public record sets, or fetch the one named and tell its columns, units and rig."""
     if name is not None:
         say(ss.datasets.info(name), err=True)
         for path in ss.datasets.fetch(name).files:
             say(path)
         return
-    for each in ss.datasets.names():
-        say(f"{ss.datasets.info(each)}\n")
+    sets = [ss.datasets.info(each) for each in ss.datasets.names()]
+    if everything:
+        say("\n\n".join(map(str, sets)))
+        return
+    rows = [(each.name, each.title, each.licence) for each in sets]
+    say("\n".join(aligned(("name", "record set", "licence"), rows)))
+    say("\nMore with --all, or of one: stickslip datasets NAME")

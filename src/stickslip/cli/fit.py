@@ -50,7 +50,7 @@ CURVES = (
 @result_options("FILE-fit")
 @reading_options
 def fit(
-    files: tuple[str, ...], output: Path | None, as_json: bool, laws: str | None, calibration: float,
+    files: tuple[str, ...], output: Path | None, as_json: bool, everything: bool, laws: str | None, calibration: float,
     curve: str | None, system: Path | None,
     **options: Any,
 ) -> None:  # fmt: skip
@@ -83,7 +83,7 @@ def fit(
         )  # fmt: skip
         tell("drawing and writing", 2)
         written = ss.publish(result, folder=folder, record=records) if folder else None
-    show(result, written, as_json=as_json, record=records)
+    show(result, written, as_json=as_json, everything=everything, record=records)
 
 
 def _require_one_question(groups: list[list[Path]], curve: str | None, *, asked: bool) -> None:

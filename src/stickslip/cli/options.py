@@ -66,6 +66,11 @@ def usable(context: click.Context, option: click.Parameter, folder: Path | None)
     return folder
 
 
+all_option = click.option(
+    "--all", "everything", is_flag=True, help="Print all quantities, cautions and notes, as the page has them."
+)
+
+
 def result_options(folder: str) -> Callable[[Callable[..., None]], Callable[..., None]]:
     """The options that say where the results go; `folder` is where they go unless it is said."""
     output = click.option(
@@ -81,7 +86,7 @@ def result_options(folder: str) -> Callable[[Callable[..., None]], Callable[...,
         is_flag=True,
         help="Print the results as JSON and nothing else; a folder is written only with --output.",
     )
-    return lambda command: output(as_json(command))
+    return lambda command: output(as_json(all_option(command)))
 
 
 def case_options(command: Callable[..., None]) -> Callable[..., None]:

@@ -71,7 +71,7 @@ PRESETS = {"air-track": "air_track", "linear-bearing": "linear_bearing", "perfec
 )
 @case_options
 @result_options("NAME-rig, or NAME-plan,")
-def rig(case: str, output: Path | None, as_json: bool, plan: bool, **options: Any) -> None:
+def rig(case: str, output: Path | None, as_json: bool, everything: bool, plan: bool, **options: Any) -> None:
     """Measure a simulated motion with a virtual rig, or plan an experiment on it.
 
     SCENARIO or FILE.toml is what stickslip simulate takes. The record is what sensors would have written that lag,
@@ -98,7 +98,7 @@ def rig(case: str, output: Path | None, as_json: bool, plan: bool, **options: An
         results = _planned(run, bench, tell, options) if plan else _measured(run, bench, tell, options)
         context = {"needs": needs} if plan else {"form": form}
         written = ss.publish(results, folder=folder, **context) if folder else None
-    show(results, written, as_json=as_json, **context)
+    show(results, written, as_json=as_json, everything=everything, **context)
 
 
 def _bench(preset: str, changes: tuple[str, ...]) -> Rig:

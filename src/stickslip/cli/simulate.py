@@ -13,7 +13,7 @@ from stickslip.cli.interrupted import INTERRUPTED
 from stickslip.cli.options import case_options, folder_name, result_options, wanted_case
 from stickslip.cli.progress import progress
 from stickslip.cli.show import show
-from stickslip.cli.terminal import say, say_json
+from stickslip.cli.terminal import say, say_json, wrapped
 
 LIST_WIDTH = 100
 
@@ -34,7 +34,9 @@ LIST_WIDTH = 100
 @click.option("--animate", "animation", type=click.Choice(["gif", "mp4"]), help="Add a moving picture; mp4 by ffmpeg.")
 @click.option("--sound", is_flag=True, help="Add what is heard, sound.wav; of a squeak rig its sensors' record too.")
 @result_options("NAME-stickslip")
-def simulate(case: str | None, listed: bool, output: Path | None, as_json: bool, **options: Any) -> None:
+def simulate(
+    case: str | None, listed: bool, output: Path | None, as_json: bool, everything: bool, **options: Any
+) -> None:
     """Simulate masses that rub, exactly, event by event.
 
     What to simulate is a named scenario, or a TOML file of a system: masses, friction laws and a drive. Without
@@ -50,7 +52,7 @@ def simulate(case: str | None, listed: bool, output: Path | None, as_json: bool,
     Ctrl-C while it runs keeps what was simulated until then, marked "interrupted", with exit code 130.
     """
     if case is None or listed:
-        _list_scenarios(as_json=as_json)
+        _list_scenarios(as_json=as_json, everything=everything)
         return
     wanted = wanted_case(case, **{key: options.pop(key) for key in ("duration", "cycles", "changes", "fs")})
     folder = output or (None if as_json else folder_name(wanted, "stickslip"))
@@ -60,15 +62,21 @@ def simulate(case: str | None, listed: bool, output: Path | None, as_json: bool,
         tell("simulating", 0)
         result = ss.story.outcome(wanted, progress=lambda share: tell(f"simulating, {share:.0%}", share))
         written = ss.publish(result, folder=folder, tell=tell, **options) if folder else None
-    show(result, written, as_json=as_json, **options)
+    show(result, written, as_json=as_json, everything=everything, **options)
     if result.run.status == "interrupted":
         raise SystemExit(INTERRUPTED)
 
 
-def _list_scenarios(*, as_json: bool) -> None:
+def _list_scenarios(*, as_json: bool, everything: bool) -> None:
     found = {name: ss.scenarios.get(name) for name in ss.scenarios.names()}
     if as_json:
         say_json({name: each.about for name, each in found.items()})
+        return
+    if not everything:
+        families = [list(group) for _, group in itertools.groupby(found, key=lambda name: name.partition(" ")[0])]
+        shown = [f'"{names[0]}"' + f" and {len(names) - 1} more" * (len(names) > 1) for names in families]
+        more = f'{len(found)} scenarios; --all has each with what is known of it; run one: stickslip simulate "NAME"'
+        say("\n".join([*wrapped(", ".join(shown)), "", *wrapped(more)]))
         return
     cases = [(ss.systems.scenario_case(name), ", ".join(each.known).replace("_", " ")) for name, each in found.items()]
     for (about, parts, known), group in itertools.groupby(

@@ -50,6 +50,7 @@ def squeak(
     files: tuple[str, ...],
     output: Path | None,
     as_json: bool,
+    everything: bool,
     channel: str | None,
     frequencies: str | None,
     lever: str | None,
@@ -83,4 +84,4 @@ def squeak(
         tell("drawing and writing", 2 * len(groups))
         written = ss.publish(results, folder=folder) if output or not as_json else None
     name_left_out(refused)
-    show(results, written, as_json=as_json)
+    show(results, written, as_json=as_json, everything=everything)

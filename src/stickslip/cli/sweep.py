@@ -8,7 +8,7 @@ import click
 
 import stickslip as ss
 from stickslip.cli.interrupted import INTERRUPTED
-from stickslip.cli.options import usable
+from stickslip.cli.options import all_option, usable
 from stickslip.cli.show import print_json, show
 from stickslip.cli.terminal import say
 
@@ -22,7 +22,8 @@ from stickslip.cli.terminal import say
 @click.option("--output", type=click.Path(path_type=Path), callback=usable, metavar="DIR",
               help="Folder for the report and its figures; none unless given.")  # fmt: skip
 @click.option("--json", "as_json", is_flag=True, help="Print the results as JSON and nothing else.")
-def sweep(file: Path, engine: str, store: Path | None, output: Path | None, as_json: bool) -> None:
+@all_option
+def sweep(file: Path, engine: str, store: Path | None, output: Path | None, as_json: bool, everything: bool) -> None:
     """Map what a system does over a grid of its parameters.
 
     FILE names the system, the grid and what is asked of each motion; every finished block is kept in the store, and a
@@ -48,7 +49,7 @@ def sweep(file: Path, engine: str, store: Path | None, output: Path | None, as_j
     if as_json:
         print_json({**story.data(), "store": str(place)})
         raise SystemExit(0 if whole else INTERRUPTED)
-    show(found, written, as_json=False)
+    show(found, written, as_json=False, everything=everything)
     say(f"Map: {place}")
     if not whole:
         say("Call again to go on.")

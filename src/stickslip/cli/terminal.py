@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+import itertools
 import json
+import shutil
 import sys
+import textwrap
 from collections.abc import Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
 from stickslip.printing import printable
 
-if TYPE_CHECKING:
-    from rich.console import RenderableType
-
+WIDEST = 110  # columns: longer lines are hard to read
+GAP, NARROW = 2, 6  # columns between two, and of the narrowest that is broken
 WHOLE = 28  # letters of a name that is not broken
 
 
@@ -32,33 +34,33 @@ def say_json(told: Mapping[str, Any]) -> None:
     say(json.dumps(told, indent=2, ensure_ascii=False, allow_nan=False))
 
 
-def paragraph(*parts: str | tuple[str, str]) -> None:
-    """Text broken at the terminal's width; a part may have a style: ``("Title", "bold")``."""
-    from rich.text import Text
-
-    styled = ((part, "") if isinstance(part, str) else part for part in parts)
-    _print(Text.assemble(*((_shown(text), style) for text, style in styled)))
+def say_styled(line: str, **style: Any) -> None:
+    """A line in a style of :func:`click.style`, where it is a terminal that shows styles."""
+    click.echo(click.style(_shown(line), **style) if style else _shown(line))
 
 
-def print_table(headings: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
-    """A table under its headings; the first column is broken only where it is long."""
-    from rich.table import Table
-    from rich.text import Text
-
-    rows = list(rows)
-    table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
-    for place, heading in enumerate(headings):
-        whole = place == 0 and max((len(row[0]) for row in rows), default=0) <= WHOLE
-        table.add_column(Text(_shown(heading)), overflow="fold", no_wrap=whole)
-    for row in rows:
-        table.add_row(*(Text(_shown(cell)) for cell in row))
-    _print(table)
+def wrapped(text: str, begin: str = "") -> list[str]:
+    """A paragraph as lines of the terminal's width; the further ones stand under the first behind `begin`."""
+    return textwrap.wrap(_shown(text), _width(), initial_indent=begin, subsequent_indent=" " * len(begin))
 
 
-def _print(what: RenderableType) -> None:
-    from rich.console import Console
+def aligned(headings: Sequence[str], rows: Iterable[Sequence[str]]) -> list[str]:
+    """A table under its headings as lines; the widest columns are broken until it fits the terminal."""
+    table = [[_shown(cell) for cell in row] for row in (headings, *rows)]
+    widths = [max(1, *map(len, column)) for column in zip(*table, strict=True)]
+    breakable = range(widths[0] <= WHOLE, len(widths))
+    while sum(widths) + GAP * (len(widths) - 1) > _width():
+        widest = max(breakable, key=lambda place: widths[place], default=0)
+        if widths[widest] <= NARROW:
+            break
+        widths[widest] -= 1
+    broken = ((textwrap.wrap(cell, width) for cell, width in zip(row, widths, strict=True)) for row in table)
+    parts = (part for cells in broken for part in itertools.zip_longest(*cells, fillvalue=""))
+    return [(GAP * " ").join(map(str.ljust, part, widths)).rstrip() for part in parts]
 
-    Console(highlight=False, soft_wrap=False).print(what)
+
+def _width() -> int:
+    return min(WIDEST, shutil.get_terminal_size().columns)
 
 
 def _shown(text: object, *, err: bool = False) -> str:

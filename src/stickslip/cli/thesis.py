@@ -14,7 +14,7 @@ import click
 import stickslip as ss
 from stickslip.cli.options import result_options
 from stickslip.cli.progress import progress
-from stickslip.cli.terminal import paragraph, print_table, say, say_json
+from stickslip.cli.terminal import aligned, say, say_json, wrapped
 
 CHECKOUT = Path(ss.__file__).parents[2]
 _ROW = ("place", "quantity", "verdict", "why")
@@ -83,10 +83,10 @@ def _show(found: dict[str, Any], done: tuple[Any, ...], folder: Path | None) -> 
             [f"{key[0]}: {key[1]}{label}", entries[0]["printed"], "-" if ours is None else f"{ours:.4g}", *key[2:]]
         )
     if rows:
-        print_table(("number", "printed", "ours", "verdict", "why"), rows)
+        say("\n".join(aligned(("number", "printed", "ours", "verdict", "why"), rows)))
     counts = [[chapter.name, *(str(chapter.counts[verdict]) for verdict in found["verdicts"])] for chapter in done]
-    print_table(("chapter", *found["verdicts"]), counts)
+    say("\n".join(aligned(("chapter", *found["verdicts"]), counts)))
     total = ", ".join(f"{count} {verdict}" for verdict, count in found["verdicts"].items() if count)
-    paragraph(f"{len(found['numbers'])} printed numbers: {total}.")
+    say("\n".join(wrapped(f"{len(found['numbers'])} printed numbers: {total}.")))
     if folder is not None:
         say(f"Report: {folder / 'thesis.html'}")

@@ -32,7 +32,9 @@ if TYPE_CHECKING:
 @click.option("--stiffness", metavar="VALUE", help="Spring in N/m, or with its unit, for the same.")
 @result_options("FILE-wavelet")
 @reading_options
-def wavelet(file: str, output: Path | None, as_json: bool, frequencies: str | None, **options: Any) -> None:
+def wavelet(
+    file: str, output: Path | None, as_json: bool, everything: bool, frequencies: str | None, **options: Any
+) -> None:
     """Map a channel over time and frequency, and tell what its sticks are like.
 
     Of an acceleration: at which frequency the contact rings while the mass sticks, how many micro-slips there are,
@@ -55,7 +57,7 @@ def wavelet(file: str, output: Path | None, as_json: bool, frequencies: str | No
         found = ss.answers.time_frequency(parts, frequencies=frequencies, **asked)
         tell("drawing and writing", 2)
         written = ss.publish(found, folder=folder) if folder else None
-    show(found, written, as_json=as_json)
+    show(found, written, as_json=as_json, everything=everything)
 
 
 def _told_of(parts: Iterator[Record], tell: Callable[[str, float], None]) -> Iterator[Record]:

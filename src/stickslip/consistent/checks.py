@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 from typing import Any
@@ -93,6 +93,10 @@ class Amplitudes:
     damper: str
     tolerance: float
 
+    def cured(self, slip: Slip) -> float:
+        """The misfit without a slip."""
+        return self.misfit({**self.values, **{name: by * self.values[of] for name, (of, by) in slip.cure.items()}})
+
     def misfit(self, values: Mapping[str, complex]) -> float:
         """Sum of squares, in standard deviations, of what should be zero, and of energy that runs the wrong way."""
         w, x = self.angular, values["x"]
@@ -115,24 +119,45 @@ class Amplitudes:
         return total
 
 
-def mixups(balance: Amplitudes, checks: Sequence[Check]) -> list[Check]:
-    """A check that names every slip which would make the channels agree, or that none would."""
+@dataclass(frozen=True)
+class Slip:
+    """A slip of the hand that would make the channels agree.
+
+    Attributes
+    ----------
+    words : str
+        What it is.
+    cure : mapping of str to (str, float)
+        Of each channel that is wrong: the channel that it should be read as, and times what.
+    """
+
+    words: str
+    cure: Mapping[str, tuple[str, float]]
+
+
+def mixups(balance: Amplitudes) -> tuple[Slip, ...]:
+    """Every slip that would make the channels agree, the best first; none where they agree or none would."""
     before = balance.misfit(balance.values)
     most = 2 * APART**2
-    tried = sorted((balance.misfit(values), slip) for slip, values in _slips(balance.values))
-    cured = [mixup for misfit, mixup in tried if misfit < max(most, 1.2 * tried[0][0]) and misfit * BETTER < before]
-    if before <= most or not cured:
+    tried = sorted(((balance.cured(slip), slip) for slip in _slips(balance.values)), key=lambda each: each[0])
+    near = max(most, 1.2 * tried[0][0])
+    return tuple(slip for misfit, slip in tried if before > most and misfit < near and misfit * BETTER < before)
+
+
+def slip_check(balance: Amplitudes, slips: Sequence[Slip]) -> list[Check]:
+    """A check that names the slips; none without any."""
+    if not slips:
         return []
-    sentence = " or ".join(cured)
-    return [Check(ONE_SLIP, before**0.5, tried[0][0] ** 0.5, "1", before**0.5, FAILS, sentence)]
+    before, after = balance.misfit(balance.values) ** 0.5, balance.cured(slips[0]) ** 0.5
+    return [Check(ONE_SLIP, before, after, "1", before, FAILS, " or ".join(slip.words for slip in slips))]
 
 
-def _slips(values: Mapping[str, complex]) -> Iterator[tuple[str, dict[str, complex]]]:
+def _slips(names: Iterable[str]) -> Iterator[Slip]:
     """Every channel turned round, every two exchanged, every usual unit mistaken."""
-    for name in values:
-        yield f"{name} has the wrong sign", {**values, name: -values[name]}
-    for one, other in combinations(values, 2):
-        yield f"{one} and {other} are exchanged", {**values, one: values[other], other: values[one]}
-    for name in values:
+    for name in names:
+        yield Slip(f"{name} has the wrong sign", {name: (name, -1.0)})
+    for one, other in combinations(names, 2):
+        yield Slip(f"{one} and {other} are exchanged", {one: (other, 1.0), other: (one, 1.0)})
+    for name in names:
         for unit, factor in UNITS.get(name, {}).items():
-            yield f"{name} is in {unit}, not in its SI unit", {**values, name: factor * values[name]}
+            yield Slip(f"{name} is in {unit}, not in its SI unit", {name: (name, factor)})

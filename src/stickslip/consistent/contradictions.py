@@ -15,7 +15,19 @@ from numpy.typing import NDArray
 
 from stickslip.balance.balance import known_constants
 from stickslip.balance.motion import is_measured, require_change, stretches
-from stickslip.consistent.checks import FAILS, HOLDS, ONE_SLIP, UNTOLD, Check, compared, judged, mixups, untold
+from stickslip.consistent.checks import (
+    FAILS,
+    HOLDS,
+    ONE_SLIP,
+    UNTOLD,
+    Check,
+    Slip,
+    compared,
+    judged,
+    mixups,
+    slip_check,
+    untold,
+)
 from stickslip.consistent.forced_checks import (
     Seen,
     acceleration_check,
@@ -64,10 +76,13 @@ class Consistency(Result):
         In the order of asking.
     status : str
         "ok", or what can not all be true.
+    slips : tuple of Slip
+        What would make the channels agree, the likeliest first.
     """
 
     checks: tuple[Check, ...]
     status: str
+    slips: tuple[Slip, ...] = ()
 
     @property
     def failed(self) -> tuple[Check, ...]:
@@ -172,9 +187,11 @@ def consistency(
         sampling_check(record, seen),
         *cycle_checks(record, seen),
     )
+    slips: tuple[Slip, ...] = ()
     if any(check.verdict == FAILS for check in checks):
-        checks = (*checks, *mixups(seen.balance, checks))
-    return Consistency(checks, what_fails(checks))
+        slips = mixups(seen.balance)
+        checks = (*checks, *slip_check(seen.balance, slips))
+    return Consistency(checks, what_fails(checks), slips)
 
 
 def silent(record: Record, names: Sequence[str]) -> dict[str, str]:

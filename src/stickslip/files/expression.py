@@ -65,6 +65,18 @@ def split_spec(text: str) -> Spec:
     return Spec(before, match[1], match[2], match[3] or "", gain_sd)
 
 
+def times(text: str, factor: float) -> str:
+    """A channel as asked for, times a factor.
+
+    Examples
+    --------
+    >>> times("acc [g] ± 1 %", -1.0), times("F + 2 [N]", 1.0)
+    ('-1 * (acc) [g] ± 1 %', 'F + 2 [N]')
+    """
+    arithmetic = split_spec(text).arithmetic
+    return text if factor == 1 else text.replace(arithmetic, f"{factor:.14g} * ({arithmetic})", 1)
+
+
 def _gain(text: str) -> tuple[str, float]:
     """What stands before the uncertainty of a gain, and that as a part of it; ``a +- b`` is arithmetic."""
     match = re.fullmatch(rf"(.*){PLUS_MINUS}\s*([^\[\]@]*)", text, re.DOTALL)

@@ -28,10 +28,6 @@ POINTS = 2000  # pairs of least and greatest value of a channel that are drawn
 MOTION, FORCES = {"x", "v"}, {"friction", "load", "force"}
 CONSTANTS = ("mass", "stiffness", "damping")
 UNTOLD = " (no unit stated, "  # how a channel's source tells it
-_REPAIRS = {
-    "repair_clock": "clock", "fill_gaps": "gaps", "fill_missing": "missing", "remove_spikes": "spikes",
-    "restore_clipped": "clipping", "remove_drift": "drift",
-}  # fmt: skip
 
 
 def describe(asked: Asked) -> dict[str, Any]:
@@ -135,8 +131,8 @@ def _untold(channel: ss.record.Channel) -> bool:
 
 
 def _fault(fault: Fault) -> dict[str, Any]:
-    match = re.search(rf"\b({'|'.join(_REPAIRS)})\(record", fault.message)
-    repair = _REPAIRS[match[1]] if match else ""
+    match = re.search(rf"\b({'|'.join(ss.story.REPAIRS)})\(record", fault.message)
+    repair = ss.story.REPAIRS[match[1]] if match else ""
     return {"message": on_the_page(fault.message), "severity": fault.severity, "repair": repair}
 
 
@@ -245,8 +241,8 @@ def _shown(story: Story) -> dict[str, Any]:
     return {
         "title": story.title,
         "headline": [on_the_page(sentence) for sentence in story.headline],
-        "cautions": [on_the_page(sentence) for sentence in story.cautions],
-        "lines": [[line.name, line.value, line.interval, line.status] for line in story.lines],
+        "cautions": [on_the_page(sentence) for sentence in story.notices],
+        "lines": [[line.name, line.value, line.interval, story.marks(line)] for line in story.lines],
         "notes": [on_the_page(sentence) for sentence in story.notes],
         "overlay": [],
     }

@@ -197,25 +197,25 @@ def _cycles(findings: Findings, abscissa: str) -> list[tuple[Array, Array]]:
     """Displacement (or velocity) across the contact and friction of at most thirty cycles, thinned."""
     record, loops, drawn = findings.record, findings.loops, []
     assert loops is not None
-    across = _across(findings, abscissa)
+    moved = across(findings, abscissa)
     rows = round(record.fs / loops.frequency.value)
     for start in np.asarray(loops.cycles)[thinned(len(loops.cycles), MOST_CYCLES)]:
         first = round((float(start) - record.start) * record.fs)
         part = slice(max(first, 0), first + rows + 1)
-        some = thinned(len(across[part]), POINTS_A_CYCLE)
+        some = thinned(len(moved[part]), POINTS_A_CYCLE)
         if len(some):
-            drawn.append((across[part][some], record["friction"][part][some]))
+            drawn.append((moved[part][some], record["friction"][part][some]))
     return drawn
 
 
-def _across(findings: Findings, abscissa: str) -> Array:
+def across(findings: Findings, abscissa: str) -> Array:
     """Displacement or velocity of the mass against what it slides on."""
     record, contact = findings.record, findings.settings.get("contact", "ground")
     name = {"displacement": "x", "velocity": "v"}[abscissa]
     if contact == "ground" and name in record:
         return record[name]
-    across: Array = getattr(contact_motion(record, contact=contact, question="the figure"), abscissa)
-    return across
+    moved: Array = getattr(contact_motion(record, contact=contact, question="the figure"), abscissa)
+    return moved
 
 
 @styled

@@ -278,6 +278,23 @@ def _ratio(comparison: ForceComparison, ax: Axes) -> None:
     legend_above(ax, columns=3)
 
 
+def follows(measured: Array, model: Array) -> float:
+    """Share of the motion that a model follows: ``100 (1 - |y - m| / |y - mean y|)`` %, an offset left out.
+
+    Ljung, System Identification (1999), section 16.4, as a comparison of models is commonly rated.
+
+    Examples
+    --------
+    >>> wave = np.sin(np.linspace(0, 20, 1000))
+    >>> round(follows(wave, 0.9 * wave), 1)
+    90.0
+    """
+    both = np.isfinite(measured) & np.isfinite(model)
+    left, whole = (measured - model)[both], measured[both]
+    size = float(np.linalg.norm(whole - whole.mean()))
+    return 100 * (1 - float(np.linalg.norm(left - left.mean())) / size) if size else 0.0
+
+
 @styled
 def plot_twin(trial: Trial, *, record: Record | None = None) -> Figure:
     """Does the rig that the record is believed to come from move as the record did?
@@ -300,13 +317,13 @@ def plot_twin(trial: Trial, *, record: Record | None = None) -> Figure:
     moved = trial.belief.moved
     left = whole["x"] - moved
     left = left - left.mean()
-    follows = 100 * (1 - float(np.linalg.norm(left) / np.linalg.norm(whole["x"] - whole["x"].mean())))
+    rated = follows(whole["x"], moved)
     stretch = whole if record is None else record
     shown = (whole.time >= stretch.time[0]) & (whole.time <= stretch.time[-1])
     figure, (above, below) = new_figure(2, height=4.4, heights=(2, 1))
     factor, unit = prefixed(whole["x"][shown], "m")
     above.plot(whole.time[shown], factor * whole["x"][shown], color=BLUE, label="measured")
-    above.plot(whole.time[shown], factor * moved[shown], color=ORANGE, ls="--", label=f"twin, follows {follows:.2f} %")
+    above.plot(whole.time[shown], factor * moved[shown], color=ORANGE, ls="--", label=f"twin, follows {rated:.2f} %")
     above.set_ylabel(axis_label("x", unit))
     legend_above(above, columns=2)
     factor, unit = prefixed(left[shown], "m")

@@ -18,6 +18,7 @@ from stickslip.decay.fit_decay import LEFT_OVER
 from stickslip.decay.release import CAUGHT
 from stickslip.estimate import Estimate, kinds
 from stickslip.plot.decay import plates_of, plates_together
+from stickslip.story.scope import Scope, of_fit
 from stickslip.story.story import Line, Story, Table, tried
 from stickslip.story.words import WITHIN_DIGIT, cautions, doubts, interval_of, number, value_of
 
@@ -40,8 +41,20 @@ def of_findings(findings: Findings) -> Story:
         findings.name, list(_headline(findings)), cautions(findings),
         settings={**settings, **stated},
         tables=[*_by_other_ways([*decay.beside, *beside]), *([tried("motion", motions)] if motions else [])],
-        draw=lambda: plates_of(decay), data=lambda: _data(decay),
+        draw=lambda: plates_of(decay), data=lambda: _data(decay), look=lambda: _scope(findings),
     )  # fmt: skip
+
+
+def _scope(findings: Findings) -> Scope | None:
+    """The record with the fitted waveform over it, where there is one."""
+    fit = findings.decay.waveform
+    if fit is None:
+        return None
+    asked = ["decay", "--channel", fit.channel]
+    if findings.settings["restoring"] != "linear":
+        asked += ["--restoring", findings.settings["restoring"]]
+    time, fitted = np.concatenate(fit.time), np.concatenate(fit.fitted)
+    return of_fit(findings.record, fit.channel, time, fitted, asked, fit.model)
 
 
 def _by_other_ways(estimates: list[Estimate]) -> Iterator[Table]:
@@ -114,7 +127,7 @@ def _headline(findings: Findings) -> Iterator[str]:
     force = decay.dry_force
     word = "torque" if findings.settings["channel"] == "theta" else "force"
     if force is not None and decay.rubs:
-        yield f"That is a dry friction {word} of {value_of(force)} (95 % sure: {interval_of(force)})."
+        yield f"That is a dry friction {word} of {value_of(force)} (95 %: {interval_of(force)})."
     elif decay.rubs:
         yield f"The dry friction {word} is that displacement times the spring's stiffness; state stiffness= or mass=."
     yield from _motion(decay)
@@ -214,7 +227,7 @@ def _both(ratio: Estimate, dry: Estimate) -> str:
 
 
 def _told(estimate: Estimate) -> str:
-    return f"a {estimate.name} of {value_of(estimate)} (95 % sure: {interval_of(estimate)})"
+    return f"a {estimate.name} of {value_of(estimate)} (95 %: {interval_of(estimate)})"
 
 
 def _hidden(estimate: Estimate, words: str) -> str:
@@ -306,7 +319,7 @@ def _together(comparison: Comparison) -> Iterator[str]:
         yield f"{way} {_both(ratio, dry)}."
     if comparison.dry_force is not None:
         force = comparison.dry_force
-        yield f"That is a dry friction force of {value_of(force)} (95 % sure: {interval_of(force)})."
+        yield f"That is a dry friction force of {value_of(force)} (95 %: {interval_of(force)})."
     either, static = comparison.dry_displacement_any, comparison.static_displacement
     if either is not None:
         yield f"Whichever motion it was, the dry friction displacement is {_reach(either)}."

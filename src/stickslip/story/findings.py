@@ -11,11 +11,27 @@ from typing import Any
 import numpy as np
 
 from stickslip.answers.findings import Comparison, Findings
+from stickslip.estimate import Estimate
 from stickslip.story.story import Line, Story
 from stickslip.story.words import leading, number
 
 # The file that tells findings which hold a result of this name; friction.py tells all others.
 FAMILIES = {"decay": "decay", "squeaks": "squeak"}
+
+
+# What an engineer looks for first: these quantities lead the table, those without a value end it.
+FIRST = (
+    "sliding friction", "Coulomb friction", "viscous friction", "inertia", "friction coefficient",
+    "static over sliding friction", "stuck share of the time", "stops per cycle", "slope of friction against speed",
+    "presliding stiffness", "contact stiffness", "forcing frequency", "sliding friction forward",
+    "sliding friction back", "damping ratio", "damping ratio, whichever motion", "dry friction displacement",
+    "dry friction force", "natural frequency", "static friction displacement",
+)  # fmt: skip
+
+
+def _place(estimate: Estimate) -> tuple[bool, int]:
+    """Where a quantity stands in the table."""
+    return not estimate.known, FIRST.index(estimate.name) if estimate.name in FIRST else len(FIRST)
 
 
 def of_findings(findings: Findings) -> Story:
@@ -27,7 +43,7 @@ def of_findings(findings: Findings) -> Story:
     return replace(
         own,
         headline=[*leading(findings.faults), *own.headline],
-        lines=[*(Line.of(each, findings.true_value(each)) for each in findings.quoted), *own.lines],
+        lines=[*(Line.of(each, findings.true_value(each)) for each in sorted(findings.quoted, key=_place)), *own.lines],
         faults=[str(fault) for fault in findings.faults],
         notes=[*findings.notes, *own.notes],
         settings={**own.settings, **load, **length},

@@ -15,8 +15,9 @@ from stickslip.parameters import unit
 from stickslip.plot.law import law_plates
 from stickslip.record.record import Record
 from stickslip.story.law_files import write_law
-from stickslip.story.story import Line, Story, tried
-from stickslip.story.words import doubts, leading, number
+from stickslip.story.scope import Scope, of_fit
+from stickslip.story.story import Line, Story, Table
+from stickslip.story.words import Caution, doubts, leading, number
 
 Fit: TypeAlias = LawComparison | LawFit | CurveFit
 Records: TypeAlias = Record | Sequence[Record]  # what it was fitted to
@@ -26,32 +27,36 @@ LOUD = 0.3  # of the friction, that a curve leaves for noise
 
 def of_curve(found: CurveFit, *, record: Records = ()) -> Story:
     """A curve of friction."""
-    cautions = [] if found.status == "ok" else [f"{found.status}."]
-    return _story(found, record, list(_curve_told(found)), cautions, data=partial(_curve_numbers, found))
+    return _story(found, record, list(_curve_told(found)), data=partial(_curve_numbers, found))
 
 
 def of_law(found: LawFit, *, record: Records = ()) -> Story:
     """One law."""
-    cautions = [] if found.status == "ok" else [f"{found.status}."]
-    return _story(found, record, list(_law_told(found)), cautions, notes=list(found.checks), data=found.to_dict)
+    return _story(found, record, list(_law_told(found)), notes=list(found.checks), data=found.to_dict)
 
 
 def of_laws(found: LawComparison, *, record: Records = ()) -> Story:
     """Several laws compared."""
-    said = found.status == "ok" or found.status in found.verdict
-    verdicts = [(each.name, f"{each.standing.verdict} ({_values(each.oscillator.law)})") for each in found.candidates]
+    laws = sorted(found.candidates, key=lambda each: each.standing.misfit)
+    rows = [
+        (each.name, _ratio(each.standing.misfit), "yes" if each.standing.kept else "no", _values(each.oscillator.law))
+        for each in laws
+    ]
+    verdicts = [(each.name, each.standing.verdict) for each in laws]
+    note = "Misfit: mean square left over, in channels and records together, over the least that any law leaves."
+    ranked = Table("Laws by misfit", ("law", "misfit", "possible", "parameters"), rows, note)
+    why = Table("Why each law is possible or not", ("law", "verdict"), verdicts, folded=True)
     return _story(
-        found, record, [found.verdict], [] if said else [f"{found.status}."], notes=[*found.checks, *found.fit.checks],
-        tables=[tried("law", verdicts)], history=found.history, data=found.to_dict,
+        found, record, [found.verdict], notes=[*found.checks, *found.fit.checks], tables=[ranked, why],
+        history=found.history, data=found.to_dict,
     )  # fmt: skip
 
 
-def _story(found: Fit, record: Records, headline: list[str], cautions: list[str], **told: Any) -> Story:
+def _story(found: Fit, record: Records, headline: list[str], **told: Any) -> Story:
     """What all fits tell of their parameters and of the records that they were made to."""
     records = [record] if isinstance(record, Record) else list(record)
     units = list(dict.fromkeys(words for each in records for words in leading(each.check())))
-    said = set(doubts_of(found.status))
-    cautions += doubts([estimate for estimate in found.estimates if not said.issuperset(doubts_of(estimate.status))])
+    cautions = [*map(Caution, (doubt.words for doubt in doubts_of(found.status))), *doubts(found.estimates)]
     if records:
         first = records[0]
         told = {"channels": list(first.channels.values()), "history": first.history, **told}
@@ -62,8 +67,23 @@ def _story(found: Fit, record: Records, headline: list[str], cautions: list[str]
     title = record_name(records[0]) if len(records) == 1 else f"{len(records)} records" if records else "Fit"
     return Story(
         title, [*units, *headline], cautions, lines=list(map(Line.of, found.estimates)),
-        draw=lambda: law_plates(found), write=partial(write_law, result=found, records=records), **told,
+        draw=lambda: law_plates(found), look=lambda: _scope(found, records),
+        write=partial(write_law, result=found, records=records), **told,
     )  # fmt: skip
+
+
+def _scope(found: Fit, records: Sequence[Record]) -> Scope | None:
+    """The first record's first channel with what the law's sensor would have read."""
+    fit = found.fit if isinstance(found, LawComparison) else found
+    if not records or isinstance(fit, CurveFit) or not fit.traces:
+        return None
+    traces = fit.traces[0]
+    name = next(iter(traces.measured))
+    return of_fit(records[0], name, traces.time[name], traces.fitted[name], ["fit"], type(fit.law).__name__)
+
+
+def _ratio(misfit: float) -> str:
+    return f"{misfit:.2f}" if misfit < 10 else f"{misfit:.0f}"
 
 
 def _curve_told(found: CurveFit) -> Iterator[str]:

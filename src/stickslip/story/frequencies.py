@@ -40,11 +40,11 @@ def _headline(found: TimeFrequency) -> Iterator[str]:
     if found.transition is not None:
         ring = found.transition
         yield (
-            f"In the sticks the contact rings at {value_of(ring.frequency)} (95 % sure: {interval_of(ring.frequency)}) "
+            f"In the sticks the contact rings at {value_of(ring.frequency)} (95 %: {interval_of(ring.frequency)}) "
             f"with a damping ratio of {value_of(ring.damping)}; {ring.agreement}."
         )
         if ring.stiffness is not None:
-            yield f"That takes a contact of {value_of(ring.stiffness)} (95 % sure: {interval_of(ring.stiffness)})."
+            yield f"That takes a contact of {value_of(ring.stiffness)} (95 %: {interval_of(ring.stiffness)})."
     if found.microslips is not None and found.microslips.kind != UNTOLD:
         slips = found.microslips
         yield f"{len(slips.events)} micro-slips are found in {len(slips.counts)} sticks: {slips.kind}."
@@ -72,4 +72,4 @@ def _of_slip_ringing(found: SlipRinging) -> Iterator[str]:
     if found.difference is not None:
         told = found.verdict if found.verdict.startswith("no") else f"it is {found.verdict}"
         low_high = interval_of(found.difference)
-        yield f"Between the directions {told}: forward less back {value_of(found.difference)} (95 % sure: {low_high})."
+        yield f"Between the directions {told}: forward less back {value_of(found.difference)} (95 %: {low_high})."

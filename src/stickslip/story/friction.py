@@ -13,10 +13,10 @@ from stickslip.cycle.onset import Breakaway
 from stickslip.estimate import Estimate, stands
 from stickslip.plot.friction import plates_of, plates_together
 from stickslip.record.record import RIG_UNITS
+from stickslip.story import scope
 from stickslip.story.story import Line, Story
 from stickslip.story.words import cautions, interval_of, number, sentence, value_of
 
-NEVER = "The contact never sticks."
 RARELY = 0.005  # of the time
 SAME = 0.05  # forward and back differ noticeably beyond this part of the level
 ALIKE = 0.02  # a static friction that differs from the sliding one by less is about as large
@@ -30,6 +30,7 @@ def of_findings(findings: Findings) -> Story:
     return Story(
         findings.name, list(_headline(findings)), cautions(findings, said), notes=list(_exact(findings)),
         settings=_settings(findings), draw=lambda: plates_of(findings), data=lambda: _data(findings),
+        look=lambda: scope.of_findings(findings), remedy=_remedy(findings),
     )  # fmt: skip
 
 
@@ -76,16 +77,25 @@ def _exact(findings: Findings) -> Iterator[str]:
         )
 
 
+def _remedy(findings: Findings) -> str:
+    """The command that reads the channels without the slip that would make them agree."""
+    slips = findings.consistency.slips if findings.contradiction else ()
+    return scope.corrected(findings, slips[0]) if slips else ""
+
+
 def _headline(findings: Findings) -> Iterator[str]:
     if findings.contradiction:
         yield (
             f"The channels contradict each other: perhaps {findings.contradiction}. Until that is mended no force is "
-            "told here; the table has what they give as they are."
+            "given here; the table has what they give as they are."
         )
         if findings.sticks is not None:
-            yield from _of_sticks(findings)
+            yield sentence(f"{_of_sticks(findings)}.")
         return
+    clauses = [_of_level(findings)] if findings.loops is not None else []
+    clauses += [_of_sticks(findings)] if findings.sticks is not None else []
     if findings.loops is not None:
+        yield sentence(f"{'; '.join(clauses)}.")
         yield from _of_loops(findings)
     found = findings.regression
     if found is not None and found.viscous is not None and found.coulomb is not None:
@@ -98,8 +108,8 @@ def _headline(findings: Findings) -> Iterator[str]:
     if apart is not None and findings.loops is None:
         yield from _of_directions(apart.coulomb_forward, apart.coulomb_back)
         yield from _of_directions(apart.viscous_forward, apart.viscous_back, "in viscous friction")
-    if findings.sticks is not None:
-        yield from _of_sticks(findings)
+    if findings.sticks is not None and findings.loops is None:
+        yield sentence(f"{_of_sticks(findings)}.")
     if findings.breakaway is not None:
         yield from _of_breakaway(findings.breakaway)
     if findings.stiffness is not None:
@@ -124,19 +134,22 @@ def _of_directions(forward: Estimate | None, back: Estimate | None, what: str = 
         )
 
 
+def _of_level(findings: Findings) -> str:
+    """How large the friction is; lesser doubts are among the cautions."""
+    level = findings.loops.level
+    if not level.known:
+        return f"the sliding friction is not known: {level.status}"
+    doubt = "" if stands(level.status) else f", which is not to be trusted ({level.status})"
+    if level.interval[0] == 0:
+        return f"no sliding friction is resolved: it is below {value_of(level, level.interval[1])} (95 %){doubt}"
+    return f"the contact slides against {value_of(level)} of friction (95 %: {interval_of(level)}){doubt}"
+
+
 def _of_loops(findings: Findings) -> Iterator[str]:
     loops = findings.loops
     assert loops is not None
     if not loops.level.known:
-        yield f"How large the friction is can not be told: {loops.level.status}."
         return
-    if loops.level.interval[0] == 0:
-        highest = value_of(loops.level, loops.level.interval[1])
-        yield f"No sliding friction can be told from none: it is {highest} at most (95 % sure)."
-    else:
-        yield f"The contact slides against {value_of(loops.level)} of friction (95 % sure: {interval_of(loops.level)})."
-    if not stands(loops.level.status):  # lesser doubts are said among the cautions
-        yield f"That is not to be trusted: {loops.level.status}."
     if findings.coefficient is not None and findings.normal is not None:
         yield (
             f"Under a normal load of {number(findings.normal, 0.0, 'N')} that is a friction coefficient of "
@@ -149,56 +162,50 @@ def _of_loops(findings: Findings) -> Iterator[str]:
     if low > 0 or high < 0:
         yield f"Friction {'rises' if low > 0 else 'falls'} with speed, by {value_of(loops.slope)}."
     elif math.isfinite(low + high):
-        yield "No change of friction with speed can be told from zero."
+        yield "No change of friction with speed is resolved."
 
 
-def _of_sticks(findings: Findings) -> Iterator[str]:
+def _of_sticks(findings: Findings) -> str:
     sticks = findings.sticks
     assert sticks is not None
     if findings.trial is not None and sticks.share.known and sticks.share.interval[0] == 0.0 < sticks.share.interval[1]:
-        yield f"No stick can be told from none: it sticks {100 * sticks.share.interval[1]:.2g} % of the time at most."
-        return
+        return f"no stick is resolved: it sticks below {100 * sticks.share.interval[1]:.2g} % of the time (95 %)"
     if not any(event.kind == "stick" for event in sticks.events):
         brief = sticks.share.value >= RARELY
         share = value_of(sticks.share)
-        yield f"The contact rests only briefly as it turns round, {share} of the time in all." if brief else NEVER
-        return
+        return f"it rests only briefly as it turns round, {share} of the time in all" if brief else "it never sticks"
     if sticks.share.value < RARELY:
-        yield "The contact hardly ever sticks."
-        return
-    beat = f" of {value_of(findings.loops.frequency)}" if findings.loops is not None else ""
+        return "it hardly ever sticks"
     often = sticks.per_cycle.value
-    stops = f", with {often:.2g} stops in each cycle{beat}" if math.isfinite(often) and often > 0 else ""
+    stops = f", with {often:.2g} stops in each cycle" if math.isfinite(often) and often > 0 else ""
     low, high = sticks.share.interval
     share = interval_of(sticks.share) if high - low > 0.01 else value_of(sticks.share)
-    yield f"It sticks {share} of the time{stops}."
+    return f"it sticks {share} of the time{stops}"
 
 
 def _of_breakaway(found: Breakaway) -> Iterator[str]:
     ratio = found.ratio
     low, high = ratio.interval
     if not math.isfinite(low + high):
-        yield f"What it bears just before it slips can not be told: {ratio.status}."
+        yield f"The breakaway force is not known: {ratio.status}."
         return
     more = "more than" if low > 1 + ALIKE else "less than" if high < 1 - ALIKE else "about as much as"
     sides = " and ".join(f"{value_of(each)} {each.name.split()[-1]}" for each in (found.forward, found.back) if each)
     yield (
-        f"Just before it slips it bears {sides}: {more} while it slides ({value_of(ratio)} times, 95 % sure: "
-        f"{interval_of(ratio)})."
+        f"At breakaway it bears {sides}: {more} while it slides ({value_of(ratio)} times, 95 %: {interval_of(ratio)})."
     )
     rings = [each for each in (found.ringing_forward, found.ringing_back) if each is not None]
     if rings:
         yield f"After slip begins it rings at {' and '.join(f'{value_of(e)} {e.name.split()[-1]}' for e in rings)}."
     apart = found.ringing_difference
     if apart is not None and not apart.interval[0] <= 0 <= apart.interval[1]:
-        yield f"The two directions ring apart by {value_of(apart)} (95 % sure: {interval_of(apart)})."
+        yield f"The two directions ring apart by {value_of(apart)} (95 %: {interval_of(apart)})."
 
 
 def _of_contact(stiffness: Estimate, damping: Estimate | None) -> str:
     damped = f" and a damping of {value_of(damping)}" if damping is not None else ""
     return (
-        f"While it holds the contact has a stiffness of {value_of(stiffness)} (95 % sure: {interval_of(stiffness)})"
-        f"{damped}."
+        f"While it holds the contact has a stiffness of {value_of(stiffness)} (95 %: {interval_of(stiffness)}){damped}."
     )
 
 
@@ -208,19 +215,19 @@ def _of_presliding(found: Presliding) -> Iterator[str]:
         play = f", with {value_of(gap)} of play" if gap is not None and gap.interval[0] > 0 else ""
         yield (
             f"Before it slips the contact gives way, with a stiffness of {value_of(found.stiffness)} "
-            f"(95 % sure: {interval_of(found.stiffness)}){play}."
+            f"(95 %: {interval_of(found.stiffness)}){play}."
         )
     elif found.verdict == "rigid":
-        yield f"Before it slips the contact is rigid as far as the record can tell: {found.evidence}."
+        yield f"Before it slips the contact is rigid as far as the record shows: {found.evidence}."
     else:
-        yield f"Whether the contact gives way before it slips can not be told: {found.evidence}."
+        yield f"Whether the contact gives way before it slips is not resolved: {found.evidence}."
 
 
 def _of_pull(found: Pull) -> Iterator[str]:
     if found.regime == "stick-slip":
         yield (
             f"The slider sticks and slips at {value_of(found.frequency)}: while it sticks the force rises by "
-            f"{value_of(found.loading_rate)} (95 % sure: {interval_of(found.loading_rate)}), to "
+            f"{value_of(found.loading_rate)} (95 %: {interval_of(found.loading_rate)}), to "
             f"{value_of(found.breakaway)}, and falls by {value_of(found.drop)} in a slip."
         )
     else:
@@ -240,6 +247,6 @@ def _together(comparison: Comparison) -> Iterator[str]:
         )
     if comparison.coefficient is not None:
         mu = comparison.coefficient
-        yield f"Against the normal load the friction coefficient is {value_of(mu)} (95 % sure: {interval_of(mu)})."
+        yield f"Against the normal load the friction coefficient is {value_of(mu)} (95 %: {interval_of(mu)})."
         if mu.interval[1] - mu.interval[0] > TOO_WIDE * abs(mu.value):
             yield "The interval is wide because few records fix it; more loads would narrow it."

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import base64
+import json
 import re
 from collections.abc import Mapping, Sequence
+from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,12 +16,15 @@ from stickslip.plot import style
 from stickslip.plot.plate import Plate
 from stickslip.printing import printable
 from stickslip.squeak.spectra import Clip
+from stickslip.story.scope import Scope
 from stickslip.story.story import Story, summary
 
 if TYPE_CHECKING:
     from jinja2 import Environment
 
 TEMPLATE = "page.html.jinja"
+SCRIPT = "scope.js"
+DRAWN = ("twin", "close-up", "record", "motion", "identified", "whole-run")  # figures of what the page draws itself
 MOST_SOUND = 1 << 20  # bytes of sound of one record in a page; the folder holds all
 _COLOURS = {
     style.INK: "currentColor", style.FAINT: "var(--faint)", style.SHADE: "var(--shade)", style.BLUE: "var(--blue)",
@@ -85,13 +90,35 @@ def templates(*folders: Path) -> Environment:
         loader=ChoiceLoader([PackageLoader("stickslip.story"), FileSystemLoader(folders)]), autoescape=True,
         undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True, finalize=_visible,
     )  # fmt: skip
-    environment.filters.update(inline_svg=inline_svg, told=told, spelled=style.spelled, played=played, heard=heard)
+    environment.filters.update(
+        inline_svg=inline_svg,
+        told=told,
+        spelled=style.spelled,
+        played=played,
+        heard=heard,
+        packed=packed,
+        closer=closer,
+    )
+    environment.globals.update(script=(files("stickslip.story") / "templates" / SCRIPT).read_text("utf-8"))
     return environment
 
 
 def _visible(value: Any) -> Any:
     """What the page is given: text of others shows its hidden signs."""
     return type(value)(printable(value)) if isinstance(value, str) else value
+
+
+def packed(scope: Scope) -> str:
+    """What the page draws itself, as JSON that no sign of markup ends."""
+    return json.dumps(scope.packed(), allow_nan=False).replace("<", "\\u003c")
+
+
+def closer(story: Story) -> tuple[Plate | None, list[Plate]]:
+    """The figure that leads, and those that are folded: without those that the page draws itself."""
+    named = {plate.name: plate for plate in story.plates}
+    drawn = [named[name] for name in DRAWN if name in named] if story.scope else []
+    first = drawn[0] if drawn else story.plates[0] if story.plates else None
+    return first, [plate for plate in story.plates if plate is not first and plate not in drawn]
 
 
 def heard(clips: Sequence[Clip]) -> Sequence[Clip]:

@@ -28,6 +28,7 @@ from stickslip.plot.trajectory import (
     pressed,
     sampled,
 )  # fmt: skip
+from stickslip.record.record import RIG_UNITS
 from stickslip.solve.curved import CurvedTrajectory
 from stickslip.solve.energies import energy
 from stickslip.solve.simulate import simulate
@@ -36,6 +37,8 @@ from stickslip.solve.trajectory import Event, Trajectory
 from stickslip.squeak.sound import sound_pressure, squeak_record
 from stickslip.squeak.spectra import write_sound
 from stickslip.story.folder import check_folder
+from stickslip.story.scope import Scope
+from stickslip.story.scope import of_run as of_motion
 from stickslip.story.story import Story, Table
 from stickslip.structure import Structure
 from stickslip.systems.file import Case
@@ -50,6 +53,8 @@ SHOWN_EVENTS = 12
 MOST_NAMED = 4  # masses in a sentence
 KINDS = ("slip", "microstick", "stick", "flight")
 TANGENTIAL_NORMAL_TORSIONAL = 3  # displacements of a squeak rig
+LOOKED_CYCLES = 8  # of a run, at first
+LOOKED = 100_000  # samples of a run that is looked at without a record
 HEARD = 10_000.0  # Hz of a sound whose rate was not asked for
 PEAKS = 4001  # instants looked at for the largest values of the last cycle
 
@@ -106,7 +111,9 @@ class Outcome:
 
 def of_run(run: Trajectory) -> Story:
     """A run by itself: its figures."""
-    return Story("Run", draw=lambda: plates_of(run))
+    return Story(
+        "Run", draw=lambda: plates_of(run), look=lambda: _scope(run, min(default_rate(run), LOOKED / run.duration))
+    )
 
 
 def of_outcome(
@@ -146,7 +153,16 @@ def of_outcome(
     return Story(
         f"{case.name}  {case.about}".rstrip(), result.sentences, tables=list(_tables(result)),
         draw=draw, data=lambda: {**result.to_dict(), "fs": rate}, write=write,
+        look=lambda: _scope(run, rate, f"record.{form}"),
     )  # fmt: skip
+
+
+def _scope(run: Trajectory, rate: float, file: str = "record.csv") -> Scope:
+    """The motion as its record has it; of a structure its masses over time."""
+    system = run.system
+    constants = {key: getattr(system, key) for key in (*RIG_UNITS, "damper", "contact") if hasattr(system, key)}
+    alone = {} if isinstance(system, Structure) else constants
+    return of_motion(run.record(fs=rate), cycle_of(run), last_cycles(run, LOOKED_CYCLES), alone, file)
 
 
 def _tables(result: Outcome) -> Iterator[Table]:

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from stickslip.errors import ModelError
-from stickslip.story.words import interval_of, value_of
+from stickslip.story.words import Caution, flags, interval_of, value_of
 
 if TYPE_CHECKING:
     from stickslip.estimate import Estimate
@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from stickslip.record.channels import Channel
     from stickslip.record.record import Record, Step
     from stickslip.squeak.spectra import Clip
+    from stickslip.story.scope import Scope
 
 # Of each kind of result the function that tells it, in a file of this room, which is imported when it is needed.
 TELLERS = {
@@ -99,7 +100,12 @@ def _nothing_more(folder: Path) -> None:
     """Of most results page, numbers and figures are all."""
 
 
-SHORT = 30  # letters of a status that may be said twice
+def _nothing_to_look_at() -> None:
+    """Of maps and sounds the figures are all."""
+
+
+LEADING = 8  # rows that are shown first
+ABOVE = "above"  # the mark of a row whose caution the headline says already
 
 
 @dataclass(frozen=True)
@@ -111,7 +117,8 @@ class Story:
     title : str
         The record's name.
     headline, cautions : sequence of str
-        What was found; what should keep the reader from trusting it.
+        What was found, the answer in the first sentence; what should keep the reader from trusting it. What must be
+        read before the answer is a :class:`Caution` in the headline.
     lines : sequence of Line
         The table.
     faults : sequence of str or None
@@ -128,14 +135,15 @@ class Story:
         What was done to the record.
     parts : sequence of Story
         Of several records, each by itself.
-    draw, listen : callable
-        The figures, and the sounds; called when they are first looked at, as :attr:`plates` and :attr:`clips`.
+    draw, listen, look : callable
+        The figures, the sounds, and what the page draws itself; called when they are first looked at, as
+        :attr:`plates`, :attr:`clips` and :attr:`scope`.
     data : callable
         What ``results.json`` holds.
+    remedy : str
+        The command that would mend what is wrong; empty where nothing is, or no command would.
     write : callable
         Writes the files that this kind of result has beside page, numbers, figures and sounds into a folder.
-    brief : bool
-        Whether a terminal tells the parts in a line each; the page has the rest.
     """
 
     title: str
@@ -151,29 +159,88 @@ class Story:
     parts: Sequence[Story] = ()
     draw: Callable[[], Iterable[Plate]] = tuple
     listen: Callable[[], Sequence[Clip]] = tuple
+    look: Callable[[], Scope | None] = _nothing_to_look_at
     data: Callable[[], Mapping[str, Any]] = dict
+    remedy: str = ""
     write: Callable[[Path], object] = _nothing_more
-    brief: bool = False
 
     @property
     def has_truth(self) -> bool:
         """Whether a true value is known for any row."""
         return any(line.true is not None for line in self.lines)
 
-    def how_sure(self, line: Line) -> str:
-        """A row's status; where it stands above already, that it does."""
-        said = " ".join((*self.headline, *self.cautions))
-        return "as said above" if len(line.status) > SHORT and line.status in said else line.status
+    @property
+    def answer(self) -> str:
+        """The sentence that answers; where nothing is told, none."""
+        return next((told for told in self.headline if not isinstance(told, Caution)), "")
 
     @property
-    def has_checks(self) -> bool:
-        """Whether anything was checked for any row."""
-        return any(line.checks for line in self.lines)
+    def others(self) -> list[str]:
+        """The sentences behind the answer."""
+        return [told for told in self.headline if not isinstance(told, Caution)][1:]
+
+    @property
+    def urgent(self) -> list[str]:
+        """What every number hangs on, told before it."""
+        return [told for told in self.headline if isinstance(told, Caution)]
+
+    @functools.cached_property
+    def notices(self) -> list[Caution]:
+        """The cautions, each reason once: those of rows in the rows' order, which numbers them, then the others."""
+        said = " ".join(self.headline).casefold()
+        rows = [
+            each
+            for each in flags((line.name, line.status) for line in self.lines)
+            if each.reason.casefold() not in said
+        ]
+        reasons, kinds = {each.reason for each in rows}, {each.kind for each in rows} - {""}
+        plain = [each if isinstance(each, Caution) else Caution(each) for each in self.cautions]
+        others = [
+            each
+            for each in plain
+            if each.reason not in reasons and each.kind not in kinds and each.reason.casefold() not in said
+        ]
+        return [*rows, *(each for each in others if not each.names), *(each for each in others if each.names)]
+
+    def marks(self, line: Line) -> str:
+        """The numbers of the cautions that concern a row; none of one that is sure."""
+        numbers = [str(place) for place, each in enumerate(self.notices, start=1) if line.name in each.names]
+        return " ".join(numbers) or ("" if line.status == "ok" else ABOVE)
+
+    def mark(self, caution: Caution) -> str:
+        """The number of a caution that rows bear; none of one that concerns the record."""
+        rows = {line.name for line in self.lines}
+        return str(self.notices.index(caution) + 1) if rows.intersection(caution.names) else ""
+
+    @property
+    def leading(self) -> Sequence[Line]:
+        """The rows that are shown first."""
+        return self.lines[:LEADING]
+
+    def concerned(self, rows: Sequence[Line]) -> list[Caution]:
+        """The cautions of the record as a whole, and of these rows."""
+        names = {line.name for line in rows}
+        return [each for each in self.notices if not self.mark(each) or not names.isdisjoint(each.names)]
+
+    @property
+    def shown(self) -> list[Caution]:
+        """The cautions that stand beside the leading rows."""
+        return self.concerned(self.leading)
+
+    @property
+    def hidden(self) -> list[Caution]:
+        """The cautions of further rows alone."""
+        return [each for each in self.notices if each not in self.shown]
 
     @functools.cached_property
     def plates(self) -> tuple[Plate, ...]:
         """The figures, in reading order."""
         return tuple(self.draw())
+
+    @functools.cached_property
+    def scope(self) -> Scope | None:
+        """What the page draws itself."""
+        return self.look()
 
     @functools.cached_property
     def clips(self) -> Sequence[Clip]:

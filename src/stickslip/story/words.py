@@ -3,18 +3,23 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
-from stickslip.estimate import UNKNOWN, Estimate, decimals, doubts_of
+from stickslip.estimate import FEW, UNKNOWN, Doubt, Estimate, decimals, doubts_of
 from stickslip.record.check import Fault
 from stickslip.units import NOTHING, prefixed
 
 if TYPE_CHECKING:
     from stickslip.answers.findings import Findings
 
+# What a step of a record's history is called where a command asks for it.
+REPAIRS = {
+    "repair_clock": "clock", "fill_gaps": "gaps", "fill_missing": "missing", "remove_spikes": "spikes",
+    "restore_clipped": "clipping", "remove_drift": "drift",
+}  # fmt: skip
 WITHIN_DIGIT = "within its last digit"  # an interval narrower than the digits shown
 FIGURES = 5  # significant figures at most: what is surer than that still reads well
 
@@ -67,59 +72,89 @@ def interval_of(estimate: Estimate) -> str:
     return between if between == UNKNOWN else f"{between}{text}"
 
 
-def cautions(findings: Findings, said: Iterable[Estimate] = ()) -> list[str]:
+class Caution(str):
+    """A caution in words; behind them stand the rows that it speaks against, and the reason alone.
+
+    Attributes
+    ----------
+    reason : str
+        The words without the rows.
+    names : tuple of str
+        The quantities that it speaks against; none of one that concerns the whole record.
+    kind : str
+        The kind of doubt, where there is one.
+
+    Examples
+    --------
+    >>> caution = Caution("the base moves", ["stops per cycle"])
+    >>> caution, caution.reason, caution.names
+    ('Stops per cycle: the base moves.', 'the base moves', ('stops per cycle',))
+    """
+
+    reason: str
+    names: tuple[str, ...]
+    kind: str
+
+    def __new__(cls, reason: str, names: Iterable[str] = (), kind: str = "") -> Self:
+        """A reason, of these rows; of a doubt of this kind."""
+        names = tuple(dict.fromkeys(names))
+        few = ", ".join(names) if len(names) <= 3 else f"{names[0]} and {len(names) - 1} more quantities"
+        caution = super().__new__(cls, sentence(f"{few}: {reason.rstrip('.')}.") if names else reason)
+        caution.reason, caution.names, caution.kind = reason, names, kind
+        return caution
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Caution, (self.reason, self.names, self.kind)
+
+
+def cautions(findings: Findings, said: Iterable[Estimate] = ()) -> list[Caution]:
     """What should keep the reader from trusting a number, but what the headline has `said` of those without a value."""
     untold = {estimate.name for estimate in said if not estimate.known}
     told = [(estimate.name, estimate.status) for estimate in findings.estimates if estimate.name not in untold]
-    flagged = _flags([*told, *findings.doubts])
-    flagged += _of_few([estimate.status for estimate in findings.estimates])
-    if findings.faults:
-        many = len(findings.faults)
-        flagged.append(f"The check-up found {many} fault{'s' * (many > 1)} in the record, listed below.")
-    return flagged
+    return [*flags([*told, *findings.doubts]), *faulty(findings.faults)]
 
 
-def doubts(estimates: Sequence[Estimate]) -> list[str]:
+def doubts(estimates: Iterable[Estimate]) -> list[Caution]:
     """The estimates that are flagged, with the reason, each reason once."""
-    return [
-        *_flags([(each.name, each.status) for each in estimates]),
-        *_of_few([estimate.status for estimate in estimates]),
-    ]
+    return flags((each.name, each.status) for each in estimates)
 
 
-def _flags(told: Sequence[tuple[str, str]]) -> list[str]:
-    """What speaks against answers, each reason once, with the names of those that it speaks against."""
+def flags(told: Iterable[tuple[str, str]]) -> list[Caution]:
+    """What speaks against answers, each reason once, with the names of those concerned; few cycles last."""
     flagged: dict[str, list[str]] = {}
+    few: dict[Doubt, list[str]] = {}
     for name, status in told:
-        if status != "ok" and not _only_few(status):
-            flagged.setdefault(status, []).append(name)
-    return [sentence(f"{_few(names)}: {status}.") for status, names in flagged.items()]
+        for doubt in doubts_of(status):
+            if doubt.count:
+                few.setdefault(doubt, []).append(name)
+            else:
+                flagged.setdefault(doubt.words, []).append(name)
+    return [*(Caution(reason, names) for reason, names in flagged.items()), *_of_few(few)]
 
 
-def _only_few(status: str) -> bool:
-    """Whether nothing is wrong but that the number rests on few cycles: that is said once for all numbers."""
-    return any(doubt.count for doubt in doubts_of(status)) and len(doubts_of(status)) == 1
-
-
-def _of_few(statuses: Sequence[str]) -> Iterator[str]:
+def _of_few(few: Mapping[Doubt, Sequence[str]]) -> Iterator[Caution]:
     """One sentence for all intervals that few cycles leave crude."""
-    few = [doubts_of(status)[0] for status in statuses if _only_few(status)]
     if few:
         counts, kinds = sorted({doubt.count for doubt in few}), dict.fromkeys(doubt.of for doubt in few)
+        names = list(dict.fromkeys(name for those in few.values() for name in those))
         many = f"{counts[0]}" if len(counts) == 1 else f"{counts[0]} to {counts[-1]}"
         plural = "" if counts[-1] == 1 else "s"
-        those = "the interval of one number is" if len(few) == 1 else f"the intervals of {len(few)} numbers are"
-        yield f"There are only {many} {' or '.join(kind + plural for kind in kinds)}: {those} crude."
+        reason = f"only {many} {' or '.join(kind + plural for kind in kinds)}: the interval is crude"
+        yield Caution(reason, names, FEW)
 
 
-def _few(names: list[str]) -> str:
-    """Three names at most."""
-    return ", ".join(names) if len(names) <= 3 else f"{names[0]} and {len(names) - 1} more numbers"
+def faulty(faults: Sequence[Fault]) -> Iterator[Caution]:
+    """What the check-up found beside what leads: the first of it, and how many more."""
+    others = [str(fault) for fault in faults if fault.kind != "unit"]
+    if others:
+        more = len(others) - 1
+        those = f" ({more} more fault{'s' * (more > 1)} in the record)" if more else ""
+        yield Caution(f"The check-up found 1 fault in the record: {others[0]}" if not more else f"{others[0]}{those}")
 
 
-def leading(faults: Iterable[Fault]) -> list[str]:
+def leading(faults: Iterable[Fault]) -> list[Caution]:
     """What the check-up found wrong with units: every number hangs on it, so that it comes first."""
-    return [str(fault) for fault in faults if fault.kind == "unit"]
+    return [Caution(str(fault)) for fault in faults if fault.kind == "unit"]
 
 
 def sentence(words: str) -> str:

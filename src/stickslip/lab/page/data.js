@@ -482,7 +482,7 @@ async function guarded(work) {
 function showAnswer(answer, command) {
   const link = (path, text) => make("a", { href: `jobs/${parts.job}/${path}`, download: "", class: "button" }, text);
   const rows = answer.lines.map((line) => make("tr", {}, make("th", { scope: "row" }, line[0]),
-    ...line.slice(1, 3).map((cell) => make("td", {}, cell)), make("td", { title: line[3] }, sure(answer, line[3]))));
+    ...line.slice(1, 3).map((cell) => make("td", {}, cell)), make("td", {}, line[3] ? `see ${line[3]}` : "ok")));
   const head = ["Quantity", "Value", "95 % interval", "How sure"].map((text) => make("th", { scope: "col" }, text));
   const table = make("div", { class: "data-scroll", tabindex: "0", role: "region", "aria-label": "Results" },
     make("table", { id: "data-results" }, make("thead", {}, make("tr", {}, ...head)), make("tbody", {}, ...rows)));
@@ -492,7 +492,7 @@ function showAnswer(answer, command) {
   parts.answer.replaceChildren(make("article", { class: "card" },
     make("h2", {}, answer.title),
     ...answer.headline.map((text) => make("p", { class: "data-headline" }, text)),
-    ...answer.cautions.map((text, j) => make("p", { class: "data-caution" }, numbered(answer, j), text)),
+    ...answer.cautions.map((text, j) => make("p", { class: "data-caution" }, `${j + 1}. `, text)),
     ...(rows.length ? [table] : []), overlay,
     make("p", { class: "data-downloads" }, link("report?keep=1", "Report (HTML)"), link("results.json", "Numbers (JSON)"),
       link("results.zip", "All with figures (ZIP)"),
@@ -512,13 +512,6 @@ function showAnswer(answer, command) {
   }
   parts.answer.focus();
   lab.say(answer.headline[0] || "done");
-}
-
-// What a caution above says is not said again in each row.
-const numbered = ({ cautions }, j) => (cautions.length > 1 ? `${j + 1}. ` : "");
-function sure(answer, status) {
-  const above = status === "ok" ? -1 : answer.cautions.findIndex((text) => text.includes(status));
-  return above < 0 ? status : `as said above ${numbered(answer, above).replace(/(\d+)\. /, "($1)")}`.trim();
 }
 
 function playIt(state) {

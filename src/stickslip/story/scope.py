@@ -1,0 +1,277 @@
+"""What the page draws itself: the record with its model over it, cycle by cycle, and how to ask about a span."""
+
+from __future__ import annotations
+
+import base64
+import shlex
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from stickslip.answers.findings import Findings
+from stickslip.balance.motion import is_measured
+from stickslip.consistent.checks import Slip
+from stickslip.errors import StickslipError
+from stickslip.files.expression import times
+from stickslip.plot.contact import across
+from stickslip.plot.style import Array, envelope, prefixed, spelled
+from stickslip.plot.traces import follows
+from stickslip.record.record import RIG_UNITS, Record
+from stickslip.rig.rig import Rig
+from stickslip.rig.sensor import Digitiser, Noise, Sensor
+from stickslip.story.words import REPAIRS
+from stickslip.twin.belief import Belief
+
+DETAILED = 12_000  # samples that the page holds one by one; of the others the least and the most of each column
+COLUMNS = 1_500
+LEVELS = 65_534  # of a value, in two bytes; one more is a gap
+MOST_PANELS = 4
+PANELS = ("x", "theta", "v", "a", "load", "force", "friction", "normal", "sound")
+EXPLAINED = "inertia, viscous and dry friction"  # the model of a regression
+BESIDE = {"x": "z"}  # drawn in the same panel
+ROWS = "--rows {first}:{last}"  # of a command, with the rows left open
+READING = ("channels", "units", "fs", "time", "delimiter", "decimal")  # options that read_record has too
+
+
+@dataclass(frozen=True, eq=False)
+class Panel:
+    """A channel over time.
+
+    Attributes
+    ----------
+    name, unit : str
+        What it is, in SI.
+    lines : mapping of str to ndarray
+        "measured", "model" and others by name, all of one length.
+    """
+
+    name: str
+    unit: str
+    lines: Mapping[str, Array]
+
+    def packed(self, detail: slice) -> dict[str, Any]:
+        """For the page, in a readable unit."""
+        factor, unit = prefixed(self.lines["measured"], self.unit)
+        model = self.lines.get("model")
+        merit = None if model is None else follows(self.lines["measured"], model)
+        lines = {name: _line(factor * values, detail) for name, values in self.lines.items()}
+        return {"name": self.name, "unit": "" if unit == "1" else spelled(unit), "merit": merit, "lines": lines}
+
+
+@dataclass(frozen=True, eq=False)
+class Scope:
+    """A record as the page draws it.
+
+    Attributes
+    ----------
+    start, fs : float
+        Time of the first sample [s], and samples a second.
+    panels : sequence of Panel
+        One under the other.
+    model : str
+        What the model is, in a few words; empty without one.
+    across : Panel or None
+        Displacement across the contact, which friction is drawn against; None where there are no cycles.
+    cycles : array-like of float
+        When cycles begin [s].
+    period : float
+        How long they last [s].
+    command : str
+        What asks about the rows from ``{first}`` to ``{last}`` again; empty where nothing can.
+    first : int
+        The file's row of the first sample.
+    view : tuple of float or None
+        From when to when it is shown at first [s]; None: some cycles of its middle.
+    """
+
+    start: float
+    fs: float
+    panels: Sequence[Panel]
+    model: str = ""
+    across: Panel | None = None
+    cycles: Sequence[float] | Array = ()
+    period: float = 0.0
+    command: str = ""
+    first: int = 0
+    view: tuple[float, float] | None = None
+
+    def packed(self) -> dict[str, Any]:
+        """For the page: the whole as envelopes, and of a long record its middle in detail."""
+        count = len(self.panels[0].lines["measured"])
+        middle = count // 2 if self.view is None else round((sum(self.view) / 2 - self.start) * self.fs)
+        first = max(0, min(middle - DETAILED // 2, count - DETAILED))
+        detail = slice(first, min(count, first + DETAILED))
+        cycles = [round(float(cycle), 6) for cycle in self.cycles if self._within(cycle, detail)]
+        return {
+            "start": self.start, "fs": self.fs, "count": count, "detail": [detail.start, detail.stop],
+            "panels": [panel.packed(detail) for panel in self.panels], "model": self.model,
+            "across": None if self.across is None else self.across.packed(detail),
+            "cycles": cycles, "period": self.period,
+            "command": self.command, "first": self.first, "view": self.view,
+        }  # fmt: skip
+
+    def _within(self, cycle: float, detail: slice) -> bool:
+        """Whether a whole cycle lies in what is held in detail."""
+        first, last = ((time - self.start) * self.fs for time in (cycle, cycle + self.period))
+        return bool(detail.start - 0.5 < first and last < detail.stop + 0.5)
+
+
+def _line(values: Array, detail: slice) -> dict[str, Any]:
+    """A line in detail and as a whole, each value in two bytes."""
+    finite = values[np.isfinite(values)]
+    low, high = (float(finite.min()), float(finite.max())) if finite.size else (0.0, 1.0)
+    step = (high - low) / LEVELS or 1.0
+
+    def coded(part: Array) -> str:
+        known = np.isfinite(part)
+        levels = np.where(known, np.round((np.where(known, part, low) - low) / step), LEVELS + 1)
+        return base64.b64encode(levels.astype("<u2").tobytes()).decode("ascii")
+
+    whole = len(values) > detail.stop - detail.start
+    outline = coded(envelope(np.arange(float(len(values))), values, COLUMNS)[1]) if whole else ""
+    return {"low": low, "step": step, "detail": coded(values[detail]), "whole": outline}
+
+
+def of_findings(findings: Findings) -> Scope | None:
+    """A record of friction, with its twin over it where it has one; none of a broken clock."""
+    record, trial, loops = findings.record, findings.trial, findings.loops
+    if record.stamps is not None:
+        return None
+    twin = None if trial is None else _quiet_twin(trial.belief, len(record))
+    panels, model = list(_panels(record, twin)), "" if trial is None or twin is None else str(trial.belief)
+    if not model and findings.regression is not None:
+        panels, model = [_explained(panel, findings) for panel in panels], EXPLAINED
+    moved, cycles, period = None, (), 0.0
+    if loops is not None:
+        moved = _moved(findings, twin)
+        cycles, period = loops.cycles, 1 / loops.frequency.value
+    command, first = command_of(record, "analyze", *_stated(findings.settings))
+    return Scope(record.start, record.fs, panels, model, moved, cycles, period, command, first)
+
+
+def _quiet_twin(belief: Belief, count: int) -> Record | None:
+    """What the rig believed in would have written without noise, counts and chance, with its friction."""
+    sensors = [replace(s, noise=Noise(), digitiser=Digitiser(limit=s.digitiser.limit)) for s in belief.rig.sensors]
+    exact = {name: replace(channel, gain_sd=0.0) for name, channel in belief.record.channels.items()}
+    record = replace(belief.record, channels=exact)
+    try:
+        quiet = replace(belief, record=record, rig=Rig((*sensors, Sensor("friction"))))
+        twin = quiet.twin(np.random.default_rng(0))
+    except StickslipError:
+        return None
+    return twin if len(twin) == count else None
+
+
+def _panels(record: Record, twin: Record | None) -> Iterator[Panel]:
+    """The channels that tell most; friction is one of them."""
+    names = [name for name in PANELS if name in record and (name == "friction" or is_measured(record, name))]
+    names = [name for name in names if name != "v" or "x" not in names]
+    kept = [name for name in names if name != "friction"][: MOST_PANELS - ("friction" in names)]
+    for name in [*kept, *(["friction"] if "friction" in names else [])] or list(record)[:1]:
+        lines = {"measured": record[name]}
+        if twin is not None and name in twin:
+            lines["model"] = twin[name]
+        beside = BESIDE.get(name, "")
+        if beside in record:
+            lines[beside] = record[beside]
+        yield Panel(name, record.channels[name].unit, lines)
+
+
+def _explained(panel: Panel, findings: Findings) -> Panel:
+    """The force that a regression explains, over what was measured of it."""
+    found, time = findings.regression, findings.record.time
+    if panel.name != found.signal:
+        return panel
+    over = np.interp(time, found.time, found.explained, left=np.nan, right=np.nan)
+    return replace(panel, lines={**panel.lines, "model": over})
+
+
+def _moved(findings: Findings, twin: Record | None) -> Panel:
+    """The displacement across the contact, which friction is drawn against."""
+    lines = {"measured": across(findings, "displacement")}
+    if twin is not None:
+        slides_on = twin["z"] if findings.settings.get("contact") == "base" and "z" in twin else 0.0
+        lines["model"] = twin["x"] - slides_on
+    return Panel("displacement", findings.loops.unit, lines)
+
+
+def of_fit(record: Record, name: str, time: Array, fitted: Array, asked: Sequence[str], model: str) -> Scope | None:
+    """A channel with what was fitted to it at some times; none of a broken clock."""
+    if record.stamps is not None:
+        return None
+    lines = {"measured": record[name], "model": np.interp(record.time, time, fitted, left=np.nan, right=np.nan)}
+    command, first = command_of(record, *asked)
+    panels = [Panel(name, record.channels[name].unit, lines)]
+    return Scope(record.start, record.fs, panels, model, command=command, first=first)
+
+
+def of_run(record: Record, period: float, view: tuple[float, float], constants: Mapping[str, Any], file: str) -> Scope:
+    """A simulated motion as a record, that `file` holds too, with its cycles."""
+    moved = None
+    if "x" in record and "friction" in record:
+        base = record["z"] if constants.get("contact") == "base" and "z" in record else 0.0
+        moved = Panel("displacement", record.channels["x"].unit, {"measured": record["x"] - base})
+    cycles = np.arange(view[0], min(view[1], record.start + record.duration - period), period)
+    asked = shlex.join(["stickslip", "analyze", file, *_stated(constants)])
+    return Scope(
+        record.start, record.fs, list(_panels(record, None)), "", moved, cycles, period, f"{asked} {ROWS}",
+        view=view,
+    )  # fmt: skip
+
+
+def command_of(record: Record, question: str, *options: str) -> tuple[str, int]:
+    """What asks a question about some rows of the record again, and the file's row of the first sample.
+
+    Empty of a record that came from no file, or from several that were read one by one.
+    """
+    words = _asked(record, question, options)
+    return (f"{shlex.join(words)} {ROWS}", _read(record).get("rows", (0,))[0] or 0) if words else ("", 0)
+
+
+def corrected(findings: Findings, slip: Slip) -> str:
+    """The command that asks again, with channels read without a slip of the hand; empty where none can."""
+    record = findings.record
+    told = _read(record).get("channels") or {
+        name: channel.source for name, channel in record.channels.items() if channel.source
+    }
+    if not told.keys() >= {of for of, _ in slip.cure.values()}:
+        return ""
+    cured = {name: times(told[of], by) for name, (of, by) in slip.cure.items()}
+    return shlex.join(_asked(record, "analyze", tuple(_stated(findings.settings)), {**told, **cured}))
+
+
+def _read(record: Record) -> Mapping[str, Any]:
+    """The arguments by which the record was read, once; none of another record."""
+    reads = [step.arguments for step in record.history if step.arguments.get("files")]
+    return reads[0] if len(reads) == 1 else {}
+
+
+def _asked(
+    record: Record, question: str, options: Sequence[str], channels: Mapping[str, str] | None = None
+) -> list[str]:
+    """The words of a command about the record's file, with other channels where they are given."""
+    read = _read(record)
+    if not read:
+        return []
+    words = ["stickslip", question, "+".join(file["name"] for file in read["files"])]
+    for option in READING:
+        told = channels if channels and option == "channels" else read.get(option)
+        if isinstance(told, Mapping):
+            words += [word for name, value in told.items() for word in (f"--{option}", f"{name}={value}")]
+        elif told is not None:
+            words += [f"--{option}", f"{told:.12g}" if isinstance(told, float) else str(told)]
+    repairs = [REPAIRS[step.action] for step in record.history if step.action in REPAIRS]
+    words += ["--repair", ",".join(dict.fromkeys(repairs))] if repairs else []
+    return [*words, *options]
+
+
+def _stated(constants: Mapping[str, Any]) -> Iterator[str]:
+    """The options that state a rig; where a damper or a contact ends is said where it is not the ground."""
+    for key in RIG_UNITS:
+        if constants.get(key):
+            yield from (f"--{key}", f"{constants[key]:.12g}")
+    for key in ("damper", "contact"):
+        if constants.get(key) == "base":
+            yield from (f"--{key}", "base")
