@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stickslip.compiled import OPTIONS, compiled
+from stickslip.interpreted import at_once
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -113,7 +114,7 @@ def cells_of(flow: Array, constant: int) -> tuple[Array, Array]:
     moving, resting = np.flatnonzero(~still), np.flatnonzero(still)
     core = np.ascontiguousarray(whole[:, moving[:, None], moving])
     where, which = np.empty((2, len(core)), np.int64)
-    where = where[: distinct(core.reshape(len(core), -1), where, which)]
+    where = where[: at_once(distinct, core.reshape(len(core), -1), where, which, small=count == 1)]
     cell, turned, integral = _one_by_one(core[where]) if count == 1 else _turned(core[where], where % modes)
     hop = np.zeros((len(whole), 3, size, size))
     hop[:, 0, resting, resting] = 1.0
@@ -172,6 +173,12 @@ def _fastest(flow: Array) -> Array:
         values = own[:, :, 0] if len(part) == 1 else np.linalg.eigvals(own)
         rates = np.maximum(rates, np.max(np.abs(values), axis=1))
     return rates
+
+
+def eigenvalues(flow: Array) -> NDArray[np.complex128]:
+    """Those of one flow, part by part, for the same reason."""
+    parts = _parts((flow != 0).tobytes(), len(flow))
+    return np.concatenate([np.linalg.eigvals(flow[np.ix_(part, part)]).astype(complex) for part in parts])
 
 
 @lru_cache(maxsize=256)
