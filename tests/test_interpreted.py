@@ -19,6 +19,9 @@ import stickslip as ss
 from stickslip import drives, interpreted, laws
 from stickslip.compiled import compilation
 from stickslip.solve import kernel
+from stickslip.solve.assembly import table_of
+from stickslip.solve.glide import Model
+from stickslip.solve.phasors import fast_tables
 
 SYSTEMS: dict[str, Callable[[], Any]] = {
     "decay": lambda: ss.Oscillator(2.42, 2310.0, laws.Coulomb(1.1), drives.Release()),
@@ -143,3 +146,13 @@ def test_a_refused_compilation_counts_for_nothing() -> None:
     with pytest.raises(interpreted.Uncompiled), compilation.refused():
         kernel.multiply.compile(types)
     assert compilation.seconds == before
+
+
+def test_types_are_told_to_another_process_as_they_are() -> None:
+    model = Model(table_of(SYSTEMS["rigid"]()).linear, fast_tables(table_of(SYSTEMS["rigid"]())), 0.4)
+    shared = np.zeros((2, 3))[:, :2]
+    shared.flags.writeable = False
+    values = model, kernel.Scratch(*[shared] * 7), (1.0, 2), np.array([True]), np.int16(3), 7, 2.5, False
+    kinds = [kernel.march.typeof_pyval(value) for value in values]
+    again = [interpreted._type_of(json.loads(json.dumps(interpreted._told(kind)))) for kind in kinds]
+    assert again == kinds

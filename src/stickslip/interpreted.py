@@ -9,10 +9,9 @@ The other process outlives this one: what it compiles is there for the next.
 from __future__ import annotations
 
 import atexit
-import base64
+import json
 import math
 import os
-import pickle
 import subprocess
 import sys
 import threading
@@ -26,6 +25,7 @@ from types import FunctionType
 from typing import Any
 
 import numpy as np
+from numba import types
 
 from stickslip.compiled import Uncompiled, common, compilation, generated, is_compiled
 from stickslip.whole import locked
@@ -54,7 +54,8 @@ def at_once(kernel: Any, *arguments: Any, small: bool = True, codes: Iterable[in
             return kernel(*arguments)
     orders = [_ordered("", code.text) for code in known if not code.settled()]
     if not compiled:
-        orders.append(_ordered(kernel.__module__, kernel.__name__, _types(kernel, arguments)))
+        told = map(_told, _types(kernel, arguments))
+        orders.append(_ordered(kernel.__module__, kernel.__name__, *told))
     before = _copied(arguments)
     _limit[:] = orders[-1], time.monotonic() + PATIENCE if processors() == 1 else math.inf
     try:
@@ -142,6 +143,33 @@ def _types(kernel: Any, arguments: tuple[Any, ...]) -> tuple[Any, ...]:
     return tuple(map(kernel.typeof_pyval, arguments))
 
 
+def _told(kind: Any) -> list[Any]:
+    """A type of numba as another process can be told of it: an array, a named tuple, a tuple, or a number."""
+    if isinstance(kind, types.Array):
+        return ["array", str(kind.dtype), kind.ndim, kind.layout, not kind.mutable]
+    if isinstance(kind, types.BaseNamedTuple):
+        return ["named", kind.instance_class.__module__, kind.instance_class.__name__, *map(_told, kind)]
+    if isinstance(kind, types.BaseTuple):
+        return ["tuple", *map(_told, kind)]
+    return ["number", str(kind)]
+
+
+def _type_of(told: list[Any]) -> Any:
+    """The type that was :func:`_told`."""
+    kind, *rest = told
+    if kind == "array":
+        dtype, dimensions, layout, fixed = rest
+        return types.Array(_number(dtype), dimensions, layout, readonly=fixed)
+    if kind == "named":
+        own = getattr(import_module(rest[0]), rest[1])
+        return types.BaseTuple.from_types(tuple(map(_type_of, rest[2:])), own)
+    return types.BaseTuple.from_types(tuple(map(_type_of, rest))) if kind == "tuple" else _number(rest[0])
+
+
+def _number(name: str) -> Any:
+    return types.boolean if name == "bool" else getattr(types, name)
+
+
 def _copied(value: Any) -> Any:
     if isinstance(value, tuple):
         return tuple(map(_copied, value))
@@ -177,7 +205,7 @@ class _Compiler:
             try:
                 self.process = self.process or self.begun()
                 assert self.process.stdin is not None
-                self.process.stdin.write(base64.b64encode(job) + b"\n")
+                self.process.stdin.write(job + b"\n")
                 self.process.stdin.flush()
                 self.waiting.append(done)
             except OSError:
@@ -231,7 +259,7 @@ def _ordered(*job: Any) -> threading.Event:
         done = threading.Event()
         done.set()
         return done
-    return _compiler(os.getpid()).tell(pickle.dumps(job))
+    return _compiler(os.getpid()).tell(json.dumps(job).encode())
 
 
 def serve() -> None:
@@ -244,10 +272,10 @@ def serve() -> None:
         time.sleep(GLANCE)
     with lock or nullcontext():
         for line in sys.stdin.buffer:
-            module, name, *types = pickle.loads(base64.b64decode(line))
+            module, name, *given = json.loads(line)
             if not module:
                 generated(name)
             else:
-                getattr(import_module(module), name).compile(*types)
+                getattr(import_module(module), name).compile(tuple(map(_type_of, given)))
             with suppress(OSError):  # nobody listens any more: what was asked for is compiled all the same
                 print(flush=True)

@@ -23,6 +23,7 @@ PART = 4  # a cell turns one radian; its exponential is summed over a fourth of 
 TERMS = 40  # of that sum at most: it ends where a term changes nothing
 SETTLED = 16  # terms of an exponential after which one that changes nothing is followed by none that does
 ROOM = 2**17  # numbers of the flows whose exponentials are summed together
+ROUNDED = 1e-13  # of a flow's fastest rate: an eigenvalue below is the rounding of zero
 MOST_KNOWN = 512  # flows of single systems whose exponentials are kept
 NEAR = 256  # different rows among which an equal one is looked for
 
@@ -176,9 +177,12 @@ def _fastest(flow: Array) -> Array:
 
 
 def eigenvalues(flow: Array) -> NDArray[np.complex128]:
-    """Those of one flow, part by part, for the same reason."""
-    parts = _parts((flow != 0).tobytes(), len(flow))
-    return np.concatenate([np.linalg.eigvals(flow[np.ix_(part, part)]).astype(complex) for part in parts])
+    """Those of one flow, part by part, for the same reason; what rounding leaves of a zero is one."""
+    values = []
+    for part in _parts((flow != 0).tobytes(), len(flow)):
+        own = np.linalg.eigvals(flow[np.ix_(part, part)]).astype(complex)
+        values.append(np.where(np.abs(own) > ROUNDED * np.max(np.abs(own)), own, 0.0))
+    return np.concatenate(values)
 
 
 @lru_cache(maxsize=256)

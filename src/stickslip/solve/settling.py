@@ -75,8 +75,8 @@ def _split(flow: Array, apart: float) -> Split | None:
         return None
     if fast > FARTHEST * slow:
         raise SolveError(
-            f"a contact of rate {fast:.1e}/s beside motion of {slow:.1e}/s",
-            f"what is {FARTHEST:g} times faster than the motion is lost in the 16 digits of its state",
+            f"a part of the motion that dies at {fast:.1e}/s beside one of {slow:.1e}/s",
+            f"a rate of the contact is far above the motion's own: 16 digits tell no more than {FARTHEST:g} times",
             "leave out the damping or the mass that makes the contact so fast",
         )
     with localcontext() as context:
