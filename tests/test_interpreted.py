@@ -69,7 +69,8 @@ ALONE = """
 import json, threading
 from stickslip import interpreted
 from stickslip.compiled import compilation
-interpreted._ordered = lambda *job: threading.Event()  # the compiler is never done
+interpreted.PATIENCE = 1e9
+interpreted._Order.given = lambda order: threading.Event()  # the compiler is never done
 import test_interpreted as here
 print(json.dumps({**{name: here.told(name) for name in here.SYSTEMS}, "seconds": compilation.seconds}))
 """
@@ -123,7 +124,7 @@ def test_what_takes_python_long_is_left_to_the_compiled_kernel_as_if_it_had_not_
 ) -> None:
     done = threading.Event()
     done.set()
-    monkeypatch.setattr(interpreted, "_ordered", lambda *job: done)
+    monkeypatch.setattr(interpreted._Order, "given", lambda order: done)
     state = np.array([1.0, 2.0])
     assert interpreted.at_once(counted, state) == 4.0
     assert state.tolist() == [2.0, 2.0]

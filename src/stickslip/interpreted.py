@@ -31,13 +31,14 @@ from stickslip.compiled import Uncompiled, common, compilation, generated, is_co
 from stickslip.whole import locked
 from stickslip.workers import processors
 
-PATIENCE = 4.0  # s that Python may run a kernel's source where it takes the compiler's time, on a single processor
+PATIENCE = 4.0  # s in all that a process runs sources: who asks on and on, as a fit, is served by compiling at once
 FEW = 20_000  # samples of a motion that Python has in about a second
 GLANCE = 0.02  # s between two looks whether the compiler is done
 MOST_WAIT = 120.0  # s for another process that compiles: a lock that a dead machine left is not waited for
 SERVE = "from stickslip.interpreted import serve; serve()"
 
 _limit: list[Any] = []  # of the source that runs: what is set when the compiler is done, and the time to give up
+_spent = [0.0]  # s that sources ran in this process
 _codes: dict[int, Code] = {}
 
 
@@ -47,26 +48,28 @@ def at_once(kernel: Any, *arguments: Any, small: bool = True, codes: Iterable[in
     `codes` are the addresses of generated code among the arguments, see :class:`Code`.
     """
     known = [_codes[address] for address in codes]
+    small = small and _spent[0] < PATIENCE
     compiled = bool(getattr(kernel, "overloads", True)) or (small and _loaded(kernel, arguments))
-    if compiled or not small:
-        lacking = [code for code in known if not code.settled(wait=not small)]
-        if not lacking:
-            return kernel(*arguments)
-    orders = [_ordered("", code.text) for code in known if not code.settled()]
-    if not compiled:
-        told = map(_told, _types(kernel, arguments))
-        orders.append(_ordered(kernel.__module__, kernel.__name__, *told))
-    before = _copied(arguments)
-    _limit[:] = orders[-1], time.monotonic() + PATIENCE if processors() == 1 else math.inf
-    try:
-        with np.errstate(all="ignore"):
-            return by_source(kernel)(*arguments)
-    except (Uncompiled, ArithmeticError, ValueError):  # it took long, or Python refuses what a processor calls inf
-        _restored(arguments, before)
+    lacking = [code for code in known if not code.settled()]
+    if compiled and not lacking:
+        return kernel(*arguments)
+    orders = [] if compiled else [_Order(kernel.__module__, kernel.__name__, *map(_told, _types(kernel, arguments)))]
+    orders += [_Order("", code.text) for code in lacking]
+    if small:
+        before, began = _copied(arguments), time.monotonic()
+        _limit[:] = orders[0].given(), began + PATIENCE if processors() == 1 else math.inf
+        for order in orders[1:]:
+            _limit[0] = order.given()
+        try:
+            with np.errstate(all="ignore"):
+                return by_source(kernel)(*arguments)
+        except (Uncompiled, ArithmeticError, ValueError):  # it took long, or Python refuses what a processor calls inf
+            _restored(arguments, before)
+        finally:
+            _spent[0] += time.monotonic() - began
     for order in orders:
-        while not order.wait(GLANCE):  # a wait without an end would not hear a Ctrl-C everywhere
-            pass
-    for code in known:
+        order.wait()
+    for code in lacking:
         code.settled(wait=True)
     return kernel(*arguments)
 
@@ -253,13 +256,25 @@ def _compiler(process: int) -> _Compiler:
     return _Compiler()
 
 
-def _ordered(*job: Any) -> threading.Event:
-    """Have something compiled elsewhere; the event is set when that is done."""
-    if common() is None or getattr(sys, "frozen", False):  # nothing can be handed over, or no Python can be begun
-        done = threading.Event()
-        done.set()
-        return done
-    return _compiler(os.getpid()).tell(json.dumps(job).encode())
+class _Order:
+    """Something to be compiled elsewhere, once it is given to the compiler. Lives for one call."""
+
+    def __init__(self, *job: Any) -> None:
+        self.job = json.dumps(job).encode()
+
+    def given(self) -> threading.Event:
+        """Have it compiled; the event is set when that is done."""
+        if common() is None or getattr(sys, "frozen", False):  # nothing can be handed over, or no Python can be begun
+            done = threading.Event()
+            done.set()
+            return done
+        return _compiler(os.getpid()).tell(self.job)
+
+    def wait(self) -> None:
+        """Wait until it is done, if it was ever given."""
+        done = _compiler(os.getpid()).told.get(self.job)
+        while done is not None and not done.wait(GLANCE):  # a wait without an end would not hear a Ctrl-C everywhere
+            pass
 
 
 def serve() -> None:
