@@ -64,7 +64,7 @@ def process(arguments: list[str], kept: Path) -> tuple[float, float]:
 
 def quiet(kept: Path) -> None:
     """Wait until nothing is compiled any more."""
-    time.sleep(1.0)
+    time.sleep(3.0)  # by then the compiler's process has begun
     (kept / "kernels").mkdir(exist_ok=True)
     while (lock := locked(kept / "kernels")) is None:
         time.sleep(0.2)

@@ -31,14 +31,14 @@ from stickslip.compiled import Uncompiled, common, compilation, generated, is_co
 from stickslip.whole import locked
 from stickslip.workers import processors
 
-PATIENCE = 4.0  # s in all that a process runs sources: who asks on and on, as a fit, is served by compiling at once
+PATIENCE = 3.0  # s in all that a process runs sources: who asks on and on, as a fit, is served by compiling at once
 FEW = 20_000  # samples of a motion that Python has in about a second
 GLANCE = 0.02  # s between two looks whether the compiler is done
 MOST_WAIT = 120.0  # s for another process that compiles: a lock that a dead machine left is not waited for
 SERVE = "from stickslip.interpreted import serve; serve()"
 
 _limit: list[Any] = []  # of the source that runs: what is set when the compiler is done, and the time to give up
-_spent = [0.0]  # s that sources ran in this process
+_spent = [0.0]  # s of the processor that sources took in this process
 _codes: dict[int, Code] = {}
 
 
@@ -56,8 +56,8 @@ def at_once(kernel: Any, *arguments: Any, small: bool = True, codes: Iterable[in
     orders = [] if compiled else [_Order(kernel.__module__, kernel.__name__, *map(_told, _types(kernel, arguments)))]
     orders += [_Order("", code.text) for code in lacking]
     if small:
-        before, began = _copied(arguments), time.monotonic()
-        _limit[:] = orders[0].given(), began + PATIENCE if processors() == 1 else math.inf
+        before, began = _copied(arguments), time.thread_time()
+        _limit[:] = orders[0].given(), time.monotonic() + PATIENCE if processors() == 1 else math.inf
         for order in orders[1:]:
             _limit[0] = order.given()
         try:
@@ -66,7 +66,7 @@ def at_once(kernel: Any, *arguments: Any, small: bool = True, codes: Iterable[in
         except (Uncompiled, ArithmeticError, ValueError):  # it took long, or Python refuses what a processor calls inf
             _restored(arguments, before)
         finally:
-            _spent[0] += time.monotonic() - began
+            _spent[0] += time.thread_time() - began
     for order in orders:
         order.wait()
     for code in lacking:
