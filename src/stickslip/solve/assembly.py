@@ -15,9 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stickslip.errors import ModelError
+from stickslip.interpreted import at_once
 from stickslip.laws.base import Mode
 from stickslip.laws.curved import CurvedLaw
 from stickslip.solve.cells import DEGREE, cells_of, derivatives, derive
+from stickslip.solve.settling import settled
 from stickslip.solve.tables import (
     Array,
     JointMode,
@@ -52,7 +54,7 @@ def table_of(system: System) -> Tables:
 
 
 def _built(system: System) -> Tables:
-    return tables_of(batch_of(system) if isinstance(system, Structure) else systems_of([system])).of(0)
+    return settled(tables_of(batch_of(system) if isinstance(system, Structure) else systems_of([system])).of(0))
 
 
 _known = lru_cache(maxsize=32)(_built)  # a fit asks for the same system from many starts
@@ -322,7 +324,8 @@ class _Builder:
                     series[:, part, 0] = quantities
             self._resets(j, [own for _, own in rows], reset[:, part])
         if not self.systems.joint:
-            derive(flows, first, series, np.empty((2, size**2), np.int64), np.empty(size**2))
+            room = np.empty((2, size**2), np.int64), np.empty(size**2)
+            at_once(derive, flows, first, series, *room, small=count == 1)
         cell, hop = cells_of(flows, self.physical)
         return Tables(
             names=self.names,

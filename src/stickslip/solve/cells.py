@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stickslip.compiled import OPTIONS, compiled
+from stickslip.interpreted import at_once
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -22,6 +23,7 @@ PART = 4  # a cell turns one radian; its exponential is summed over a fourth of 
 TERMS = 40  # of that sum at most: it ends where a term changes nothing
 SETTLED = 16  # terms of an exponential after which one that changes nothing is followed by none that does
 ROOM = 2**17  # numbers of the flows whose exponentials are summed together
+ROUNDED = 1e-13  # of a flow's fastest rate: an eigenvalue below is the rounding of zero
 MOST_KNOWN = 512  # flows of single systems whose exponentials are kept
 NEAR = 256  # different rows among which an equal one is looked for
 
@@ -113,7 +115,7 @@ def cells_of(flow: Array, constant: int) -> tuple[Array, Array]:
     moving, resting = np.flatnonzero(~still), np.flatnonzero(still)
     core = np.ascontiguousarray(whole[:, moving[:, None], moving])
     where, which = np.empty((2, len(core)), np.int64)
-    where = where[: distinct(core.reshape(len(core), -1), where, which)]
+    where = where[: at_once(distinct, core.reshape(len(core), -1), where, which, small=count == 1)]
     cell, turned, integral = _one_by_one(core[where]) if count == 1 else _turned(core[where], where % modes)
     hop = np.zeros((len(whole), 3, size, size))
     hop[:, 0, resting, resting] = 1.0
@@ -172,6 +174,15 @@ def _fastest(flow: Array) -> Array:
         values = own[:, :, 0] if len(part) == 1 else np.linalg.eigvals(own)
         rates = np.maximum(rates, np.max(np.abs(values), axis=1))
     return rates
+
+
+def eigenvalues(flow: Array) -> NDArray[np.complex128]:
+    """Those of one flow, part by part, for the same reason; what rounding leaves of a zero is one."""
+    values = []
+    for part in _parts((flow != 0).tobytes(), len(flow)):
+        own = np.linalg.eigvals(flow[np.ix_(part, part)]).astype(complex)
+        values.append(np.where(np.abs(own) > ROUNDED * np.max(np.abs(own)), own, 0.0))
+    return np.concatenate(values)
 
 
 @lru_cache(maxsize=256)

@@ -18,6 +18,7 @@ from stickslip.oscillator import Oscillator
 from stickslip.solve.assembly import tables_of
 from stickslip.solve.cells import DEGREE
 from stickslip.solve.kernel import multiply
+from stickslip.solve.settling import settled_alike
 from stickslip.solve.tables import Array, Tables, systems_of
 from stickslip.solve.trajectory import Trajectory
 
@@ -107,7 +108,7 @@ def sensitivity(
     changes = _Changes.none(table, count, outputs, run)
     begun, later = np.zeros((len(run.modes), count, size)), np.zeros((len(run.modes), count))
     if neighbours:
-        near = tables_of(systems_of(list(neighbours)))
+        near = settled_alike(tables_of(systems_of(list(neighbours))), table)
         changes.take(near, run, step)
         begun[0, :first, signals] = (near.begin - run.states[0])[:, signals] / step
     knotted = np.array([table.names.index(name) for name in table.motion.knotted], dtype=np.int64)

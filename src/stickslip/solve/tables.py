@@ -147,6 +147,8 @@ class Tables:
         Degrees of freedom: the state starts with their displacements, then their velocities.
     entry : tuple of int
         Modes in which motion starts with negative, zero and positive relative velocity.
+    settling : frozenset of int
+        Exits that are no event, see :mod:`stickslip.solve.settling`.
     """
 
     names: tuple[str, ...]
@@ -169,6 +171,7 @@ class Tables:
     physical: int
     degrees: int
     entry: tuple[int, int, int]
+    settling: frozenset[int] = frozenset()
 
     def of(self, number: int) -> Tables:
         """The tables of one system, without the leading axis."""

@@ -94,6 +94,11 @@ class Tape:
         return tuple(tuple(sorted({*row[row >= size].tolist()})) for row in columns)
 
     @property
+    def settling(self) -> frozenset[int]:
+        """Exits that are no event: none."""
+        return frozenset()
+
+    @property
     def first(self) -> NDArray[np.int64]:
         """Exits of mode j are ``first[j]`` to ``first[j + 1]``."""
         return self.exits.first

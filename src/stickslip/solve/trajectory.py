@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from stickslip.errors import SolveError
+from stickslip.interpreted import FEW, at_once
 from stickslip.record.channels import Channel, described
 from stickslip.record.record import Record, Step
 from stickslip.solve.cells import DEGREE
@@ -166,7 +167,10 @@ class Trajectory:
     @cached_property
     def _changes(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         """Pieces that begin with an event, and a number for what happens there: by which exit, into which mode."""
-        begun = np.flatnonzero(self.exits[:-1] >= 0) + 1
+        told = self.exits[:-1] >= 0
+        if self.table.settling:
+            told &= ~np.isin(self.exits[:-1], list(self.table.settling))
+        begun = np.flatnonzero(told) + 1
         return begun, self.exits[begun - 1].astype(np.int64) * len(self.table.modes) + self.modes[begun]
 
     def _words(self, code: int) -> list[tuple[str, str, int, int]]:
@@ -243,7 +247,10 @@ class Trajectory:
         rows = np.concatenate([self.rows(name) for name in outputs], axis=1)
         out, piece = np.empty((rows.shape[1], len(times))), np.empty(len(times), dtype=np.int64)
         work, c = np.empty((4, self.states.shape[1])), np.empty((len(out), DEGREE + 1))
-        sample(self.table.linear, self.starts, self.modes, self.states, times, rows, piece, out, work, c)
+        at_once(
+            sample, self.table.linear, self.starts, self.modes, self.states, times, rows, piece, out, work, c,
+            small=out.size < FEW,
+        )  # fmt: skip
         return out, piece
 
     @property
