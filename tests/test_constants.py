@@ -252,5 +252,5 @@ def test_a_trial_says_once_that_constants_were_taken_as_exact():
     told = {}
     for name, constants in {"exact": {"mass": 2.42, "stiffness": 2310}, "unsure": RIG}.items():
         quick = ss.analyze(record, **constants)
-        told[name] = [sum(words in note for note in ss.summary(f).notes) for f in (quick, ss.tried(quick, twins=8))]
+        told[name] = [sum(words in note for note in ss.summary(f).headline) for f in (quick, ss.tried(quick, twins=8))]
     assert told == {"exact": [0, 1], "unsure": [0, 0]}

@@ -67,14 +67,19 @@ def _constant(value: float, sd: float, unit: str) -> str:
 
 
 def _exact(findings: Findings) -> Iterator[str]:
-    """Of a trial, that its intervals leave out how sure constants and gains are, where nobody stated that."""
+    """How to state how sure constants and gains are, where the headline says that nobody did."""
+    if _taken_exact(findings):
+        yield (
+            "The intervals leave out how sure your constants and the sensors' gains are: state it as in "
+            '"2.42 ± 0.02 kg", and of a channel as in "COLUMN [g] ± 1 %".'
+        )
+
+
+def _taken_exact(findings: Findings) -> bool:
+    """Whether a trial took constants and gains as exact, as nobody stated how sure they are."""
     record = findings.record
     stated = bool(record.rig and record.rig.sd) or any(channel.gain_sd for channel in record.channels.values())
-    if findings.trial is not None and not stated:
-        yield (
-            "The intervals hold with your constants exact, and with the sensors' gains: how sure they are is not "
-            'stated. Write it as in "2.42 ± 0.02 kg", and of a channel as in "COLUMN [g] ± 1 %".'
-        )
+    return findings.trial is not None and not stated
 
 
 def _remedy(findings: Findings) -> str:
@@ -142,7 +147,8 @@ def _of_level(findings: Findings) -> str:
     doubt = "" if stands(level.status) else f", which is not to be trusted ({level.status})"
     if level.interval[0] == 0:
         return f"no sliding friction is resolved: it is below {value_of(level, level.interval[1])} (95 %){doubt}"
-    return f"the contact slides against {value_of(level)} of friction (95 %: {interval_of(level)}){doubt}"
+    sure = "95 %, with your constants exact" if _taken_exact(findings) else "95 %"
+    return f"the contact slides against {value_of(level)} of friction ({sure}: {interval_of(level)}){doubt}"
 
 
 def _of_loops(findings: Findings) -> Iterator[str]:
