@@ -40,13 +40,7 @@ def counted(findings: ss.answers.Findings, rig: stepped.Rig, tally: dict[str, li
     for estimate in findings.estimates:
         if not estimate.known or not stands(estimate.status):
             continue
-        compared = {
-            "Stribeck": (NAMES[0], *NAMES[2:], RATIO),
-            "LuGre": (NAMES[0], RATIO),
-            "state variable": (NAMES[0],),
-        }
-        compared["compliant"] = (NAMES[0], NAMES[1], RATIO)
-        if estimate.name in compared.get(rig.kind, (*NAMES, RATIO)) and np.isfinite(truth[estimate.name]):
+        if estimate.name in COMPARED.get(rig.kind, (*NAMES, RATIO)) and np.isfinite(truth[estimate.name]):
             tally[estimate.name].append(estimate.includes(truth[estimate.name]))
         if estimate.name == GIVES:
             tally["claim: gives way"].append(rig.kind in stepped.SOFT)
