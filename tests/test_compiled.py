@@ -93,7 +93,7 @@ SQUARE = "from stickslip.compiled import compiled\n\n@compiled()\ndef square(x):
 def test_who_watches_is_told_that_it_compiles_and_for_how_long(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(compiled, "common", lambda: tmp_path)
+    monkeypatch.setattr(compiled, "_root", lambda: tmp_path)
     monkeypatch.setattr(compiled.compilation, "seconds", 0.0)
     monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
     with compiling():
@@ -119,7 +119,7 @@ def test_who_does_not_watch_reads_nothing_of_it(
 def test_the_log_tells_that_it_compiles(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
-    monkeypatch.setattr(compiled, "common", lambda: tmp_path)
+    monkeypatch.setattr(compiled, "_root", lambda: tmp_path)
     monkeypatch.setattr(compiled.compilation, "seconds", 0.0)
     with caplog.at_level("INFO", logger="stickslip"):
         compiled.generated(SQUARE).square(3.0)

@@ -271,7 +271,7 @@ def test_a_hostile_file_is_one_sentence_and_makes_nothing(tmp_path: Path) -> Non
 
 
 def test_generated_code_is_kept_for_the_latest_systems_alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(compiled, "common", lambda: tmp_path)
+    monkeypatch.setattr(compiled, "_root", lambda: tmp_path)
     monkeypatch.setattr(compiled, "KEPT", 4)
     monkeypatch.setattr(compiled, "IN_USE", 0.0)
     first = compiled.generated("number = 0\n")
@@ -287,7 +287,7 @@ def test_generated_code_is_kept_for_the_latest_systems_alone(tmp_path: Path, mon
 
 
 def test_what_was_used_this_minute_is_not_pruned(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(compiled, "common", lambda: tmp_path)
+    monkeypatch.setattr(compiled, "_root", lambda: tmp_path)
     monkeypatch.setattr(compiled, "KEPT", 1)
     for number in range(5):
         compiled.generated(f"number = {number}\n")

@@ -20,7 +20,7 @@ import tempfile
 import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from functools import cache
 from importlib.machinery import SourceFileLoader
 from importlib.util import module_from_spec, spec_from_loader
@@ -30,7 +30,6 @@ from typing import Any
 
 from numba import cfunc, config, njit
 from numba.core import event
-from numba.core.compiler_lock import global_compiler_lock
 
 OPTIONS = {"error_model": "numpy", "_nrt": False}
 FAST = {**OPTIONS, "fastmath": {"contract", "nsz", "arcp"}}
@@ -42,10 +41,6 @@ KEPT = 256  # generated modules on disk, the latest used: what a user comes back
 IN_USE = 60.0  # s: one that was used so lately may be about to be read by another process
 
 
-class Uncompiled(Exception):
-    """What is asked for would have to be compiled first."""
-
-
 class Compilation(event.Listener):  # type: ignore[misc]  # numba tells no types
     """Says when numba begins to compile, which it does not for what it finds on disk, and counts for how long.
 
@@ -53,29 +48,14 @@ class Compilation(event.Listener):  # type: ignore[misc]  # numba tells no types
     ----------
     seconds : float
         That this process has spent compiling so far.
-    is_refused : bool
-        Whether nothing is compiled now.
     """
 
     def __init__(self) -> None:
-        self.seconds, self._depth, self._began, self.is_refused = 0.0, 0, 0.0, False
+        self.seconds, self._depth, self._began = 0.0, 0, 0.0
         event.register("numba:compile", self)
-
-    @contextmanager
-    def refused(self) -> Iterator[None]:
-        """Within, nothing is compiled: a kernel not on disk raises :class:`Uncompiled`, a pointer is Python's own."""
-        with global_compiler_lock:  # what another thread compiles meanwhile waits
-            self.is_refused = True
-            try:
-                yield
-            finally:
-                self.is_refused = False
 
     def on_start(self, event: Any) -> None:
         """A function, or one that it calls, is compiled."""
-        if self.is_refused:
-            self._depth += 1  # numba says the end of what begins by an error as well
-            raise Uncompiled
         if not self._depth:
             self._began = time.perf_counter()
             if not self.seconds:
@@ -85,7 +65,7 @@ class Compilation(event.Listener):  # type: ignore[misc]  # numba tells no types
     def on_end(self, event: Any) -> None:
         """It is done."""
         self._depth -= 1
-        if not self._depth and not self.is_refused:
+        if not self._depth:
             self.seconds += time.perf_counter() - self._began
 
     def timed(self, compiler: Callable[[], Any]) -> Any:
@@ -117,9 +97,6 @@ def pointer(signature: Any, **options: Any) -> Callable[[Callable[..., Any]], An
     def compiler(**more: Any) -> Callable[[Callable[..., Any]], Any]:
         return lambda function: compilation.timed(lambda: cfunc(signature, **more)(function))
 
-    if compilation.is_refused:
-        return lambda function: function
-
     return _keeping(compiler, options)
 
 
@@ -139,22 +116,6 @@ def _keeping(compiler: Callable[..., Any], options: dict[str, Any]) -> Callable[
 
 def generated(source: str) -> ModuleType:
     """The module of a text, kept beside what is compiled of it."""
-    file = _written(source)
-    loader = SourceFileLoader(f"{__package__}.{file.stem}", str(file))
-    spec = spec_from_loader(loader.name, loader)
-    assert spec is not None
-    module = module_from_spec(spec)
-    sys.modules[loader.name] = module
-    loader.exec_module(module)
-    return module
-
-
-def is_compiled(source: str) -> bool:
-    """Whether something that was compiled of a text to be :func:`generated` is on disk."""
-    return any(_written(source).parent.rglob("*.nbi"))
-
-
-def _written(source: str) -> Path:
     name = "generated_" + hashlib.sha256(source.encode()).hexdigest()[:16]
     place = _kept(f"{name}-{_digest(_closure(source))}") or _passing()
     file = place / f"{name}.txt"  # no module of the package
@@ -162,7 +123,13 @@ def _written(source: str) -> Path:
         part = file.with_suffix(f".{os.getpid()}-{threading.get_ident()}")
         part.write_text(source, "utf-8")
         part.replace(file)
-    return file
+    loader = SourceFileLoader(f"{__package__}.{name}", str(file))
+    spec = spec_from_loader(loader.name, loader)
+    assert spec is not None
+    module = module_from_spec(spec)
+    sys.modules[loader.name] = module
+    loader.exec_module(module)
+    return module
 
 
 @cache
@@ -224,7 +191,7 @@ def _text(file: Path) -> str:
 
 def _kept(name: str) -> Path | None:
     """The folder of this name at the first place that may be written, made with what is out of use there removed."""
-    root = common()
+    root = _root()
     if root is None:
         return None
     place = root / name
@@ -253,8 +220,7 @@ def _prune(root: Path) -> None:
 
 
 @cache
-def common() -> Path | None:
-    """Where all that is compiled is kept; None where nothing may be written."""
+def _root() -> Path | None:
     chosen = [Path(config.CACHE_DIR)] if config.CACHE_DIR else []
     # Not the common temporary folder: what numba finds there it would run, whoever put it there.
     for parent in (*chosen, PACKAGE / "__pycache__", _own_cache()):

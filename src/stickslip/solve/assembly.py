@@ -15,7 +15,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stickslip.errors import ModelError
-from stickslip.interpreted import at_once
 from stickslip.laws.base import Mode
 from stickslip.laws.curved import CurvedLaw
 from stickslip.solve.cells import DEGREE, cells_of, derivatives, derive
@@ -324,8 +323,7 @@ class _Builder:
                     series[:, part, 0] = quantities
             self._resets(j, [own for _, own in rows], reset[:, part])
         if not self.systems.joint:
-            room = np.empty((2, size**2), np.int64), np.empty(size**2)
-            at_once(derive, flows, first, series, *room, small=count == 1)
+            derive(flows, first, series, np.empty((2, size**2), np.int64), np.empty(size**2))
         cell, hop = cells_of(flows, self.physical)
         return Tables(
             names=self.names,

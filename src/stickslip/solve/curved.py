@@ -22,7 +22,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from stickslip.errors import ModelError, SolveError
-from stickslip.interpreted import FEW, at_once
 from stickslip.solve import collocation, march, taylor
 from stickslip.solve.collocation import Model
 from stickslip.solve.march import LAPS, TIME, TRY, Dense, Shown, Steps, Work
@@ -83,9 +82,7 @@ class CurvedTrajectory(Trajectory):
         out, step = np.empty((len(names), len(times))), np.empty(len(times), dtype=np.int64)
         count = table.watched.most
         work = np.empty(count * (self.order + 1)), np.empty(self.steps.states.shape[1]), np.empty(count)
-        shown, small = _shown(table, self.order), out.size < FEW
-        codes = shown.series, shown.outputs
-        at_once(march.sample, shown, self.steps, times, nodes, out, step, work, codes=codes, small=small)
+        march.sample(_shown(table, self.order), self.steps, times, nodes, out, step, work)
         piece = np.searchsorted(self.starts, self.steps.starts[step], side="right") - 1
         return out, piece
 
@@ -132,11 +129,6 @@ def model_of(table: Tape, rtol: float) -> Model:
     )
 
 
-def codes_of(model: Model) -> tuple[int, int]:
-    """The addresses of generated code that a march calls."""
-    return model.series, model.rates
-
-
 def run_curved(
     table: Tape,
     state: Array,
@@ -166,8 +158,7 @@ def run_curved(
         run.total = last.offsets[-1] + last.lengths[-1] + _lasting(last.laps[-1], table.motion.period)
     if status == "complete":
         tell(1.0)
-        still = at_once(march.rests, run.model, run.mode, run.state, run.work.step.s, codes=codes_of(run.model))
-        status = "at rest" if still else status
+        status = "at rest" if march.rests(run.model, run.mode, run.state, run.work.step.s) else status
     return _assembled(table, run.kept, float(run.total), status, run.model.order)
 
 
@@ -205,7 +196,7 @@ class _Run:
 
     def march(self, *rest: Any) -> tuple[int, int, int, int]:
         """The march of this system."""
-        return at_once(march.march, self.model, *rest, codes=codes_of(self.model))  # type: ignore[no-any-return]
+        return march.march(self.model, *rest)  # type: ignore[no-any-return]
 
     def chunk(self, until: tuple[float, float], follow: March) -> int:
         """March for so many steps at the most, keep them, and say why it ended; refuse what gets nowhere."""

@@ -22,22 +22,11 @@ from numpy.typing import NDArray
 
 from stickslip.compiled import compiled
 from stickslip.errors import SolveError
-from stickslip.interpreted import at_once
 from stickslip.laws.base import Rigid, Row
 from stickslip.laws.curved import CurvedMode, lifted, symbol
 from stickslip.laws.time_delay import DELAYED, TimeDelay
 from stickslip.oscillator import Oscillator
-from stickslip.solve.curved import (
-    CHUNK,
-    STEPS,
-    CurvedTrajectory,
-    Stops,
-    codes_of,
-    degree,
-    model_of,
-    room_for,
-    run_curved,
-)
+from stickslip.solve.curved import CHUNK, STEPS, CurvedTrajectory, Stops, degree, model_of, room_for, run_curved
 from stickslip.solve.march import DONE, DUE, LAPS, TIME, TRY, Steps, Work, march
 from stickslip.solve.tape import Tape, tape
 from stickslip.solve.taylor import EXACT, GROWTH, Array, Index, coded, length
@@ -142,10 +131,9 @@ class _Past:
         self._forget(count)
         before = self.known
         known = Steps._make([*(column[: before + count] for column in self.columns), steps.polys, steps.reach])
-        outcome, self.known, mode = at_once(
-            _march, self.model, self.recalled, clock, state, big, mode, np.array(until), known, before, work,
-            codes=codes_of(self.model),
-        )  # fmt: skip
+        outcome, self.known, mode = _march(
+            self.model, self.recalled, clock, state, big, mode, np.array(until), known, before, work
+        )
         written = self.known - before
         for column, own in zip(steps[:COLUMNS], self.columns, strict=True):
             column[:written] = own[before : self.known]

@@ -16,8 +16,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from stickslip.compiled import generated
 from stickslip.errors import ModelError
-from stickslip.interpreted import Code
 from stickslip.solve.taylor import ASINH, EXP, LINEAR, LOG, POWER, PRODUCT, QUOTIENT, SLOPE, SQUARE, TANH
 
 Number = tuple[int, ...]
@@ -74,7 +74,7 @@ class Structure(NamedTuple):
 
 
 def expansion(nodes: Nodes, kept: tuple[Number, ...], order: int) -> tuple[int, NDArray[np.float64]]:
-    """Address of code that fills a work array with coefficients 0 .. `order`, and its numbers.
+    """Address of compiled code that fills a work array with coefficients 0 .. `order`, and its numbers.
 
     Raises a ModelError where the law has so many curved nodes that compiling would not end soon.
 
@@ -108,7 +108,7 @@ def curved_nodes(nodes: Nodes) -> int:
 
 @cache
 def _compiled(structure: Structure, order: int, stride: int) -> int:
-    return Code(source(structure, order, stride)).address
+    return int(generated(source(structure, order, stride)).series.address)
 
 
 def source(structure: Structure, order: int, stride: int) -> str:

@@ -4,10 +4,11 @@ The rates of such a mode fall into two groups: fast ones, which all decay, and t
 of its parts in the two invariant subspaces, S = P S + (1 - P) S, with P the spectral projector on the slow one, which
 commutes with the flow A. After `DEAD` time constants the fast part is below rounding whatever it was, and from then on
 
-    S' = P A S,    S = P S,
+    S' = (P A - r (1 - P)) S,    S = P S,
 
-without approximation: the flow P A has the slow rates alone, so its cells are long. The mode becomes two: one that ends
-by a clock, whose exit drops the fast part (S -> P S), and one that follows, with the same exits.
+to e^-DEAD times the condition of P: with r the fastest of the slow rates this flow has no fast one, so its cells are
+long, and what rounding, or a neighbour's state, brings in beside the slow subspace dies as well. The mode becomes two:
+one that ends by a clock, whose exit drops the fast part (S -> P S), and one that follows, with the same exits.
 
 P is the matrix sign function of A + rho, with rho between the two groups (Higham, Functions of Matrices, chapter 5):
 (1 + sign) / 2, by Newton's iteration. It is summed in many digits, since P A is the difference of numbers that are as
@@ -30,14 +31,17 @@ from stickslip.solve.tables import OWN, Array, Tables
 APART = 1e4  # fast over slow rates from which a mode is split: the fast part is followed for some 60 cells and more
 FARTHEST = 1e13  # fast over slow rates: beyond, rounding of the state takes part in the speed that the contact has
 DEAD = 60.0  # time constants after which it is dead: e^-60 = 1e-26
+WORTH = 0.1  # of the slow part's cells, that following the fast part until it is dead may take
+DAMPED = 10.0  # times the middle of the gap, at which all of the fast part decays
+NEIGHBOUR = 0.9  # of what is asked of a mode, that is asked of one of a system next to it
 DIGITS = 80  # the square of the ratio of rates may take 30 of them, a double has 16
 Split = tuple[Any, Array, float]
 CLOCK = "age"  # s since the mode began
 
 
-def settled(table: Tables, apart: float = APART) -> Tables:
-    """The tables of one system, with every mode split whose fast rates are so far `apart` from the others; the same
-    where none is. A drive with knots begins a fast part anew at each: its systems are left as they are.
+def settled(table: Tables) -> Tables:
+    """The tables of one system, with every mode split whose fast rates are far apart from the others; the same where
+    none is. A drive with knots begins a fast part anew at each: its systems are left as they are.
 
     Raises
     ------
@@ -46,7 +50,7 @@ def settled(table: Tables, apart: float = APART) -> Tables:
     """
     if table.motion.knots is not None:
         return table
-    splits = {j: split for j, flow in enumerate(table.flow) if (split := _split(flow, apart)) is not None}
+    splits = {j: split for j, flow in enumerate(table.flow) if (split := _split(flow)) is not None}
     return _Splitting(table, splits).build() if splits else table
 
 
@@ -54,37 +58,58 @@ def settled_alike(tables: Tables, like: Tables) -> Tables:
     """The tables of systems next to one, split as that one's are."""
     if not like.settling:
         return tables
-    each = [settled(tables.of(k), 0.9 * APART) for k in range(len(tables.flow))]
+    split = np.searchsorted(like.first, sorted(like.settling), side="right") - 1
+    each = [_neighbour(tables.of(k), split.tolist()) for k in range(len(tables.flow))]
     own: Any = {name: np.array([getattr(one, name) for one in each]) for name in OWN}
     outputs = {name: np.array([one.outputs[name] for one in each]) for name in tables.outputs}
     return replace(each[0], **own, outputs=outputs, motions=tables.motions)
 
 
-def _split(flow: Array, apart: float) -> Split | None:
-    """P in many digits, P A and the time until the fast part is dead; None where there is no such part."""
+def _neighbour(table: Tables, split: list[int]) -> Tables:
+    """One of them, with those modes split."""
+    splits = {}
+    for j in split:
+        own = _split(table.flow[j], NEIGHBOUR)
+        if own is None:
+            raise SolveError(
+                f"a contact whose fast part is split off, next to one whose is not (mode {table.modes[j].name})",
+                "a derivative needs neighbours that are solved alike",
+                "take differences of whole runs",
+            )
+        splits[j] = own
+    return _Splitting(table, splits).build()
+
+
+def _split(flow: Array, share: float = 1.0) -> Split | None:
+    """P in many digits, its flow and the time until the fast part is dead; None where there is no such part.
+
+    Of what is asked of such a part a `share` is enough.
+    """
     values = eigenvalues(flow)
     rates = np.sort(np.abs(values))
     rates = rates[rates > 0]
-    gaps = np.flatnonzero(rates[1:] >= apart * rates[:-1])
+    gaps = np.flatnonzero(rates[1:] >= share * APART * rates[:-1])
     if not len(gaps):
         return None
     slow, fast = rates[gaps[-1] : gaps[-1] + 2]
     middle, decay = math.sqrt(slow * fast), -np.max(values.real[np.abs(values) >= fast])
     # the clock runs for so many cells of the fast rates; the slow ones must be worth that
-    if decay < 10 * middle or DEAD * rates[-1] / decay > 0.1 * rates[-1] / slow:
+    if decay < share * DAMPED * middle or DEAD / decay > WORTH / (share * slow):
         return None
-    if fast > FARTHEST * slow:
+    if share * fast > FARTHEST * slow:
         raise SolveError(
             f"a part of the motion that dies at {fast:.1e}/s beside one of {slow:.1e}/s",
             f"a rate of the contact is far above the motion's own: 16 digits tell no more than {FARTHEST:g} times",
-            "leave out the damping or the mass that makes the contact so fast",
+            "leave out the damping or the mass that makes it so fast",
         )
     with localcontext() as context:
         context.prec = DIGITS
         exact = np.vectorize(Decimal, otypes=[object])(flow)
         unit = np.vectorize(Decimal, otypes=[object])(np.eye(len(flow)))
         keep = (unit + _sign(exact + unit * Decimal(middle), unit)) / 2
-        return keep, _rounded(keep @ exact), DEAD / decay
+        follows = _rounded(keep @ exact - (unit - keep) * Decimal(slow))
+    follows[~flow.any(axis=1)] = 0.0  # what is constant stays so, whatever the iteration left
+    return keep, follows, DEAD / decay
 
 
 def _sign(matrix: Any, unit: Any) -> Any:

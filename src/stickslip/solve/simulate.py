@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from stickslip.errors import ModelError, SolveError
-from stickslip.interpreted import at_once, by_source
 from stickslip.laws.curved import CurvedLaw
 from stickslip.laws.time_delay import TimeDelay
 from stickslip.oscillator import Oscillator
@@ -227,7 +226,7 @@ def run(
         with ExitStack() as holding:
             for at, (signals, values) in stops_of(table, laps, offset):
                 state[signals] = values
-                came, mode = mode, at_once(kernel.begin, model.linear, mode, state, total, 1.0, work)
+                came, mode = mode, kernel.begin(model.linear, mode, state, total, 1.0, work)
                 _refuse(kernel.CHATTER if mode < 0 else kernel.DONE, table, state, came, clock)
                 outcome = kernel.FULL
                 while outcome == kernel.FULL:
@@ -236,12 +235,12 @@ def run(
                     # then; the first call may compile for long, and is left to it
                     if heed is None and getattr(kernel.march, "overloads", True):
                         heed = holding.enter_context(held_back())
-                    outcome, count, mode, clock = at_once(
-                        kernel.march, model, before, state, mode, goal, past, pieces.room(), work, patience
+                    outcome, count, mode, clock = kernel.march(
+                        model, before, state, mode, goal, past, pieces.room(), work, patience
                     )
                     if heed is not None:
                         heed()
-                    passed = by_source(until)(before, clock, period)
+                    passed = until(before, clock, period)
                     pieces.keep(count, passed, total)
                     _refuse(outcome, table, state, mode, clock)
                     if outcome == kernel.FULL and count < CHUNK:  # by its patience: it goes cell by cell

@@ -19,7 +19,6 @@ from numba.extending import intrinsic
 from numpy.typing import NDArray
 
 from stickslip.compiled import compiled
-from stickslip.interpreted import coded_by_source
 from stickslip.solve.roots import NOISE, NONE, UNSURE, first_rise
 
 Array = NDArray[np.float64]
@@ -39,21 +38,16 @@ CODE = types.void(ROW, types.int64, ROW, types.float64, ROW)  # what fills in co
 
 @intrinsic
 def coded(_context: Any, address: Any) -> Any:
-    """The function of the kind `CODE` that an address leads to (see :class:`stickslip.interpreted.Code`): a number is
-    passed in no time, a function's type is not."""
+    """The function of the kind `CODE` at an address: a number is passed in no time, a function's type is not."""
     kind = types.FunctionType(CODE)
 
     def made(context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
         function = cgutils.create_struct_proxy(kind)(context, builder)
-        place = builder.inttoptr(arguments[0], cgutils.voidptr_t.as_pointer())
-        function.c_addr = builder.load(place)
+        function.c_addr = builder.inttoptr(arguments[0], cgutils.voidptr_t)
         function.py_addr = function.jit_addr = cgutils.voidptr_t(None)
         return function._getvalue()
 
     return kind(address), made
-
-
-coded.by_source = coded_by_source
 
 
 class Sums(NamedTuple):

@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from stickslip.errors import SolveError
-from stickslip.interpreted import FEW, at_once
 from stickslip.record.channels import Channel, described
 from stickslip.record.record import Record, Step
 from stickslip.solve.cells import DEGREE
@@ -247,10 +246,7 @@ class Trajectory:
         rows = np.concatenate([self.rows(name) for name in outputs], axis=1)
         out, piece = np.empty((rows.shape[1], len(times))), np.empty(len(times), dtype=np.int64)
         work, c = np.empty((4, self.states.shape[1])), np.empty((len(out), DEGREE + 1))
-        at_once(
-            sample, self.table.linear, self.starts, self.modes, self.states, times, rows, piece, out, work, c,
-            small=out.size < FEW,
-        )  # fmt: skip
+        sample(self.table.linear, self.starts, self.modes, self.states, times, rows, piece, out, work, c)
         return out, piece
 
     @property

@@ -161,7 +161,10 @@ def _quiet_twin(belief: Belief, count: int) -> Record | None:
         twin = quiet.twin(np.random.default_rng(0))
     except StickslipError:
         return None
-    return twin if len(twin) == count else None
+    if len(twin) != count:
+        return None
+    drift = belief.record["x"] - belief.moved - belief.residual  # of the sensor: it is not the rig's
+    return twin.with_channel("x", twin["x"] + drift, unit="m")
 
 
 def _panels(record: Record, twin: Record | None) -> Iterator[Panel]:

@@ -299,7 +299,7 @@ def _values(run: Trajectory) -> dict[str, tuple[float, str]]:
     values = {
         "simulated time": (run.duration, "s"),
         "cycles": (run.duration / period_of(run), "1"),
-        "events": (float(np.count_nonzero(run.exits[:-1] >= 0)), "1"),
+        "events": (float(run.event_counts().total()), "1"),
         **_shares(run),
     }
     for j in range(len(run.labels("x"))):

@@ -37,6 +37,7 @@ FITTED: dict[str, Callable[[Belief], float]] = {
     RATIO: lambda rig: rig.ratio,
     GIVES: lambda rig: rig.contact,
 }
+BOUNDS = {FALL: (-math.inf, math.inf), SHARE: (0.0, 1.0), RATIO: (1.0, math.inf)}  # of others: zero and more
 ASKED = (*DIRECTIONS, SHARE, STOPS)
 SIZES = tuple(1e-4 * 1.4**step for step in range(30))  # of friction, or of the motion: parts looked for, to two fifths
 STICKS = ("stick", "microstick")  # kinds of event
@@ -190,9 +191,8 @@ def try_on_twins(
     for name, value in FITTED.items():
         if name in answers and (name != GIVES or GIVE in belief.values):
             tried[name] = _among(_fitted(answers[name], value, belief, twins, misfit), _apart(belief, value))
-    if RATIO in tried:
-        tried[RATIO] = tried[RATIO].within(1.0, math.inf)
-    return Trial(count, belief, tried, *_powers(belief), misfit.strays)
+    bounded = {name: answer.within(*BOUNDS.get(name, (0.0, math.inf))) for name, answer in tried.items()}
+    return Trial(count, belief, bounded, *_powers(belief), misfit.strays)
 
 
 @dataclass(frozen=True)
@@ -367,8 +367,7 @@ def _estimate(
     """The answer as tried, with a doubt where the record is not of its twins' kind."""
     doubts = [*doubts, misfit.doubt] if misfit.doubt else doubts
     sd = (interval[1] - interval[0]) / (2 * NORMAL_95)
-    tried = Estimate(quick.name, value, interval, sd, quick.unit, method, Status(*doubts), checks or quick.checks)
-    return tried if quick.name == FALL else tried.within(0.0, 1.0 if quick.name == SHARE else math.inf)
+    return Estimate(quick.name, value, interval, sd, quick.unit, method, Status(*doubts), checks or quick.checks)
 
 
 def _strays(belief: Belief, twins: list[_Twin]) -> float:
