@@ -138,16 +138,8 @@ def test_what_the_page_draws_is_the_record_to_its_last_digit() -> None:
     np.testing.assert_allclose(told["low"] + told["step"] * levels, values, atol=10.0 / LEVELS)
 
 
-@pytest.mark.parametrize(
-    ("column", "wrong", "cure"),
-    [
-        ("a", "acc / 9.80665", "9.80665 * (acc / 9.80665) [m/s^2]"),
-        ("a", "-1 * acc", "-1 * (-1 * acc) [m/s^2]"),
-    ],
-)
-def test_the_one_slip_that_explains_a_contradiction_leads_with_the_command_that_mends_it(
-    column: str, wrong: str, cure: str
-) -> None:
+def rig_written(columns: str) -> None:
+    """A rig's noisy x, z and a in a file with these columns."""
     slider = ss.Oscillator(
         mass=2.0, stiffness=3000.0, damping=1.0, law=ss.laws.Coulomb(1.2), drive=ss.drives.HarmonicBase(2e-3, 4.0)
     )
@@ -158,15 +150,39 @@ def test_the_one_slip_that_explains_a_contradiction_leads_with_the_command_that_
         seen[name] + size * rng.standard_normal(len(seen)) for name, size in (("x", 2e-7), ("z", 2e-7), ("a", 1e-3))
     ]
     rows = np.column_stack([seen.time, *noisy])
-    np.savetxt("rig.csv", rows, delimiter=",", header="t [s],plate [m],base [m],acc [m/s^2]", comments="", fmt="%.9g")
-    asked = ["analyze", "rig.csv", "--mass", "2", "--stiffness", "3000", "--damping", "1", "--twins", "0"]
-    asked += ["--channels", "x=plate [m]", "--channels", "z=base [m]"]
-    result = CliRunner().invoke(main, [*asked, "--channels", f"{column}={wrong} [m/s^2]"])
+    np.savetxt("rig.csv", rows, delimiter=",", header=columns, comments="", fmt="%.9g")
+
+
+ASKED = ["analyze", "rig.csv", "--mass", "2", "--stiffness", "3000", "--damping", "1", "--twins", "0"]
+
+
+def mending(options: list[str]) -> list[str]:
+    """The command that stands under the answer."""
+    result = CliRunner().invoke(main, [*ASKED, *options])
     lines = result.stdout.splitlines()
-    assert lines[2].startswith("The channels contradict each other: perhaps a "), result.output
+    assert lines[2].startswith("The channels contradict each other: perhaps "), result.output
     (command,) = (line for line in lines if line.startswith("stickslip analyze"))
-    words = shlex.split(command)
-    assert f"{column}={cure}" in words
+    return shlex.split(command)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "cure"),
+    [("acc / 9.80665", "9.80665 * (acc / 9.80665) [m/s^2]"), ("-1 * acc", "-1 * (-1 * acc) [m/s^2]")],
+)
+def test_the_one_slip_that_explains_a_contradiction_leads_with_the_command_that_mends_it(wrong: str, cure: str) -> None:
+    rig_written("t [s],plate [m],base [m],acc [m/s^2]")
+    named = ["--channels", "x=plate [m]", "--channels", "z=base [m]", "--channels", f"a={wrong} [m/s^2]"]
+    words = mending(named)
+    assert f"a={cure}" in words
+    mended = CliRunner().invoke(main, [*words[1:], "--twins", "0"])
+    assert "The contact slides against 1.2" in mended.stdout, mended.output
+
+
+def test_channels_that_a_file_names_are_mended_too_each_with_its_own_unit() -> None:
+    rig_written("t [s],a [m/s^2],z [m],x [m]")  # x and a exchanged
+    words = mending([])
+    named = [word for before, word in zip(words, words[1:], strict=False) if before == "--channels"]
+    assert sorted(named) == ["a=x [m/s^2]", "x=a [m]", "z=z [m]"]
     mended = CliRunner().invoke(main, [*words[1:], "--twins", "0"])
     assert "The contact slides against 1.2" in mended.stdout, mended.output
 

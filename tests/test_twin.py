@@ -148,6 +148,19 @@ def test_a_rig_near_its_resonance_is_found_from_constants_that_are_off() -> None
     assert belief.kinetic == pytest.approx(rig.friction(belief.sliding_speed), rel=0.02)
 
 
+def test_a_spring_in_the_wrong_unit_gives_no_number() -> None:
+    rng = np.random.default_rng(3)
+    quick = ss.analyze(stepped.record(STOPS, rng), **{**STOPS.stated, "stiffness": STOPS.stiffness / 1000})
+    tried = ss.tried(quick, twins=8)
+    level = estimate(tried, "sliding friction")
+    assert tried.trial.unlike
+    assert not level.known or ASTRAY in kinds(level.status)
+    for answer in tried.estimates:
+        if answer.name in ("stuck share of the time", "stops per cycle") and answer.known:
+            assert answer.interval[0] >= 0
+            assert answer.interval[1] <= 1 or answer.name == "stops per cycle"
+
+
 def test_bristles_whose_static_friction_x_does_not_show_leave_it_open() -> None:
     rig = stepped.Rig(
         "LuGre", 2.0, 800.0, 1.0, 4e-3, 3.9, kinetic=0.2 * PULL, static=0.3 * PULL, speed=2e-3, contact=2e4

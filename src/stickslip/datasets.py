@@ -225,8 +225,11 @@ def demo() -> Record:
         name: Channel(name, sensor["unit"], described(name, sensor["unit"]), sensor["words"], noise=sensor["noise"])
         for name, sensor in about["sensors"].items()
     }
-    history = tuple(Step(**step) for step in about["history"])
-    return Record(samples, channels, about["fs"], 0.0, history, truth=about["truth"])
+    history, truth = tuple(Step(**step) for step in about["history"]), about["truth"]
+    static = dict.fromkeys(("static friction forward", "static friction back"), truth["static friction"])
+    ratio = truth["static friction"] / truth["sliding friction"]
+    truth = {**truth, **static, "static over sliding friction": ratio}
+    return Record(samples, channels, about["fs"], 0.0, history, truth=truth)
 
 
 def _fetched(source: Source, files: list[str]) -> tuple[Path, list[Path]]:

@@ -65,16 +65,17 @@ def split_spec(text: str) -> Spec:
     return Spec(before, match[1], match[2], match[3] or "", gain_sd)
 
 
-def times(text: str, factor: float) -> str:
-    """A channel as asked for, times a factor.
+def times(text: str, factor: float, *, unit: str | None = None) -> str:
+    """A channel as asked for, times a factor, in another `unit` where one is given.
 
     Examples
     --------
-    >>> times("acc [g] ± 1 %", -1.0), times("F + 2 [N]", 1.0)
-    ('-1 * (acc) [g] ± 1 %', 'F + 2 [N]')
+    >>> times("acc [g] ± 1 %", -1.0), times("F + 2 [N]", 1.0), times("acc [g]", 1.0, unit="m")
+    ('-1 * (acc) [g] ± 1 %', 'F + 2 [N]', 'acc [m]')
     """
-    arithmetic = split_spec(text).arithmetic
-    return text if factor == 1 else text.replace(arithmetic, f"{factor:.14g} * ({arithmetic})", 1)
+    spec = split_spec(text)
+    text = text.replace(f"[{spec.unit}]", f"[{unit}]", 1) if unit and spec.unit else text
+    return text if factor == 1 else text.replace(spec.arithmetic, f"{factor:.14g} * ({spec.arithmetic})", 1)
 
 
 def _gain(text: str) -> tuple[str, float]:

@@ -14,10 +14,11 @@ from stickslip.answers.findings import Findings
 from stickslip.balance.motion import is_measured
 from stickslip.consistent.checks import Slip
 from stickslip.errors import StickslipError
-from stickslip.files.expression import times
+from stickslip.files.expression import split_spec, times
 from stickslip.plot.contact import across
 from stickslip.plot.style import Array, envelope, prefixed, spelled
 from stickslip.plot.traces import follows
+from stickslip.printing import printable
 from stickslip.record.record import RIG_UNITS, Record
 from stickslip.rig.rig import Rig
 from stickslip.rig.sensor import Digitiser, Noise, Sensor
@@ -109,7 +110,7 @@ class Scope:
             "panels": [panel.packed(detail) for panel in self.panels], "model": self.model,
             "across": None if self.across is None else self.across.packed(detail),
             "cycles": cycles, "period": self.period,
-            "command": self.command, "first": self.first, "view": self.view,
+            "command": printable(self.command), "first": self.first, "view": self.view,
         }  # fmt: skip
 
     def _within(self, cycle: float, detail: slice) -> bool:
@@ -237,11 +238,14 @@ def corrected(findings: Findings, slip: Slip) -> str:
     """The command that asks again, with channels read without a slip of the hand; empty where none can."""
     record = findings.record
     told = _read(record).get("channels") or {
-        name: channel.source for name, channel in record.channels.items() if channel.source
+        name: channel.source
+        for name, channel in record.channels.items()
+        if channel.source and is_measured(record, name)
     }
     if not told.keys() >= {of for of, _ in slip.cure.values()}:
         return ""
-    cured = {name: times(told[of], by) for name, (of, by) in slip.cure.items()}
+    # of two that were exchanged each keeps its unit
+    cured = {name: times(told[of], by, unit=split_spec(told[name]).unit) for name, (of, by) in slip.cure.items()}
     return shlex.join(_asked(record, "analyze", tuple(_stated(findings.settings)), {**told, **cured}))
 
 
@@ -272,9 +276,11 @@ def _asked(
 
 def _stated(constants: Mapping[str, Any]) -> Iterator[str]:
     """The options that state a rig; where a damper or a contact ends is said where it is not the ground."""
-    for key in RIG_UNITS:
+    sd = constants.get("sd") or {}
+    for key, unit in RIG_UNITS.items():
         if constants.get(key):
-            yield from (f"--{key}", f"{constants[key]:.12g}")
+            sure = f" ± {sd[key]:.12g} {unit}" if sd.get(key) else ""
+            yield from (f"--{key}", f"{constants[key]:.12g}{sure}")
     for key in ("damper", "contact"):
         if constants.get(key) == "base":
             yield from (f"--{key}", "base")

@@ -105,7 +105,7 @@ def _nothing_to_look_at() -> None:
 
 
 LEADING = 8  # rows that are shown first
-ABOVE = "above"  # the mark of a row whose caution the headline says already
+ABOVE = "!"  # the mark of a row whose caution the headline says already
 
 
 @dataclass(frozen=True)

@@ -306,6 +306,12 @@ class Belief:
         return max(noise, TINY * float(np.std(self.record["x"])))
 
     @property
+    def left(self) -> float:
+        """The part of the displacement that it leaves."""
+        moved = float(np.std(levelled(self.record["x"])))
+        return float(np.std(self.residual)) / moved if moved > 0 else 0.0
+
+    @property
     def like_noise(self) -> bool:
         """Whether it leaves no more of the displacement than its noise, and the constants within their uncertainty."""
         return float(np.std(self.residual)) < NEAR * self.noise and self.strain < REACH

@@ -43,6 +43,7 @@ SIZES = tuple(1e-4 * 1.4**step for step in range(30))  # of friction, or of the 
 STICKS = ("stick", "microstick")  # kinds of event
 ANSWERED = 0.5  # of the twins, that must answer a question for the record's answer to be tried on them
 STRAINED = 4.0  # standard deviations by which a constant may be off before that is said
+LOST = 0.3  # of x, that the nearest rig may leave: beyond, twins scatter so far that none strays from another
 UNLIKE = 1.15  # times what noise explains, by which x may stray from its twin before that is said
 ASTRAY, UNFELT, RIVALS = "unlike its twins", "not felt", "another law as likely"  # kinds of doubt
 
@@ -101,7 +102,7 @@ class Trial:
     @property
     def doubt(self) -> Doubt | None:
         """Why the record is not of the kind of its twins; None where it is."""
-        return _Misfit(self.strays, self.belief.strain).doubt
+        return _Misfit(self.strays, self.belief.strain, self.belief.left).doubt
 
     @property
     def unlike(self) -> bool:
@@ -178,7 +179,7 @@ def try_on_twins(
             "an answer is tried on most of its twins",
             "take the quick answers",
         )
-    misfit = _Misfit(_strays(belief, twins), belief.strain)
+    misfit = _Misfit(_strays(belief, twins), belief.strain, belief.left)
     tried = {}
     for name in ASKED:
         if name in answers and answers[name].known:
@@ -201,10 +202,17 @@ class _Misfit:
 
     strays: float
     strain: float
+    left: float
 
     @property
     def doubt(self) -> Doubt | None:
         """What is said of it, where it is too far."""
+        if self.left > LOST:
+            return Doubt(
+                f"its nearest twin leaves {100 * self.left:.0f} % of x: a constant, a unit or a channel is not as "
+                "stated, or the contact is of no kind that was tried",
+                ASTRAY,
+            )
         if self.strays > UNLIKE:
             return Doubt(
                 f"x strays {self.strays:.2g} times as far from its twins as noise explains: the contact is of no kind "
@@ -292,6 +300,8 @@ def _fitted(
     quick: Estimate, value: Callable[[Belief], float], belief: Belief, twins: list[_Twin], misfit: _Misfit
 ) -> Estimate:
     """What the displacement tells through the equation of motion; a bound where the part is not believed in."""
+    if misfit.doubt and not quick.known:  # of a contact of another kind the fit tells no more
+        return quick
     part = {LEVEL: KINETIC, FALL: SLOPE, GIVES: GIVE}.get(quick.name, EXCESS)
     reach = 0.0
     if part not in belief.values:

@@ -98,9 +98,11 @@ for (const place of document.querySelectorAll(".scope")) {
     const { pen, width, height } = surface(chart), each = (height - BOTTOM) / told.panels.length;
     const x = (at) => LEFT + (width - LEFT - 4) * (at - view[0]) / (view[1] - view[0]);
     const shade = ([from, to], name) => {
+      const left = Math.max(LEFT, x(from)), right = Math.min(width, x(to));
+      if (right <= left) return; // out of view
       pen.fillStyle = colour(name);
       pen.globalAlpha = 0.45;
-      pen.fillRect(Math.max(LEFT, x(from)), 0, Math.min(width, x(to)) - Math.max(LEFT, x(from)), height - BOTTOM);
+      pen.fillRect(left, 0, right - left, height - BOTTOM);
       pen.globalAlpha = 1;
     };
     if (chosen >= 0 && row(cycles[chosen][1]) > view[0]) shade(cycles[chosen].map(row), "shade");
@@ -231,7 +233,11 @@ for (const place of document.querySelectorAll(".scope")) {
     return Math.min(end, Math.max(0, view[0] + Math.min(1, Math.max(0, share)) * (view[1] - view[0])));
   };
 
-  chart.addEventListener("wheel", (event) => { event.preventDefault(); zoom(event.deltaY > 0 ? 1.25 : 0.8, place_of(event)); }, { passive: false });
+  chart.addEventListener("wheel", (event) => {
+    if (!event.ctrlKey && !event.metaKey) return; // the page scrolls on
+    event.preventDefault();
+    zoom(event.deltaY > 0 ? 1.25 : 0.8, place_of(event));
+  }, { passive: false });
   chart.addEventListener("pointerdown", (event) => { drag = { x: event.clientX, at: place_of(event) }; chart.setPointerCapture(event.pointerId); });
   chart.addEventListener("pointermove", (event) => {
     pointer = place_of(event);
