@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import re
 import shlex
@@ -181,7 +182,7 @@ def test_the_one_slip_that_explains_a_contradiction_leads_with_the_command_that_
 def test_channels_that_a_file_names_are_mended_too_each_with_its_own_unit() -> None:
     rig_written("t [s],a [m/s^2],z [m],x [m]")  # x and a exchanged
     words = mending([])
-    named = [word for before, word in zip(words, words[1:], strict=False) if before == "--channels"]
+    named = [word for before, word in itertools.pairwise(words) if before == "--channels"]
     assert sorted(named) == ["a=x [m/s^2]", "x=a [m]", "z=z [m]"]
     mended = CliRunner().invoke(main, [*words[1:], "--twins", "0"])
     assert "The contact slides against 1.2" in mended.stdout, mended.output
