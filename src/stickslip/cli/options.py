@@ -71,8 +71,11 @@ all_option = click.option(
 )
 
 
-def result_options(folder: str) -> Callable[[Callable[..., None]], Callable[..., None]]:
-    """The options that say where the results go; `folder` is where they go unless it is said."""
+def result_options(folder: str, *, short: bool = True) -> Callable[[Callable[..., None]], Callable[..., None]]:
+    """The options that say where the results go; `folder` is where they go unless it is said.
+
+    With `short` the terminal has the answer, and all of it is an option.
+    """
     output = click.option(
         "--output",
         type=click.Path(path_type=Path),
@@ -86,7 +89,7 @@ def result_options(folder: str) -> Callable[[Callable[..., None]], Callable[...,
         is_flag=True,
         help="Print the results as JSON and nothing else; a folder is written only with --output.",
     )
-    return lambda command: output(as_json(all_option(command)))
+    return lambda command: output(as_json(all_option(command) if short else command))
 
 
 def case_options(command: Callable[..., None]) -> Callable[..., None]:

@@ -29,7 +29,7 @@ _ROW = ("place", "quantity", "verdict", "why")
     help="Checkout of stickslip's source, whose thesis/ holds the chapters; needed where stickslip was not installed "
     "from one.",
 )
-@result_options("thesis-stickslip")
+@result_options("thesis-stickslip", short=False)
 def thesis(chapters: tuple[str, ...], source: Path | None, output: Path | None, as_json: bool) -> None:
     """Reproduce the thesis: every printed number beside ours with a verdict, every figure beside its caption.
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import json
 import os
+import re
 import shutil
 import stat
 import tempfile
@@ -19,7 +20,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from starlette.applications import Starlette
 from starlette.exceptions import HTTPException
 from starlette.requests import Request
-from starlette.responses import FileResponse, JSONResponse, Response, StreamingResponse
+from starlette.responses import FileResponse, HTMLResponse, JSONResponse, Response, StreamingResponse
 from starlette.routing import BaseRoute, Route
 
 import stickslip as ss
@@ -30,6 +31,7 @@ from stickslip.lab.uploads import UNUSED, Uploads
 PREFIX = "stickslip-lab-"  # of a run's folder; its process comes next
 LONGEST_ASK = 1 << 18  # bytes
 SWEPT_EVERY = 60.0  # seconds
+SCRIPTS = re.compile(r"<script\b.*?</script>", re.DOTALL)  # of our own page, whose data holds no "<"
 # A report is a page of its own: it runs nothing and asks nothing of anyone.
 REPORT_HEADERS = {
     "Content-Security-Policy": "sandbox; default-src 'none'; style-src 'unsafe-inline'; img-src data:; "
@@ -340,14 +342,12 @@ async def cancel(request: Request) -> Response:
 
 @described("The report of an analysis", gives="text/html")
 async def report(request: Request) -> Response:
-    """The report of an analysis: to look at, or with ?keep=1 to keep."""
-    return FileResponse(
-        _kept(_job(request), Path("results", "report.html")),
-        media_type="text/html",
-        filename="report.html",
-        headers=REPORT_HEADERS,
-        content_disposition_type="attachment" if request.query_params.get("keep") else "inline",
-    )
+    """The report of an analysis: to look at, as it is without scripts, or with ?keep=1 to keep."""
+    page = _kept(_job(request), Path("results", "report.html"))
+    if request.query_params.get("keep"):
+        return FileResponse(page, media_type="text/html", filename="report.html", headers=REPORT_HEADERS)
+    still = SCRIPTS.sub("", await asyncio.to_thread(page.read_text, "utf-8"))
+    return HTMLResponse(still, headers=REPORT_HEADERS)
 
 
 @described("The numbers of an analysis", answer={"type": "object"})
