@@ -39,6 +39,7 @@ bench: $(VENV)/.dev
 	$(BIN)/python benchmarks/motions.py
 	$(BIN)/python benchmarks/decay.py
 	$(BIN)/python benchmarks/transition.py
+	$(BIN)/python benchmarks/microslips.py
 	$(BIN)/python benchmarks/rig.py --draws 5
 	$(BIN)/python benchmarks/events.py --draws 2
 	$(BIN)/python benchmarks/breakaway.py --draws 2

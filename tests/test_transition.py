@@ -126,6 +126,29 @@ def test_micro_slips_in_loud_noise(name: str, count: int) -> None:
     assert max(off) < 0.5e-3
 
 
+@pytest.mark.parametrize(("kinetic", "damping"), [(1.25, 214.0), (1.15, 184.0), (1.2, 251.0), (1.2, 81.0)])
+def test_the_drive_under_a_clean_ring_is_no_micro_slip(kinetic: float, damping: float) -> None:
+    """The ring swings about the drive's slow acceleration, not about zero: no cut makes up for that misfit."""
+    drive = ss.drives.HarmonicBase(0.65e-3, frequency=2.5)
+    slider = ss.Oscillator(mass=MASS, stiffness=SPRING, law=compliant(kinetic, damping), drive=drive)
+    run = ss.simulate(slider, cycles=8)
+    clean = run.record(fs=FS).between(1.0, 3.2)
+    found = ss.contact.find_microslips(ss.Record.of({"a": clean["a"]}, fs=FS, start=clean.start))
+    changes = np.array([event.time for event in run.events if 1.4 < event.time < 2.8])
+    slips = np.array([event.time for event in run.events if event.kind == "slip" and 1.4 < event.time < 2.8])
+    lasting = np.array([np.min(changes[changes > slip], initial=np.inf) - slip for slip in slips])
+    inside = [event.time for event in found.events if 1.4 < event.time < 2.8]
+    assert found.status == "ok"
+    assert inside == pytest.approx(slips[lasting < 0.03].tolist(), abs=1.5e-3)
+
+
+def test_an_answer_says_how_long_a_micro_slip_lasts_that_it_sees() -> None:
+    quiet, loud = (ss.contact.find_microslips(noisy("two", level)) for level in (50, 30))
+    assert loud.shortest > 2 * quiet.shortest, "noise hides more"
+    for found in (quiet, loud):
+        assert all(event.duration > 0.5 * found.shortest for event in found.events)
+
+
 @pytest.mark.parametrize(
     ("name", "mechanism"),
     [
