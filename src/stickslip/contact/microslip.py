@@ -28,6 +28,7 @@ FLOOR = 0.001  # of the acceleration's standard deviation: rings about the drive
 SHOWING = 0.4  # of a cycle: a ring over a line shows its mode where it lasts as long,
 RING_SAMPLES = 10  # and has as many samples
 MODE_RINGS = 24  # the longest of them that show it together
+ALIKE = 0.9  # of the sticks, that hold as many: of 100 rigs at each noise (benchmarks/microslips.py) false ones never did
 SWING = (1.0, 1.8)  # cycles after the beginning of a ring: the second tip, and where the ring after it is over
 LASTING = np.geomspace(0.01, 0.5, 40)  # of a cycle: micro-slips that are tried
 SEEN = 2 * PENALTY + 4 * math.sqrt(2 * PENALTY)  # variances: passes 2 PENALTY, with noise, in 98 of 100
@@ -154,7 +155,9 @@ def microslips_of(ringing: Ringing) -> MicroSlips:
         checks=(f"those are counted that last {1e3 * shortest:.2g} ms or longer",) if math.isfinite(shortest) else (),
     ).within(0.0)  # fmt: skip
     blurred = "without a load cell whose mount is stated, one may be missed or seen twice" if ringing.blurred else ""
-    status = Status(ringing.status, astray, blurred)
+    usual = sum(count == int(np.median(counts)) for count in counts) / len(counts)
+    uneven = "sticks differ in their number: noise, or a swing that is near to slip, may hide or make one"
+    status = Status(ringing.status, astray, blurred, uneven if usual < ALIKE else "")
     per_stick = replace(per_stick, status=per_stick.status if status == "ok" else status)
     return MicroSlips(per_stick, tuple(events), counts, shortest, UNTOLD if astray else _kind(counts), status)
 
