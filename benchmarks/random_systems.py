@@ -45,7 +45,8 @@ def _compliant(draw: Draw, force: float, spring: float, mass: float) -> laws.Com
 
 
 def _rock(draw: Draw, force: float, spring: float, mass: float) -> laws.RateState:
-    direct, speed = 0.6 / _log(draw, 0.5, 2), force / math.sqrt(spring * mass)
+    # the law takes no smaller one: its exponential is a number
+    direct, speed = 0.6 / min(_log(draw, 0.5, 2), 300.0), force / math.sqrt(spring * mass)
     distance = force / spring * _log(draw, -4, -1)
     which = str(draw.choice(["aging", "slip"]))
     return laws.RateState(

@@ -311,6 +311,7 @@ def test_a_run_becomes_a_record_and_pieces() -> None:
         lambda: ss.laws.LuGre(1.0, 0.5, speed=1.0, stiffness=1.0),
         lambda: ss.laws.LuGre(1.0, 1.5, speed=1.0, stiffness=math.inf),
         lambda: ss.laws.RateState(1, 0.6, 1e-9, 0.1, 1e-5, 1e-6),
+        lambda: ss.laws.RateState(1, 0.6, 0.001, 0.1, 1e-5, 1e-6),  # the square of e^600 is no number: it ran into nan
         lambda: ss.laws.RateState(1, 0.6, 0.01, 0.1, 1e-5, 1e-6, law="Ruina"),
         lambda: ss.laws.SmoothStateVariable(1.1, 0.0, 3000.0),
         lambda: ss.laws.FrictionCurve("1 / (1 + v)"),

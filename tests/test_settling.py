@@ -72,6 +72,35 @@ def test_a_contact_with_next_to_no_damping_moves_as_radau_has_it(damping: float)
     assert abs(ss.solve.energy(run).residual) < 1e-9
 
 
+def test_a_contact_mass_with_two_fast_rates_is_split_where_both_are_behind(monkeypatch: pytest.MonkeyPatch) -> None:
+    """5e10/s and 3e7/s beside 8e3/s: neither gap is 1e4 wide, both together are; 150 s of cells were foretold.
+
+    It moves as it does unsplit; and as one without mass does, but for the mass that it has.
+    """
+    force, stiffness, damping = 26.555645105020904, 2297261522527.2607, 81806.7746916635
+    light = laws.InertialContact(force, stiffness, 1.564546886139168e-06, damping)
+    system = ss.Oscillator(
+        0.40396298776840983, 24642310.779102024, light, drives.HarmonicForce(120.11152897477314, 9.748099098479683),
+        damping=631.0176380369647,
+    )  # fmt: skip
+    run = ss.simulate(system, duration=0.0096)
+    assert run.table.settling
+    assert ss.solve.energy(run).residual < 1e-9
+    massless = laws.InSeries(laws.Coulomb(force), stiffness, damping)
+    other = ss.simulate(system.having(law=massless), duration=0.0096)
+    times = np.linspace(0, 0.0096, 500)
+    ours, theirs = (each.sample(times, ("x",))[0][0] for each in (run, other))
+    assert ours == pytest.approx(theirs, abs=light.mass / system.mass * np.max(np.abs(theirs)))
+    monkeypatch.setattr(settling, "APART", math.inf)
+    assembly._known.cache_clear()
+    whole = ss.simulate(system, duration=5e-5)
+    times = np.linspace(0, 5e-5, 500)
+    ours, theirs = (each.sample(times, ("x",))[0][0] for each in (run, whole))
+    assembly._known.cache_clear()
+    assert not whole.table.settling
+    assert ours == pytest.approx(theirs, abs=1e-9 * np.max(np.abs(theirs)))
+
+
 def test_it_takes_few_pieces_and_no_event_of_its_own() -> None:
     run = ss.simulate(contact(1e-6), cycles=10)
     rough = ss.simulate(contact(1.0), cycles=10)

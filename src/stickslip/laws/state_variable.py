@@ -143,9 +143,11 @@ class StateVariable(Rigid):
                   Exit({"f": -1.0, "theta": 1.0, "1": -band}, "back"))  # fmt: skip
         released = (Exit({"df": 1.0, "theta": decay, "1": -pull}, "forward"),
                     Exit({"df": -1.0, "theta": -decay, "1": -pull}, "back"))  # fmt: skip
-        follows = {"theta": {"df": 1.0}}
-        # no time passes while it turns: it goes on, or is held with a friction that is the push from then on
-        turning = (*onward, *released, Exit({"1": 1.0}, "held", {"theta": {"f": 1.0}}))
+        follows, push = {"theta": {"df": 1.0}}, {"theta": {"f": 1.0}}
+        # no time passes while it turns: it goes on, or its friction is the push from then on, and holds it or lets it go
+        let_go = (Exit({"df": 1.0, "f": decay, "1": -pull}, "forward", push),
+                  Exit({"df": -1.0, "f": -decay, "1": -pull}, "back", push))  # fmt: skip
+        turning = (*onward, *let_go, Exit({"1": 1.0}, "held", push))
         return (
             self._slip("back", -1, decay, pull),
             Mode("turning", "stick", 0, None, turning, follows),
@@ -191,7 +193,7 @@ class RateState(Sliding):
     Raises
     ------
     ModelError
-        A value is not finite and positive, or mu_0/a is too large for numbers (700).
+        A value is not finite and positive, or mu_0/a is too large for numbers (300).
 
     Examples
     --------
@@ -216,10 +218,10 @@ class RateState(Sliding):
     law: str = parameter("", "how the age evolves", default="aging", choices=("aging", "slip"))
 
     def __post_init__(self) -> None:
-        if self.friction / self.direct > 600:
+        if self.friction / self.direct > 300:  # its square, and that of a speed beside it, are numbers too
             raise ModelError(
                 f"friction / direct = {self.friction / self.direct:g}",
-                "the exponential of it is a number up to 600",
+                "the square of its exponential is a number up to 300",
                 "give a larger direct=",
             )
 

@@ -28,7 +28,7 @@ from stickslip.errors import SolveError
 from stickslip.solve.cells import DEGREE, cells_of, derivatives, eigenvalues
 from stickslip.solve.tables import OWN, Array, Tables
 
-APART = 1e4  # fast over slow rates from which a mode is split: the fast part is followed for some 60 cells and more
+APART = 1e4  # fastest over slow rates from which a mode is split: the fast part is followed for 60 cells and more
 FARTHEST = 1e13  # fast over slow rates: beyond, rounding of the state takes part in the speed that the contact has
 DEAD = 60.0  # time constants after which it is dead: e^-60 = 1e-26
 WORTH = 0.1  # of the slow part's cells, that following the fast part until it is dead may take
@@ -88,7 +88,8 @@ def _split(flow: Array, share: float = 1.0) -> Split | None:
     values = eigenvalues(flow)
     rates = np.sort(np.abs(values))
     rates = rates[rates > 0]
-    gaps = np.flatnonzero(rates[1:] >= share * APART * rates[:-1])
+    apart = rates[1:] >= share * (DEAD / WORTH) * rates[:-1]  # else the fast part outlives the slow one's cell
+    gaps = np.flatnonzero(apart & (rates[-1:] >= share * APART * rates[:-1]))
     if not len(gaps):
         return None
     slow, fast = rates[gaps[-1] : gaps[-1] + 2]

@@ -235,15 +235,16 @@ def run(
                     # then; the first call may compile for long, and is left to it
                     if heed is None and getattr(kernel.march, "overloads", True):
                         heed = holding.enter_context(held_back())
+                    room = pieces.room()
                     outcome, count, mode, clock = kernel.march(
-                        model, before, state, mode, goal, past, pieces.room(), work, patience
+                        model, before, state, mode, goal, past, room, work, patience
                     )
                     if heed is not None:
                         heed()
                     passed = until(before, clock, period)
                     pieces.keep(count, passed, total)
                     _refuse(outcome, table, state, mode, clock)
-                    if outcome == kernel.FULL and count < CHUNK:  # by its patience: it goes cell by cell
+                    if outcome == kernel.FULL and count < len(room.laps):  # by its patience: it goes cell by cell
                         _require_cells(passed / patience, total - pieces.passed, table.modes[mode].name)
                     events.spend(pieces.columns.exits[pieces.count - count : pieces.count], passed=passed, state=state)
                     if tell:
