@@ -298,3 +298,20 @@ def least_squares(design: ArrayLike, data: ArrayLike) -> LeastSquares:
     found = [mean_uncertainty(count * (unit @ row) * residual) for row in bread]
     sd = np.array([each for each, _ in found]) * shrinkage / lengths
     return LeastSquares(scaled / lengths, sd, np.array([q for _, q in found]), residual, condition, independent)
+
+
+def follows(measured: Array, model: Array) -> float:
+    """Share of the motion that a model follows: ``100 (1 - |y - m| / |y - mean y|)`` %, an offset left out.
+
+    Ljung, System Identification (1999), section 16.4, as a comparison of models is commonly rated.
+
+    Examples
+    --------
+    >>> wave = np.sin(np.linspace(0, 20, 1000))
+    >>> round(follows(wave, 0.9 * wave), 1)
+    90.0
+    """
+    both = np.isfinite(measured) & np.isfinite(model)
+    left, whole = (measured - model)[both], measured[both]
+    size = float(np.linalg.norm(whole - whole.mean()))
+    return 100 * (1 - float(np.linalg.norm(left - left.mean())) / size) if size else 0.0

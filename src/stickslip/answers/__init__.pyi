@@ -9,6 +9,10 @@ from stickslip.answers.frequencies import TimeFrequency as TimeFrequency
 from stickslip.answers.frequencies import time_frequency as time_frequency
 from stickslip.answers.long_records import analyze_blocks as analyze_blocks
 from stickslip.answers.mending import mend as mend
+from stickslip.answers.predictions import Prediction as Prediction
+from stickslip.answers.predictions import Predictions as Predictions
+from stickslip.answers.predictions import predict as predict
+from stickslip.answers.predictions import read_fitted as read_fitted
 from stickslip.answers.squeak_comparison import Condition as Condition
 from stickslip.answers.squeak_comparison import compare_squeaks as compare_squeaks
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from stickslip.answers.preparation import normal_load
+from stickslip.answers.preparation import normal_load, with_sensors
 from stickslip.balance.force import friction_force
 from stickslip.drives.kinds import HarmonicBase, Release
 from stickslip.errors import ModelError, RecordError
@@ -75,6 +75,7 @@ def fit_records(
     >>> print(found.parameters["kinetic"])
     sliding friction 1.102 N (95 %: 1.100 to 1.104)
     """
+    records = [with_sensors(record, rig) for record in records]
     curve = curve or _only_curve(records[0], asked=bool(laws or system))
     if curve is not None and len(records) > 1:
         raise ModelError(f"a curve and {len(records)} records", "a curve is fitted to one", "give one of them alone")
@@ -124,7 +125,7 @@ def _oscillator(rig: RigSettings, system: object) -> Oscillator:
     if system is not None:
         if not isinstance(system, Oscillator):
             raise ModelError("a system of several masses", "a law is fitted to an oscillator of one", "give such a one")
-        return _with_stated(system, rig)
+        return with_stated(system, rig)
     constants = {name: getattr(rig, name) for name in ("mass", "stiffness")}
     if missing := [name for name, value in constants.items() if value is None]:
         raise ModelError(
@@ -136,7 +137,7 @@ def _oscillator(rig: RigSettings, system: object) -> Oscillator:
     return Oscillator(**numbers, damper=rig.damper, law=Coulomb(1.0), drive=drive)
 
 
-def _with_stated(system: Oscillator, rig: RigSettings) -> Oscillator:
+def with_stated(system: Oscillator, rig: RigSettings) -> Oscillator:
     """The oscillator with what the settings state of it in front."""
     words = ("mass", "stiffness", "damping", "damper", "contact")
     stated = {name: getattr(rig, name) for name in words if name in rig.model_fields_set}

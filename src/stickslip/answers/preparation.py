@@ -54,12 +54,9 @@ class Ready:
 
 def ready(record: Record, rig: RigSettings, method: str, asked: Asked) -> Ready:
     """The record with its sensors stated, without its delays, with its friction."""
-    for name, told in rig.sensors.items():
-        if name in record:
-            record = record.with_details(name, **told.model_dump(exclude_unset=True))
-        else:
-            asked.notes.append(f"A sensor {name} is described, but the record has no such channel.")
-    record, stated = _without_dead(record, asked), rig
+    for name in (name for name in rig.sensors if name not in record):
+        asked.notes.append(f"A sensor {name} is described, but the record has no such channel.")
+    record, stated = _without_dead(with_sensors(record, rig), asked), rig
     given = record
     record, delay = _aligned(record, asked)
     known = [name for name in USED if name in record]
@@ -82,6 +79,14 @@ def ready(record: Record, rig: RigSettings, method: str, asked: Asked) -> Ready:
     if "friction" not in whole:
         whole = _by_load(whole, rig, asked)
     return Ready(whole, delay, comparison, _doubt(whole, given, stated, aligned=record is not given))
+
+
+def with_sensors(record: Record, rig: RigSettings) -> Record:
+    """The record with what the settings state of its sensors."""
+    for name, told in rig.sensors.items():
+        if name in record:
+            record = record.with_details(name, **told.model_dump(exclude_unset=True))
+    return record
 
 
 def middle(record: Record, samples: int) -> Record:

@@ -13,6 +13,7 @@ from stickslip.cli.exchange import check, convert, datasets
 from stickslip.cli.fit import fit
 from stickslip.cli.interrupted import INTERRUPTED, SENTENCE
 from stickslip.cli.lab import lab
+from stickslip.cli.predict import predict
 from stickslip.cli.progress import compiling
 from stickslip.cli.rig import rig
 from stickslip.cli.simulate import simulate
@@ -79,6 +80,7 @@ for _command in (
     demo,
     fit,
     lab,
+    predict,
     rig,
     simulate,
     squeak,

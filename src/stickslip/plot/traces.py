@@ -28,6 +28,7 @@ from stickslip.plot.style import (
     styled,
 )
 from stickslip.signals.derivatives import differentiate
+from stickslip.statistics import follows
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -276,23 +277,6 @@ def _ratio(comparison: ForceComparison, ax: Axes) -> None:
     ax.set(xscale="log", ylim=(0, min(top, 10.0)), xlabel="frequency [Hz]", ylabel="ratio, coherence")
     ax.xaxis.set_major_formatter("{x:g}")
     legend_above(ax, columns=3)
-
-
-def follows(measured: Array, model: Array) -> float:
-    """Share of the motion that a model follows: ``100 (1 - |y - m| / |y - mean y|)`` %, an offset left out.
-
-    Ljung, System Identification (1999), section 16.4, as a comparison of models is commonly rated.
-
-    Examples
-    --------
-    >>> wave = np.sin(np.linspace(0, 20, 1000))
-    >>> round(follows(wave, 0.9 * wave), 1)
-    90.0
-    """
-    both = np.isfinite(measured) & np.isfinite(model)
-    left, whole = (measured - model)[both], measured[both]
-    size = float(np.linalg.norm(whole - whole.mean()))
-    return 100 * (1 - float(np.linalg.norm(left - left.mean())) / size) if size else 0.0
 
 
 @styled

@@ -82,6 +82,6 @@ def _drive(record: Record, given: Drive) -> Drive:
 
 def _plain(name: str, values: Mapping[str, Any]) -> str:
     lines = [
-        f"{key} = {quoted(value)}" if isinstance(value, str) else f"{key} = {value!r}" for key, value in values.items()
+        f"{key} = {quoted(value) if isinstance(value, str) else repr(float(value))}" for key, value in values.items()
     ]
     return "\n".join([f"[{name}]", *lines])

@@ -17,11 +17,11 @@ from stickslip.errors import StickslipError
 from stickslip.files.expression import split_spec, times
 from stickslip.plot.contact import across
 from stickslip.plot.style import Array, envelope, prefixed, spelled
-from stickslip.plot.traces import follows
 from stickslip.printing import printable
 from stickslip.record.record import RIG_UNITS, Record
 from stickslip.rig.rig import Rig
 from stickslip.rig.sensor import Digitiser, Noise, Sensor
+from stickslip.statistics import follows
 from stickslip.story.words import REPAIRS
 from stickslip.twin.belief import Belief
 

@@ -1,0 +1,130 @@
+"""A law tried on records that it was not fitted to."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner, Result
+
+import stickslip as ss
+from stickslip.cli.program import main
+
+RIG = {"mass": 2.42, "stiffness": 2310.0, "damping": 0.12}
+LAW = "[law]\nname = 'Coulomb'\nkinetic = 1.1\nstatic = 1.3\n"
+SYSTEM = f"{LAW}[system]\nmass = 2.42\nstiffness = 2310\ndamping = 0.12\n[drive]\nname = 'HarmonicBase'\n" + (
+    "amplitude = '0.65 mm'\nfrequency = 2.5\n"
+)
+STICKING = ss.Oscillator(
+    law=ss.laws.Coulomb(1.1, static=1.3), drive=ss.drives.HarmonicBase(0.65e-3, frequency=2.5), **RIG
+)
+NOISE = 1e-6
+
+
+@pytest.fixture(autouse=True)
+def elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("COLUMNS", "80")
+
+
+def measured(system: ss.Oscillator, seed: int = 1, lag: float = 0.0) -> ss.Record:
+    bench = ss.Rig.perfect("x", "z").having("x", white=NOISE, lag=lag)
+    return bench.measure(ss.simulate(system, duration=4), fs=1000, rng=seed, start=1.0)
+
+
+def write(name: str, record: ss.Record) -> None:
+    rows = np.column_stack([record.time, 1e3 * record["x"], 1e3 * record["z"]])
+    np.savetxt(name, rows, delimiter=",", header="t [s],x [mm],z [mm]", comments="", fmt="%.7f")
+
+
+def predict(*arguments: str) -> Result:
+    return CliRunner().invoke(main, ["predict", *arguments])
+
+
+def test_the_true_law_leaves_the_noise_and_a_wrong_one_more() -> None:
+    record = measured(STICKING)
+    (true,) = ss.answers.predict(record, STICKING).parts
+    assert true.fit.residual["x"] == pytest.approx(NOISE, rel=0.1)
+    assert true.follows["x"] == pytest.approx(100 * (1 - NOISE / np.std(record["x"])), abs=0.05)
+    assert true.plain["x"] < true.follows["x"] - 1, "static friction is not Coulomb's level and a damper"
+    (wrong,) = ss.answers.predict(record, STICKING.having(static=1.1, kinetic=0.7)).parts
+    assert wrong.follows["x"] < 95
+    assert wrong.plain["x"] > wrong.follows["x"]
+    (plain,) = ss.answers.predict(record, STICKING.having(law=ss.laws.Coulomb(0.7))).parts
+    assert not plain.plain, "the law is plain itself"
+
+
+def test_what_is_followed_is_the_fit_of_system_identification() -> None:
+    (found,) = ss.answers.predict(measured(STICKING), STICKING.having(kinetic=1.0), plain=False).parts
+    traces = found.fit.traces[0]
+    y, yhat = traces.measured["x"], traces.fitted["x"]
+    defined = 100 * (1 - np.linalg.norm(y - yhat) / np.linalg.norm(y - y.mean()))
+    assert found.follows["x"] == pytest.approx(defined, abs=1e-6)
+
+
+def test_stops_are_counted_alike_in_both() -> None:
+    (found,) = ss.answers.predict(measured(STICKING), STICKING, plain=False).parts
+    seen, told = found.sticks
+    assert seen.per_cycle.value == told.per_cycle.value == 2
+    assert told.share.value == pytest.approx(seen.share.value, abs=0.01)
+
+
+def test_sensors_are_read_as_they_are_stated() -> None:
+    record, late = measured(STICKING, lag=2e-3), ss.rig.rig_settings({"sensors": {"x": {"delay": "2 ms"}}})
+    (unknown,), (stated,) = (ss.answers.predict(record, STICKING, rig=rig, plain=False).parts for rig in (None, late))
+    assert stated.fit.misfit["x"] < 1.2 < unknown.fit.misfit["x"]
+
+
+def test_a_fit_is_tried_on_another_record_as_it_was_written(tmp_path: Path) -> None:
+    record = measured(STICKING)
+    found = ss.fit_law(record, STICKING.having(kinetic=1.0), free=["kinetic"], nuisance=["damping"], intervals=False)
+    folder = ss.publish(found, folder=tmp_path / "slow-fit", record=record)
+    read = ss.answers.read_fitted(folder)
+    assert (read.law, read.damping) == (found.law, found.oscillator.damping)
+    write("fast.csv", measured(STICKING.having(frequency=4.0), seed=2))
+    result = predict("slow-fit", "fast.csv")
+    assert result.exit_code == 0, result.output
+    assert "99." in result.stdout.splitlines()[2]
+    assert len(result.stdout.splitlines()) <= 40
+    assert max(map(len, result.stdout.splitlines())) <= 80
+    page = Path("fast-predicted/report.html").read_text("utf-8")
+    assert "as it was given" in page
+    told = json.loads(Path("fast-predicted/results.json").read_text("utf-8"))
+    assert told["records"][0]["channels"]["x"]["follows"] == pytest.approx(told["follows"]["x"])
+
+
+def test_several_records_are_rows_and_what_can_not_be_asked_is_left_out() -> None:
+    Path("law.toml").write_text(SYSTEM)
+    write("a.csv", measured(STICKING))
+    write("b.csv", measured(STICKING.having(kinetic=1.0), seed=2))
+    write("still.csv", measured(STICKING.having(amplitude=1e-5), seed=3))
+    result = predict("law.toml", "a.csv", "b.csv", "still.csv", "--no-plain", "--json")
+    assert result.exit_code == 0, result.output
+    assert "left out: still.csv" in result.stderr
+    told = json.loads(result.stdout)
+    assert [each["name"] for each in told["records"]] == ["a.csv", "b.csv"]
+    a, b = (each["channels"]["x"]["follows"] for each in told["records"])
+    assert told["follows"]["x"] == b < a
+    assert not Path("comparison-predicted").exists()
+
+
+def test_a_law_alone_needs_the_mass() -> None:
+    Path("law.toml").write_text(LAW)
+    write("a.csv", measured(STICKING))
+    refused = predict("law.toml", "a.csv")
+    assert refused.exit_code == 2
+    assert "holds a law alone" in refused.stderr
+    rig = ("--mass", "2.42 kg", "--stiffness", "2.31 N/mm", "--damping", "0.12")
+    result = predict("law.toml", "a.csv", *rig, "--no-plain", "--json")
+    assert json.loads(result.stdout)["follows"]["x"] > 99
+    heavy = predict("law.toml", "a.csv", "--mass", "2.6", *rig[2:], "--no-plain", "--json")
+    assert json.loads(heavy.stdout)["follows"]["x"] < 99
+
+
+def test_a_structure_is_refused() -> None:
+    with pytest.raises(ss.errors.ModelError, match="several masses"):
+        ss.answers.predict(measured(STICKING), ss.squeak.squeak_rig())  # type: ignore[arg-type]
+    with pytest.raises(ss.errors.EstimateError, match="no record"):
+        ss.answers.predict([], STICKING)
