@@ -157,8 +157,6 @@ def length(s, order, big, tolerance):
         scale = max(big[i], 1e-3 * (abs(s[j + 1]) + abs(s[j + 2])))
         if scale > 0.0:
             inverse = 1.0 / scale
-            if s[j + order] != s[j + order]:  # no number: a larger one would hide it
-                return math.nan
             last = max(last, abs(s[j + order]) * inverse)
             before = max(before, abs(s[j + order - 1]) * inverse)
         elif s[j + 1] != s[j + 1]:
