@@ -153,24 +153,50 @@ def test_what_is_left_of_a_tremble_is_nothing_to_the_motion(monkeypatch: pytest.
     ("system", "start", "duration"),
     [  # as drawn by benchmarks/random_systems.py: 7 7, 8 16, 8 19, 8 31
         (
-            ss.Oscillator(0.36021094778438173, 166.78855917411846, ss.laws.StateVariable(1.396067667273419, 51.35007747238944),
-                          ss.drives.MultiTone([(0.04372709801559329, 0.6141930789125883, 0.0)], on="face")), {}, 3.5,
+            ss.Oscillator(
+                0.36021094778438173,
+                166.78855917411846,
+                ss.laws.StateVariable(1.396067667273419, 51.35007747238944),
+                ss.drives.MultiTone([(0.04372709801559329, 0.6141930789125883, 0.0)], on="face"),
+            ),
+            {},
+            3.5,
         ),
         (
-            ss.Oscillator(36.31143329196384, 40165820.815777175, ss.laws.StateVariable(0.00028160216522171846, 439382460094.2972),
-                          ss.drives.Belt(2.3033727953339875e-10), 7638.006345032886), {}, 0.07,
+            ss.Oscillator(
+                36.31143329196384,
+                40165820.815777175,
+                ss.laws.StateVariable(0.00028160216522171846, 439382460094.2972),
+                ss.drives.Belt(2.3033727953339875e-10),
+                7638.006345032886,
+            ),
+            {},
+            0.07,
         ),
         (
-            ss.Oscillator(27.225408769559536, 1.3095010224591752, ss.laws.StateVariable(6064.9461114776905, 1.5250691093546638),
-                          ss.drives.Belt(1728.0118499861228), 1.194180901214003), {}, 340.0,
+            ss.Oscillator(
+                27.225408769559536,
+                1.3095010224591752,
+                ss.laws.StateVariable(6064.9461114776905, 1.5250691093546638),
+                ss.drives.Belt(1728.0118499861228),
+                1.194180901214003,
+            ),
+            {},
+            340.0,
         ),
         (
-            ss.Oscillator(0.06654125352607021, 143562068.56464255, ss.laws.StateVariable(0.6383401846680418, 5215420502.301014),
-                          damping=61.81520848816076), {"x": 3.731231288623677e-09}, 0.0016,
+            ss.Oscillator(
+                0.06654125352607021,
+                143562068.56464255,
+                ss.laws.StateVariable(0.6383401846680418, 5215420502.301014),
+                damping=61.81520848816076,
+            ),
+            {"x": 3.731231288623677e-09},
+            0.0016,
         ),
     ],
     ids=["let go as it turns", "rate 1e5 natural frequencies", "belt far too fast", "rest"],
-)  # fmt: skip
+)
 def test_a_friction_that_lags_by_next_to_nothing_turns_and_rests(
     system: ss.Oscillator, start: dict[str, float], duration: float
 ) -> None:
@@ -184,7 +210,7 @@ def test_a_friction_that_lags_by_next_to_nothing_turns_and_rests(
 
 
 def test_too_many_events_are_called_so() -> None:
-    """Some 1000 swings before a rest, within microseconds: the first 256 filled a log, and were taken for slow cells."""
+    """Some 1000 swings before a rest within microseconds: the first 256 filled a log, taken for slow cells."""
     system = ss.Oscillator(1.0, 4.0, ss.laws.StateVariable(1.0, 1e9), ss.drives.Release())
     with pytest.raises(ss.errors.SolveError, match="events within"):
         ss.simulate(system, duration=10.0, start={"x": 1.2}, budget=100)

@@ -28,7 +28,9 @@ FLOOR = 0.001  # of the acceleration's standard deviation: rings about the drive
 SHOWING = 0.4  # of a cycle: a ring over a line shows its mode where it lasts as long,
 RING_SAMPLES = 10  # and has as many samples
 MODE_RINGS = 24  # the longest of them that show it together
-ALIKE = 0.9  # of the sticks, that hold as many: of 100 rigs at each noise (benchmarks/microslips.py) false ones never did
+ALIKE = (
+    0.9  # of the sticks, that hold as many: of 100 rigs at each noise (benchmarks/microslips.py) false ones never did
+)
 SWING = (1.0, 1.8)  # cycles after the beginning of a ring: the second tip, and where the ring after it is over
 LASTING = np.geomspace(0.01, 0.5, 40)  # of a cycle: micro-slips that are tried
 SEEN = 2 * PENALTY + 4 * math.sqrt(2 * PENALTY)  # variances: passes 2 PENALTY, with noise, in 98 of 100

@@ -144,7 +144,7 @@ class StateVariable(Rigid):
         released = (Exit({"df": 1.0, "theta": decay, "1": -pull}, "forward"),
                     Exit({"df": -1.0, "theta": -decay, "1": -pull}, "back"))  # fmt: skip
         follows, push = {"theta": {"df": 1.0}}, {"theta": {"f": 1.0}}
-        # no time passes while it turns: it goes on, or its friction is the push from then on, and holds it or lets it go
+        # no time passes while it turns: it goes on, or its friction is the push from then on and holds it or lets it go
         let_go = (Exit({"df": 1.0, "f": decay, "1": -pull}, "forward", push),
                   Exit({"df": -1.0, "f": -decay, "1": -pull}, "back", push))  # fmt: skip
         turning = (*onward, *let_go, Exit({"1": 1.0}, "held", push))
