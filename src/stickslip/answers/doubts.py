@@ -11,6 +11,7 @@ import numpy as np
 from stickslip.balance.balance import ALONE
 from stickslip.balance.likely_contact import STRAYING
 from stickslip.consistent.contradictions import Consistency
+from stickslip.consistent.slips import Slip
 from stickslip.errors import StickslipError
 from stickslip.estimate import Doubt, Estimate, Status, stands
 from stickslip.record.record import Record
@@ -25,11 +26,17 @@ NO_BASE = "there is no channel z: the base is taken to be at rest, but something
 
 
 def doubted(
-    answers: dict[str, Any], record: Record, *, unknown: Doubt | None, refusals: Sequence[StickslipError]
+    answers: dict[str, Any],
+    record: Record,
+    slips: Sequence[Slip],
+    *,
+    unknown: Doubt | None,
+    refusals: Sequence[StickslipError],
 ) -> dict[str, Any]:
     """The answers, flagged by the gravest doubt that concerns each; `unknown` is what is not stated of the rig."""
     told, gravest = dict(answers), dict[str, Doubt | str]()
-    for reason, keys in _reasons(told.get("consistency"), record, unknown, refusals):
+    contradiction = slipped(slips) or untrue(told.get("consistency"))
+    for reason, keys in _reasons(contradiction, record, unknown, refusals):
         for key in keys:
             if gravest.setdefault(key, reason) == reason:
                 told[key] = flagged(told.get(key), reason)
@@ -37,11 +44,11 @@ def doubted(
 
 
 def _reasons(
-    consistent: Consistency | None, record: Record, unknown: Doubt | None, refusals: Sequence[StickslipError]
+    contradiction: str, record: Record, unknown: Doubt | None, refusals: Sequence[StickslipError]
 ) -> Iterator[tuple[Doubt | str, Iterable[str]]]:
     """Each doubt with the questions that it concerns, the gravest first."""
-    if words := _contradiction(consistent):
-        yield words, (*BY_FORCE, "sticks")
+    if contradiction:
+        yield contradiction, (*BY_FORCE, "sticks")
     if _base_unseen(record):
         yield NO_BASE, (*BY_FORCE, "sticks")
     if unknown:
@@ -67,13 +74,14 @@ def flagged(found: Any, reason: Doubt | str) -> Any:
     )  # fmt: skip
 
 
-def _contradiction(told: Consistency | None) -> str:
-    """What one slip in the channels, or in the rig's constants, would explain; a clipped sensor says so itself."""
-    if told is None:
-        return ""
-    if told.slip:
-        return f"the channels contradict each other: perhaps {told.slip}"
-    failed = told.failed
+def slipped(slips: Sequence[Slip]) -> str:
+    """What one slip of the hand would explain, in words; nothing without one."""
+    return f"something is stated wrongly: probably {' or '.join(slip.words for slip in slips)}" if slips else ""
+
+
+def untrue(told: Consistency | None) -> str:
+    """What of channels and constants can not all be true, in words; a clipped sensor says so itself."""
+    failed = told.failed if told is not None else ()
     if any("range" in check.name for check in failed):
         return ""
     apart = [check.sentence for check in failed if any(word in check.name for word in BALANCED)]

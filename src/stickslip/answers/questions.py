@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache, partial
 from typing import Any
 
 from stickslip.answers.asked import Asked
 from stickslip.answers.doubts import doubted
 from stickslip.answers.findings import Findings, record_name
+from stickslip.answers.mistakes import lacking, mistakes
 from stickslip.answers.preparation import (
     AT_ONCE,
     CONSTANTS,
@@ -28,14 +29,14 @@ from stickslip.contact.cause import lag_or_compliance
 from stickslip.contact.contact import contact_damping, contact_stiffness
 from stickslip.contact.sliding_onset import coupled_frequency, transition_speed
 from stickslip.cycle.before_slip import presliding
-from stickslip.cycle.loops import Loops, friction_loops
+from stickslip.cycle.loops import friction_loops
 from stickslip.cycle.onset import breakaway
 from stickslip.cycle.regression import regress_friction
 from stickslip.cycle.sticks import find_sticks
-from stickslip.errors import EstimateError, StickslipError
-from stickslip.estimate import Constant, Status
+from stickslip.errors import TOO_SHORT, EstimateError, StickslipError
+from stickslip.estimate import Constant
 from stickslip.record.flaws import constant
-from stickslip.record.record import Record
+from stickslip.record.record import RIG_UNITS, Record
 from stickslip.rig.settings import RigSettings
 
 STRETCH = 1 << 14  # samples in which the contact is fitted
@@ -112,14 +113,15 @@ def analyze(
         led = not question.follows or answers.get(question.follows) is not None
         if led and answers.get(question.unless) is None and question.fits(whole):
             answers[question.key] = asked.ask(question.name, partial(_answer, question, whole, fused, slid))
-    answers = doubted(answers, whole, unknown=made.doubt, refusals=asked.refusals)
-    answers["loops"] = _late(answers.get("loops"), record, rig)
+    slips = mistakes(record, rig, answers.get("consistency"), answers.get("loops"))
+    answers = doubted(answers, whole, slips, unknown=made.doubt, refusals=asked.refusals)
     if all(answer is None for answer in answers.values()):
         raise _nothing(name, record, asked.refusals)
     names = [question.key for question in QUESTIONS]
     results = {**dict.fromkeys(names), **answers, "delay": made.delay, "comparison": made.comparison, "trial": None}
+    results |= {"slips": slips, "lacking": lacking(whole, rig)}
     normal = normal_load(record, rig, name, asked.notes)
-    settings = {**_told(whole), "contact": slid}
+    settings = {**_stated(rig, all_of_it=bool(results["lacking"])), **_told(whole), "contact": slid}
     return Findings(name, whole, faults, normal, tuple(asked.notes), settings, results=results)
 
 
@@ -232,21 +234,6 @@ def _can_be_fused(record: Record, *, again: bool) -> bool:
     )
 
 
-def _late(loops: Loops | None, record: Record, rig: RigSettings) -> Loops | None:
-    """The loops, flagged where a sensor is stated to come later than a cycle of the motion."""
-    delays = {name: channel.delay for name, channel in record.channels.items()}
-    delays |= {name: told.delay for name, told in rig.sensors.items() if "delay" in told.model_fields_set}
-    cycles = {name: abs(late) * loops.frequency.value for name, late in delays.items()} if loops is not None else {}
-    far = [name for name, count in cycles.items() if count > 1]
-    if loops is None or not far:
-        return loops
-    words = (
-        f"{' and '.join(far)} {'is' if len(far) == 1 else 'are'} stated to come {delays[far[0]]:.4g} s late, "
-        f"{cycles[far[0]]:.2g} cycles of the motion (milliseconds taken for seconds, perhaps)"
-    )
-    return replace(loops, status=Status(words, loops.status))
-
-
 def _fused(record: Record) -> Record:
     """The middle of a record, enough to fit a contact by its likelihood, with all sensors put together."""
     cut = middle(record, STRETCH)
@@ -265,6 +252,13 @@ def _told(record: Record) -> dict[str, Any]:
     return told | ({"sd": dict(record.rig.sd)} if record.rig is not None and record.rig.sd else {})
 
 
+def _stated(rig: RigSettings, *, all_of_it: bool) -> dict[str, Any]:
+    """What is stated of the sensors; and of the rig's constants, where they do not lead to a force."""
+    sensors = {name: told.model_dump(exclude_unset=True) for name, told in rig.sensors.items()}
+    constants = {key: float(getattr(rig, key)) for key in RIG_UNITS if all_of_it and getattr(rig, key) is not None}
+    return {**constants, **({"sensors": sensors} if sensors else {})}
+
+
 def _nothing(name: str, record: Record, refusals: list[StickslipError]) -> EstimateError:
     value = f"{name} answers no question about friction"
     still = [each for each in MOTION if each in record and constant(record[each])]
@@ -275,7 +269,10 @@ def _nothing(name: str, record: Record, refusals: list[StickslipError]) -> Estim
             "look at its cable, range and column",
         )
     if refusals:
-        return EstimateError(f"{value}: {refusals[0].value}", refusals[0].rule, refusals[0].next_step)
+        first = refusals[0]
+        if first.kind == TOO_SHORT:
+            return EstimateError(f"{name} is too short: {len(record)} samples", *first.args[1:], kind=first.kind)
+        return EstimateError(f"{value}: {first.value}", first.rule, first.next_step, kind=first.kind)
     return EstimateError(
         f"{value}: its channels are {', '.join(f'{c.name} [{c.unit}]' for c in record.channels.values())}",
         "a displacement x or velocity v is needed, and a force, or mass and stiffness to find it",

@@ -106,7 +106,7 @@ def analyze(
         tell("drawing and writing", 2 * len(groups))
         results, written = _sure(found, twins, told, folder if output or not as_json else None, tell)
     name_left_out(refused)
-    show(results, written, as_json=as_json, everything=everything)
+    show(results, written, as_json=as_json, everything=everything, files=groups)
 
 
 def _sure(

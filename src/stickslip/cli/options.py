@@ -36,6 +36,13 @@ def reading_options(command: Callable[..., None]) -> Callable[..., None]:
             metavar='"COLUMN=UNIT"',
             help='Unit of a column whose header states none: "x=mm", "#1=ms". Repeatable.',
         ),
+        click.option(
+            "--sensor",
+            "sensors",
+            multiple=True,
+            metavar='"CHANNEL.NAME=VALUE"',
+            help='What is known of a sensor: "a.delay=3 ms", "a.mount=125 Hz, 0.1", "load.inertia=20 g". Repeatable.',
+        ),
         click.option("--fs", metavar="HZ", help="Sampling rate, for a file that states none."),
         click.option("--time", metavar="COLUMN", help="Column that holds the time, where its header does not say."),
         click.option("--delimiter", metavar="SIGN", help="Delimiter of a text file, where it can not be told."),

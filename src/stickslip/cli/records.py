@@ -39,6 +39,7 @@ def rig_of(
     channels: Sequence[str],
     units: Sequence[str],
     repair: str | None,
+    sensors: Sequence[str] = (),
     normal: Sequence[str] = (),
     **constants: str | None,
 ) -> RigSettings:
@@ -48,6 +49,8 @@ def rig_of(
     for key, pairs in (("channels", channels), ("units", units)):
         if pairs:
             given[key] = {**base.get(key, {}), **dict(pair(text, f"--{key}") for text in pairs)}
+    if sensors:
+        given["sensors"] = _sensors(base.get("sensors", {}), sensors)
     if repair is not None:
         given["repair"] = [word.strip() for word in repair.split(",")]
     if normal:  # the first pattern that fits decides
@@ -56,6 +59,26 @@ def rig_of(
             _require_load(load)
         given["normal"] = loads | {key: load for key, load in base.get("normal", {}).items() if key not in loads}
     return ss.rig.rig_settings({**base, **given}, source="the command line")
+
+
+def _sensors(known: Mapping[str, Any], stated: Sequence[str]) -> dict[str, dict[str, Any]]:
+    """What is known of the sensors, with what the command line states in front."""
+    sensors = {name: dict(details) for name, details in known.items()}
+    for text in stated:
+        name, value = pair(text, "--sensor")
+        channel, point, detail = name.partition(".")
+        if not point:
+            raise click.BadParameter(f"'{text}' is not CHANNEL.NAME=VALUE", param_hint="--sensor")
+        parts = [_number(part.strip()) for part in value.split(",")]
+        sensors.setdefault(channel, {})[detail] = parts if detail == "mount" else _number(value)
+    return sensors
+
+
+def _number(text: str) -> float | str:
+    try:
+        return float(text)
+    except ValueError:
+        return text
 
 
 def _require_load(load: str) -> None:
@@ -203,7 +226,7 @@ def collected(refused: list[ss.StickslipError], files: Sequence[Path], names: Se
     except ss.StickslipError as error:
         known = any(name in str(error) for name in names)
         value = error.value if known else f"{' + '.join(names)}: {error.value}"
-        refused.append(type(error)(value, error.rule, error.next_step))
+        refused.append(type(error)(value, error.rule, error.next_step, kind=error.kind))
 
 
 def answers(

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import stickslip as ss
+from stickslip.cli.records import names_of
 from stickslip.cli.terminal import aligned, say, say_json, say_styled, wrapped
 from stickslip.cli.words import spoken
 
@@ -28,9 +31,20 @@ def print_json(told: Mapping[str, Any]) -> None:
     say_json({"program": "stickslip", "version": ss.__version__, **told})
 
 
-def show(result: Any, written: Path | None, *, as_json: bool, everything: bool = False, **context: Any) -> None:
-    """A result as its story tells it, in short or with `everything`; `context` as in ``publish``."""
-    story = ss.summary(result, **context)
+def show(
+    result: Any,
+    written: Path | None,
+    *,
+    as_json: bool,
+    everything: bool = False,
+    files: Sequence[Sequence[Path]] = (),
+    **context: Any,
+) -> None:
+    """A result as its story tells it, in short or with `everything`; `context` as in ``publish``.
+
+    A command that mends something names the `files` of each record as they were given.
+    """
+    story = _from_here(ss.summary(result, **context), files)
     if as_json:
         print_json(story.data())
         return
@@ -43,12 +57,23 @@ def show(result: Any, written: Path | None, *, as_json: bool, everything: bool =
         say(f"Report: {written / 'report.html'}")
 
 
+def _from_here(story: Story, files: Sequence[Sequence[Path]]) -> Story:
+    """With the files by their paths in the command that mends something: it is typed where this one was."""
+    called = {"+".join(names): "+".join(map(str, group)) for group, names in zip(files, names_of(files), strict=True)}
+
+    def told(remedy: str) -> str:
+        return shlex.join(called.get(word, word) for word in shlex.split(remedy))
+
+    parts = [replace(part, remedy=told(part.remedy)) for part in story.parts]
+    return replace(story, remedy=told(story.remedy), parts=parts)
+
+
 def _print_short(story: Story) -> None:
     """At most MOST_LINES lines: the answer, the rows that lead, their cautions, and what else there is."""
     in_tables = sum(len(table.rows) for table in story.tables if not table.folded)
     rows, lines = story.lines[: MOST_ROWS - min(in_tables, OF_TABLES)], []
-    told = [story.answer, *([] if story.lines or story.tables else story.others)]  # without rows the sentences are all
-    for text in (*story.urgent, *told, *(f"{part.title}: {part.answer}" for part in story.parts[:MOST_PARTS])):
+    told = [] if story.lines or story.tables else story.others  # without rows the sentences are all
+    for text in (*story.opening, *told, *(f"{part.title}: {part.answer}" for part in story.parts[:MOST_PARTS])):
         lines += _lines(text)
     lines += [*_remedy(story), *_numbers(story, rows)]
     left, hidden = MOST_ROWS - len(rows), 0
@@ -66,7 +91,7 @@ def _print_short(story: Story) -> None:
     _print(story.title, lines)
     more = {
         "quantity": len(story.lines) - len(rows), "row": hidden, "caution": len(story.notices) - len(cautions),
-        "sentence": len(story.others) + 1 - len(told), "note": len(story.notes),
+        "sentence": len(story.others) - len(told), "note": len(story.notes),
         "record": max(0, len(story.parts) - MOST_PARTS),
     }  # fmt: skip
     counted = [
@@ -100,7 +125,7 @@ def _print(title: str, lines: Sequence[str]) -> None:
 
 def _remedy(story: Story) -> list[str]:
     """The command that mends what is wrong, on a line that can be copied."""
-    return ["To read it so that they agree:", story.remedy] if story.remedy else []
+    return ["To mend it:", story.remedy] if story.remedy else []
 
 
 def _lines(text: object, begin: str = "") -> list[str]:

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 import stickslip as ss
 from stickslip.lab.asked import AS_WRITTEN, PART, Asked, on_the_page
+from stickslip.record.channels import UNSTATED
 
 if TYPE_CHECKING:
     from stickslip import Record
@@ -27,7 +28,6 @@ Array = NDArray[np.float64]
 POINTS = 2000  # pairs of least and greatest value of a channel that are drawn
 MOTION, FORCES = {"x", "v"}, {"friction", "load", "force"}
 CONSTANTS = ("mass", "stiffness", "damping")
-UNTOLD = " (no unit stated, "  # how a channel's source tells it
 
 
 def describe(asked: Asked) -> dict[str, Any]:
@@ -108,7 +108,7 @@ def shown(name: str, parts: Iterable[Record]) -> dict[str, Any]:
                 "name": channel.name,
                 "unit": channel.unit,
                 "words": channel.quantity,
-                "column": channel.name if restored else channel.source.partition(UNTOLD)[0] or channel.name,
+                "column": channel.name if restored else channel.source.partition(UNSTATED)[0] or channel.name,
                 "low": plain(np.fmin.reduce(curves[channel.name])),
                 "high": plain(np.fmax.reduce(curves[channel.name])),
             }

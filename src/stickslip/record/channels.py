@@ -9,6 +9,8 @@ from numbers import Real
 
 from stickslip.errors import RecordError
 
+UNSTATED = " (no unit stated, "  # how a channel's source tells it
+
 
 @dataclass(frozen=True)
 class Quantity:

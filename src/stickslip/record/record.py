@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from stickslip.errors import RecordError
+from stickslip.errors import TOO_SHORT, RecordError
 from stickslip.record.channels import VOCABULARY, Channel, checked_name, described
 from stickslip.record.log import Log
 from stickslip.units import parse_unit
@@ -287,7 +287,10 @@ class Record:
         self.require(*names, question=question)
         if len(self) < samples:
             raise RecordError(
-                f"the record has {len(self)} samples", f"{question} needs at least {samples}", "give a longer record"
+                f"the record has {len(self)} samples",
+                f"{question} needs at least {samples}",
+                "give a longer record",
+                kind=TOO_SHORT,
             )
         if self.stamps is not None:
             from stickslip.record.check import clock_cure

@@ -182,14 +182,14 @@ class Story:
         return next((told for told in self.headline if not isinstance(told, Caution)), "")
 
     @property
+    def opening(self) -> list[str]:
+        """What is read first, in this order: what every number hangs on, and the answer."""
+        return [told for told in self.headline if isinstance(told, Caution) or told == self.answer]
+
+    @property
     def others(self) -> list[str]:
         """The sentences behind the answer."""
         return [told for told in self.headline if not isinstance(told, Caution)][1:]
-
-    @property
-    def urgent(self) -> list[str]:
-        """What every number hangs on, told before it."""
-        return [told for told in self.headline if isinstance(told, Caution)]
 
     @functools.cached_property
     def notices(self) -> list[Caution]:
