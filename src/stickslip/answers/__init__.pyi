@@ -1,3 +1,4 @@
+from stickslip.answers.comparison import against_load as against_load
 from stickslip.answers.decay_comparison import compare_decays as compare_decays
 from stickslip.answers.decays import Decay as Decay
 from stickslip.answers.experiment import ExperimentPlan as ExperimentPlan
@@ -8,6 +9,9 @@ from stickslip.answers.fits import fit_records as fit_records
 from stickslip.answers.frequencies import TimeFrequency as TimeFrequency
 from stickslip.answers.frequencies import time_frequency as time_frequency
 from stickslip.answers.long_records import analyze_blocks as analyze_blocks
+from stickslip.answers.many import Batch as Batch
+from stickslip.answers.many import Kept as Kept
+from stickslip.answers.many import Row as Row
 from stickslip.answers.mending import mend as mend
 from stickslip.answers.predictions import Prediction as Prediction
 from stickslip.answers.predictions import Predictions as Predictions

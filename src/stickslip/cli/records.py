@@ -195,7 +195,7 @@ def _with_source(record: Record, files: Sequence[Path], names: Sequence[str]) ->
     known = {file["name"] for step in record.history for file in step.arguments.get("files", ())}
     if called.keys() <= known:
         return dataclasses.replace(record, history=tuple(_called(step, called) for step in record.history))
-    sources = [{"name": name, "sha256": _checksum(path)} for name, path in zip(called.values(), files, strict=True)]
+    sources = [{"name": name, "sha256": checksum(path)} for name, path in zip(called.values(), files, strict=True)]
     step = ss.record.Step("read_record", {"files": sources}, "a record as it was written")
     return dataclasses.replace(record, history=(*record.history, step))
 
@@ -210,7 +210,7 @@ def _called(step: Step, names: Mapping[str, str]) -> Step:
 
 
 @functools.cache
-def _checksum(path: Path) -> str:
+def checksum(path: Path) -> str:
     with path.open("rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
 

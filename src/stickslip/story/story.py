@@ -25,7 +25,7 @@ TELLERS = {
     "Findings": "findings.of_findings", "Comparison": "findings.of_comparison",
     "TimeFrequency": "frequencies.of_map",
     "LawComparison": "fit.of_laws", "LawFit": "fit.of_law", "CurveFit": "fit.of_curve",
-    "Predictions": "prediction.of_predictions",
+    "Predictions": "prediction.of_predictions", "Batch": "many.of_batch",
     "Outcome": "simulation.of_outcome", "Trajectory": "simulation.of_run",
     "Record": "rig.of_record", "ExperimentPlan": "rig.of_plan",
     "Bifurcation": "regimes.of_bifurcation", "Basins": "regimes.of_basins", "Boundary": "regimes.of_boundary",

@@ -1,0 +1,168 @@
+"""Hundreds of records: what each answers in one row, kept as it comes, so that a run that was ended goes on."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+from stickslip.errors import RecordError
+from stickslip.estimate import Estimate, Result
+
+
+@dataclass(frozen=True)
+class Row:
+    """What one record answers, without the record.
+
+    Attributes
+    ----------
+    name, key : str
+        What it is called; the checksums of its files.
+    answer : str
+        The sentence that answers.
+    estimates : tuple of Estimate
+        Its numbers.
+    level : Estimate or None
+        The sliding friction, where it is known.
+    normal : float or None
+        Normal load [N], where it is known.
+    refusal : str
+        Why it answers nothing; else empty.
+    same_as : str
+        The record before it that has the same checksum; else empty.
+    picture : tuple of sequences of float
+        Abscissa and ordinate of a small picture.
+    """
+
+    name: str
+    key: str
+    answer: str = ""
+    estimates: tuple[Estimate, ...] = ()
+    level: Estimate | None = None
+    normal: float | None = None
+    refusal: str = ""
+    same_as: str = ""
+    picture: tuple[Sequence[float], Sequence[float]] = ((), ())
+
+    @property
+    def counts(self) -> bool:
+        """Whether it answers something that no record before it did."""
+        return not self.refusal and not self.same_as
+
+    @classmethod
+    def of_dict(cls, told: Mapping[str, Any]) -> Row:
+        """A row from plain data."""
+        level = told["level"]
+        return cls(**{
+            **told, "estimates": tuple(_estimate(each) for each in told["estimates"]),
+            "level": None if level is None else _estimate(level), "picture": tuple(told["picture"]),
+        })  # fmt: skip
+
+
+def _estimate(told: Mapping[str, Any]) -> Estimate:
+    return Estimate(**{**told, "interval": tuple(told["interval"]), "checks": tuple(told["checks"])})
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Batch(Result):
+    """What many records answer.
+
+    Attributes
+    ----------
+    question : str
+        The command that asked: analyze, decay or squeak.
+    rows : tuple of Row
+        One a record, in the order given.
+    axes : tuple of str
+        What the small pictures show.
+    together : mapping of str to Estimate
+        What they tell together: the coefficient of friction, where the normal loads are known.
+    notes : tuple of str
+        How they were asked.
+    """
+
+    question: str
+    rows: tuple[Row, ...]
+    axes: tuple[str, str]
+    together: Mapping[str, Estimate] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
+
+    @property
+    def estimates(self) -> tuple[Estimate, ...]:
+        """What they tell together."""
+        return tuple(self.together.values())
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The quantities that records answer, those of most records first."""
+        often: dict[str, int] = {}
+        for row in self.rows:
+            for each in row.estimates:
+                often[each.name] = often.get(each.name, 0) + (row.counts and each.known)
+        return tuple(sorted(often, key=lambda name: -often[name]))
+
+    def known(self, name: str) -> list[Estimate]:
+        """A quantity of each record that has it, without copies of others."""
+        rows = (row for row in self.rows if row.counts)
+        return [each for row in rows for each in row.estimates if each.name == name and each.known]
+
+    def table(self) -> list[dict[str, Any]]:
+        """A row a record for a spreadsheet: of each quantity the value and the ends of its 95 % interval."""
+        return [dict(_cells(row, self.names)) for row in self.rows]
+
+
+def _cells(row: Row, names: Sequence[str]) -> Iterator[tuple[str, Any]]:
+    yield from (
+        ("file", row.name),
+        ("answer", row.answer or row.refusal),
+        ("same as", row.same_as),
+        ("sha256", row.key),
+    )
+    yield "normal load [N]", row.normal
+    found = {each.name: each for each in row.estimates}
+    for name in names:
+        each = found.get(name)
+        unit = "" if each is None or each.unit == "1" else f" [{each.unit}]"
+        if each is not None:
+            yield f"{name}{unit}", each.value
+            yield f"{name}, low{unit}", each.interval[0]
+            yield f"{name}, high{unit}", each.interval[1]
+            yield f"{name}, status", each.status
+
+
+class Kept:
+    """The rows that are done, in a file beside the folder of results; one that was asked otherwise is begun again."""
+
+    def __init__(self, path: Path, asked: Mapping[str, Any]) -> None:
+        self.path, self.rows = path, dict[str, Row]()
+        first = json.dumps({"asked": asked}, sort_keys=True, default=str)
+        lines = path.read_text(encoding="utf-8").split("\n") if path.exists() else []
+        if lines[:1] == [first]:
+            for line in lines[1:-1]:  # a last line without its end was cut off
+                row = Row.of_dict(json.loads(line))
+                self.rows[row.key] = row
+        try:
+            self.file = path.open("w", encoding="utf-8")
+        except OSError as error:
+            raise RecordError(
+                f"{path} can not be written ({error.strerror})", "what is done is kept there", "name another --output"
+            ) from error
+        self._write(first)
+        for row in self.rows.values():
+            self._write(json.dumps(asdict(row)))
+
+    def add(self, row: Row) -> None:
+        """Keep a row: it is in the file when this returns."""
+        self.rows[row.key] = row
+        self._write(json.dumps(asdict(row)))
+
+    def _write(self, line: str) -> None:
+        self.file.write(line + "\n")
+        self.file.flush()
+
+    def done(self) -> None:
+        """All is written elsewhere."""
+        self.file.close()
+        self.path.unlink(missing_ok=True)
