@@ -21,6 +21,7 @@ BY_FORCE = (
 )  # fmt: skip
 ONSETS = ("sticks", "breakaway", "presliding")  # when it sticks, and what it does until it slips
 BALANCED = ("balance", "energy")  # checks that a wrong mass, spring or sensor fails
+FAR = 2.0  # times by which two sides that should be one differ, from which no force is given
 GOES_ON = 0.8  # of the motion at first that is left at last, where something drives it
 NO_BASE = "there is no channel z: the base is taken to be at rest, but something keeps the motion up"
 
@@ -86,6 +87,13 @@ def untrue(told: Consistency | None) -> str:
         return ""
     apart = [check.sentence for check in failed if any(word in check.name for word in BALANCED)]
     return f"the record and the rig's constants contradict each other: {apart[0]}" if apart else ""
+
+
+def hopeless(told: Consistency | None) -> str:
+    """What of channels and constants can not all be true, where it is so far off that no force is worth a headline."""
+    failed = told.failed if told is not None else ()
+    apart = [check for check in failed if any(word in check.name for word in BALANCED) and check.right]
+    return untrue(told) if any(not 1 / FAR < check.left / check.right < FAR for check in apart) else ""
 
 
 def _base_unseen(record: Record) -> bool:

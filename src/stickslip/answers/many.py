@@ -6,7 +6,7 @@ import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 from stickslip.errors import RecordError
 from stickslip.estimate import Estimate, Result
@@ -153,6 +153,12 @@ class Kept:
         for row in self.rows.values():
             self._write(json.dumps(asdict(row)))
 
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self.file.close()
+
     def add(self, row: Row) -> None:
         """Keep a row: it is in the file when this returns."""
         self.rows[row.key] = row
@@ -161,8 +167,3 @@ class Kept:
     def _write(self, line: str) -> None:
         self.file.write(line + "\n")
         self.file.flush()
-
-    def done(self) -> None:
-        """All is written elsewhere."""
-        self.file.close()
-        self.path.unlink(missing_ok=True)

@@ -95,17 +95,20 @@ def ask_many(
         for group, names in zip(groups, names_of(groups), strict=True)
     ]
     asked = {"question": question, "rig": rig.model_dump(), "options": dict(options), "version": ss.__version__}
-    kept = Kept(folder.with_name(f"{folder.name}.rows"), asked)
-    left = list({task.key: task for task in reversed(tasks) if task.key not in kept.rows}.values())[::-1]
-    done = len(tasks) - len(left)
-    for row in run(left):
-        kept.add(row)
-        done += 1
-        tell(f"{question}: {row.name}", done)
+    with Kept(_kept(folder), asked) as kept:
+        left = list({task.key: task for task in reversed(tasks) if task.key not in kept.rows}.values())[::-1]
+        for done, row in enumerate(run(left), start=len(tasks) - len(left) + 1):
+            kept.add(row)
+            tell(f"{question}: {row.name}", done)
     rows = tuple(_rows(tasks, kept.rows))
     together, notes = ss.answers.against_load([row for row in rows if row.counts]) if _loaded(rows) else ({}, ())
     found = {name: each for name, each in together.items() if each is not None}
     return Batch(question, rows, AXES[question], found, (*notes, *_untried(options)))
+
+
+def _kept(folder: Path) -> Path:
+    """Where rows are kept until the folder of results is there."""
+    return folder.with_name(f"{folder.name}.rows")
 
 
 def finish(batch: Batch, places: Places, folder: Path | None, kept: Path, *, as_json: bool, everything: bool) -> None:
@@ -113,7 +116,7 @@ def finish(batch: Batch, places: Places, folder: Path | None, kept: Path, *, as_
     written = ss.publish(batch, folder=folder) if folder is not None else None
     if places.table is not None:
         ss.story.write_table(batch, places.table)
-    kept.with_name(f"{kept.name}.rows").unlink(missing_ok=True)
+    _kept(kept).unlink(missing_ok=True)
     show(batch, written, as_json=as_json, everything=everything)
 
 

@@ -58,7 +58,7 @@ def reading_options(command: Callable[..., None]) -> Callable[..., None]:
             "--config",
             type=click.Path(path_type=Path),
             metavar="RIG.TOML",
-            help="File of the rig's constants and channel map; options go before it.",
+            help="The rig's constants and channel map; unless given rig.toml of this folder. Options go before it.",
         ),
     ]
     for option in reversed(options):

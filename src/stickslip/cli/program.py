@@ -11,6 +11,7 @@ from stickslip.cli.analyze import analyze, demo
 from stickslip.cli.decay import decay
 from stickslip.cli.exchange import check, convert, datasets
 from stickslip.cli.fit import fit
+from stickslip.cli.init import init
 from stickslip.cli.interrupted import INTERRUPTED, SENTENCE
 from stickslip.cli.lab import lab
 from stickslip.cli.mended import mended
@@ -85,6 +86,7 @@ for _command in (
     decay,
     demo,
     fit,
+    init,
     lab,
     predict,
     rig,

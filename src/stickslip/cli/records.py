@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 Answer = TypeVar("Answer")
 
 LONG = 1 << 26  # bytes on the disk
+RIG_FILE = "rig.toml"  # of the folder one is in: read where no other is named
 PART = 1 << 18  # rows of a long record's part
 
 
@@ -41,9 +42,16 @@ def rig_of(
     repair: str | None,
     sensors: Sequence[str] = (),
     normal: Sequence[str] = (),
+    here: bool = True,
     **constants: str | None,
 ) -> RigSettings:
-    """The settings of the file, with those of the command line in front."""
+    """The settings of the file, with those of the command line in front; rig.toml of this folder is that file.
+
+    A rig.toml is looked for only if it may be `here`.
+    """
+    if config is None and here and Path(RIG_FILE).is_file():
+        config = Path(RIG_FILE)
+        complain(f"columns and constants by {RIG_FILE}")
     given: dict[str, Any] = {key: value for key, value in constants.items() if value is not None}
     base = ss.rig.read_rig(config).model_dump(exclude_unset=True) if config else {}
     for key, pairs in (("channels", channels), ("units", units)):

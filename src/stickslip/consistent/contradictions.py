@@ -188,7 +188,8 @@ def consistency(
         sampling_check(record, seen),
         *cycle_checks(record, seen),
     )
-    slips = mixups(seen.balance, failing=any(c.verdict == FAILS for c in checks), repeats=seen.lines.cycles is not None)
+    failing = any(check.verdict == FAILS for check in checks)
+    slips = mixups(seen.balance, failing=failing) if seen.steady and seen.lines.cycles is not None else ()
     checks = (*checks, *slip_check(seen.balance, slips))
     return Consistency(checks, what_fails(checks), slips, zero_off(seen))
 

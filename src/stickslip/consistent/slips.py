@@ -28,6 +28,7 @@ CLOSE = 30.0  # times by which the motions of mass and base differ at most where
 ELASTIC, TURNED = 87.0, 40.0  # degrees from which a slip of a constant, of the clock is looked for
 IDLE = 0.02  # of the friction: a spring that pulls less is too soft to have moved the mass
 OPPOSED = 20.0  # degrees within which the friction must be left
+LATE = 0.15  # rad by which sensors of which nothing is stated may lag one another: energy may seem to run back by it
 SWUNG, HURLED = 0.1, 300.0  # m and m/s^2: an oscillator that does more of both is read in the wrong unit
 
 
@@ -121,7 +122,7 @@ class Amplitudes:
         for name in ("z", "load"):
             if name in values and (name != "z" or "force" not in values):
                 turned = (values[name] * complex(1j * x).conjugate()).real / (abs(values[name]) * abs(x))
-                total += (min(0.0, turned) / self.tolerance) ** 2
+                total += (min(0.0, turned + LATE) / self.tolerance) ** 2
         return total
 
     @property
@@ -131,12 +132,12 @@ class Amplitudes:
         return z > 0 and 1 / CLOSE < x / z < CLOSE
 
 
-def mixups(balance: Amplitudes, *, failing: bool, repeats: bool) -> tuple[Slip, ...]:
+def mixups(balance: Amplitudes, *, failing: bool) -> tuple[Slip, ...]:
     """Every slip that would make the channels agree, the best first; none where they agree or none would.
 
-    Channels are brought together where some check is `failing`; the friction's phase is one where the motion `repeats`.
+    Channels are brought together where some check is `failing`.
     """
-    return (_explaining(balance) if failing else ()) or (tuple(_of_the_balance(balance)) if repeats else ())
+    return (_explaining(balance) if failing else ()) or tuple(_of_the_balance(balance))
 
 
 def _explaining(balance: Amplitudes) -> tuple[Slip, ...]:

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator
 from typing import Any
 
-from stickslip.answers.doubts import untrue
+from stickslip.answers.doubts import hopeless
 from stickslip.answers.findings import Comparison, Findings
 from stickslip.balance.balance import Pull
 from stickslip.consistent.slips import Slip
@@ -103,7 +103,7 @@ def _wrong(findings: Findings) -> Iterator[str]:
     slips, missing = findings.results.get("slips") or (), findings.results.get("lacking") or ()
     if slips:
         yield f"Probably {' or '.join(each.words for each in slips)}: until that is mended no force is given."
-    elif apart := untrue(findings.consistency):
+    elif apart := hopeless(findings.consistency):
         yield f"{sentence(apart)}. Until that is mended no force is given."
     elif missing:
         are, them = ("is", "it") if len(missing) == 1 else ("are", "them")
