@@ -146,9 +146,10 @@ def test_decays_and_squeaks_have_rows_too() -> None:
     for seed in range(2):
         noisy = values + 1e-3 * np.random.default_rng(seed).standard_normal(len(values))
         ss.write_record(ss.Record.of({"x": noisy}, fs=fs), f"release_{seed}.csv")
-        tone = np.where((TIME > 2) & (TIME < 4), np.sin(2 * np.pi * 70 * TIME), 0.0)
-        sound = tone + 0.01 * np.random.default_rng(seed).standard_normal(TIME.size)
-        ss.write_record(ss.Record.of({"sound": sound}, fs=250), f"sound_{seed}.csv")
+        time = np.arange(4000) / 500
+        tone = np.where((time > 2) & (time < 5), np.sin(2 * np.pi * 120 * time), 0.0)
+        sound = tone + 0.01 * np.random.default_rng(seed).standard_normal(time.size)
+        ss.write_record(ss.Record.of({"sound": sound}, fs=500), f"sound_{seed}.csv")
     words = ("--table", "t.csv", "--workers", "1")
     assert "damping ratio" in ask("decay", "release_*.csv", "--method", "thesis", *words).stdout
     assert len(pd.read_csv("t.csv")) == 2
