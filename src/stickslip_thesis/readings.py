@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 import stickslip as ss
-from stickslip.plot.style import BLUE, FAINT, INK, styled
+from stickslip.figures.style import BLUE, FAINT, INK, styled
 from stickslip_thesis.drawing import panels
 from stickslip_thesis.printed import Given
 
