@@ -14,6 +14,7 @@ from stickslip.drives.kinds import Drive, Release, require_drive
 from stickslip.errors import ModelError
 from stickslip.laws.base import Exit, Law, Mode, Row
 from stickslip.laws.curved import CurvedLaw
+from stickslip.laws.filippov import with_sliding_modes
 from stickslip.laws.guessing import registered
 from stickslip.laws.linear_slope import LinearSlope
 from stickslip.laws.stribeck import Tabulated
@@ -119,7 +120,7 @@ class Contact:
         A load that follows the motion adds flight. Where the law starts in different modes by the sign of velocity,
         "landing" decides between them; no time passes in it.
         """
-        law, entry = tuple(map(self._pressed, self.law.modes())), self.law.entry
+        law, entry = tuple(map(self._pressed, with_sliding_modes(self.law.modes()))), self.law.entry
         lands = len(set(entry)) > 1
         landing = Mode(
             "landing", "landing", 0, {},

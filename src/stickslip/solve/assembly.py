@@ -133,7 +133,7 @@ class _Builder:
             [contact.tables[0][number] for contact, number in zip(self.contacts, joint.numbers, strict=True)]
             for joint in self.joints
         ]
-        self.still: dict[tuple[int, ...], Rows] = {}
+        self.still: dict[tuple[tuple[int, float], ...], Rows] = {}
 
     def _name(self) -> None:
         """The entries of the state, and the rows that read them."""
@@ -213,7 +213,7 @@ class _Builder:
             if part.friction is not None:
                 friction[:, c] = (self.forms[c].modes[numbers[c]][:, :1] @ known[c])[:, 0]
                 force -= contact.tangent[:, None] * friction[:, None, c]
-        flow[:, :n], flow[:, n : 2 * n], friction[:, held] = self._moving(force, held)
+        flow[:, :n], flow[:, n : 2 * n], friction[:, held] = self._moving(force, parts, held)
         for c, own in enumerate(known):
             own[:, FRICTION] = friction[:, c]
             own[:, FRICTION_RATE], own[:, LOAD_RATE] = (_through(own[:, k], flow) for k in (FRICTION, 2))
@@ -223,12 +223,13 @@ class _Builder:
             own[:, FRICTION_RATE], own[:, LOAD_RATE] = (_through(own[:, k], flow) for k in (FRICTION, 2))
         return flow, friction, known
 
-    def _moving(self, force: Rows, held: list[int]) -> tuple[Rows, Rows, Rows]:
+    def _moving(self, force: Rows, parts: Sequence[Mode], held: list[int]) -> tuple[Rows, Rows, Rows]:
         """Velocity and acceleration of every mass, and the friction of the contacts that hold."""
         if not held:
             return self.speed, self._accelerated(force), np.zeros((self.count, 0, self.size))
         rows = np.array([self.contacts[c].tangent for c in held], dtype=self.digits)
-        speed, acceleration = self._faces(held, 1), self._faces(held, 2)
+        speed = self._faces(held, 1) + np.outer([parts[c].speed for c in held], self.one)
+        acceleration = self._faces(held, 2)
         if len(held) == self.degrees:  # nothing is free: the contacts take what the masses' forced motion leaves
             spread = rows.T @ _solved(rows @ rows.T, np.eye(len(rows)))
             forced = spread @ acceleration
@@ -265,26 +266,26 @@ class _Builder:
             held = self._held(j, e)
             if held:
                 if held not in self.still:
-                    self.still[held] = self._stilled(list(held))
+                    self.still[held] = self._stilled(dict(held))
                 out[:, e] = self.still[held] if carry is None else self.still[held] @ carry
             elif carry is not None:
                 out[:, e] = carry
 
-    def _held(self, j: int, e: int) -> tuple[int, ...]:
-        """The contacts that have no velocity after an exit."""
+    def _held(self, j: int, e: int) -> tuple[tuple[int, float], ...]:
+        """The contacts whose velocity is told after an exit, and that velocity."""
         joint = self.joints[j]
         c, number = joint.exits[e]
         parts, following = self.parts[j], self.parts[joint.targets[e]]
-        held = {k for k, part in enumerate(following) if part.friction is None}
+        held = {k: part.speed for k, part in enumerate(following) if part.friction is None}
         if self.degrees > 1:  # one mass that is held has the counter-face's motion to the last digit
-            held |= {k for k, part in enumerate(parts) if part.friction is None}
+            held = {k: part.speed for k, part in enumerate(parts) if part.friction is None} | held
         # an exit at zero velocity leaves exactly none: rounding must not decide what follows
         if set(parts[c].exits[number].quantity) == {"v"} and parts[c].kind != "landing":
-            held.add(c)
-        return tuple(sorted(held))
+            held.setdefault(c, 0.0)
+        return tuple(sorted(held.items()))
 
-    def _stilled(self, held: list[int]) -> Rows:
-        """The state with no velocity left under some contacts but for the rounding of its own terms.
+    def _stilled(self, held: Mapping[int, float]) -> Rows:
+        """The state with the velocities of some contacts, none where they hold, but for the rounding of its own terms.
 
         One degree of freedom after the other takes the velocity that the rest leave it, contacts that see the fewest
         first. No projection: that would mix in the rounding of velocities that a contact does not see, and rounding
@@ -294,7 +295,7 @@ class _Builder:
         speeds = slice(self.degrees, 2 * self.degrees)
         for c in sorted(held, key=lambda c: int(np.count_nonzero(self.contacts[c].tangent))):
             contact = self.contacts[c]
-            left = contact.carried * self.face[1] - contact.tangent @ still[:, speeds]
+            left = contact.carried * self.face[1] + held[c] * self.one - contact.tangent @ still[:, speeds]
             p = self.degrees + int(np.argmax(np.abs(left[0, speeds])))
             if abs(left[0, p]) > 1e-12 * np.max(np.abs(contact.tangent)):
                 taken = -left / left[:, p, None]

@@ -23,6 +23,7 @@ from stickslip.drives.kinds import Drive, Motion
 from stickslip.errors import ModelError
 from stickslip.laws.base import Exit, Law, Mode
 from stickslip.laws.curved import CurvedMode
+from stickslip.laws.filippov import with_sliding_modes
 from stickslip.oscillator import Oscillator
 from stickslip.solve.cells import Linear
 from stickslip.structure import Structure
@@ -304,7 +305,7 @@ def oscillators(
 ) -> Systems:
     """Oscillators as systems of one mass: the different laws and drives, which of them each has (B,), its mass,
     stiffness and damping (3, B), and whether its damper is fixed to the base (B,)."""
-    tables = [one.modes() for one in laws]
+    tables = [with_sliding_modes(one.modes()) for one in laws]
     one = np.ones(1)
     contact = Rubbing(laws, tables, law, one)
     mass, stiffness, damping = numbers[:, :, None, None]
@@ -347,7 +348,7 @@ def kind_of_law(law: Any) -> Any:
     """What the laws of systems of one kind have in common; None for a law without linear modes."""
     if hasattr(law, "rates") or not hasattr(law, "modes"):
         return None
-    modes = law.modes()
+    modes = with_sliding_modes(law.modes())
     exits = [tuple((e.to, e.crossing, set(e.quantity) == {"v"}, *e.reset) for e in mode.exits) for mode in modes]
     parts = [(mode.name, mode.kind, mode.side, mode.friction is None) for mode in modes]
     return tuple(parts), tuple(exits), tuple(law.memory), tuple(law.places), law.entry

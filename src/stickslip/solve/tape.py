@@ -16,6 +16,7 @@ from stickslip.drives.kinds import Motion
 from stickslip.errors import ModelError
 from stickslip.laws.base import Exit
 from stickslip.laws.curved import Creeping, CurvedLaw, CurvedMode, Expression
+from stickslip.laws.filippov import with_sliding_modes
 from stickslip.oscillator import Oscillator
 from stickslip.solve import taylor
 from stickslip.solve.series import Nodes
@@ -259,7 +260,7 @@ class _Builder:
             (1.0, self.force), (system.stiffness, self.base), (-system.stiffness, ({0: 1.0}, 0.0)),
             (-system.damping, ({1: 1.0}, 0.0)), (system.damping, damper),
         ])  # fmt: skip
-        self.modes, self.least = law.rates(), 0.0
+        self.modes, self.least = with_sliding_modes(law.rates()), 0.0
         if isinstance(law, Creeping):
             self.least = self.standstill(law)
             stop = {side: (Exit({"v": -float(side), "1": 0.5 * self.least}, "held"),) for side in (-1, 1)}
@@ -282,7 +283,7 @@ class _Builder:
         Exactly none where the contact holds, or stops: rounding must not decide what follows.
         """
         if to.friction is None or set(exit_.quantity) == {"v"}:
-            return 0.0
+            return to.speed
         return to.side * self.least if mode.creep is not None else math.nan
 
     def form(self, row: Mapping[str, float]) -> Form:
@@ -317,7 +318,7 @@ class _Builder:
             symbols["f"] = friction
             symbols["v"] = moving.form(mode.creep) if mode.creep is not None else symbols["v"]
             creep: Form = symbols["v"] if mode.creep is not None else ({}, 0.0)
-            rates = {0: combined([(1.0, self.face[1]), (1.0, creep)]), 1: self.face[2]}
+            rates = {0: combined([(1.0, self.face[1]), (1.0, creep), (1.0, ({}, mode.speed))]), 1: self.face[2]}
         else:
             friction = moving.form(mode.friction)
             rates = {0: ({1: 1.0}, 0.0), 1: combined([(1.0, self.push), (-1.0, friction)])}
