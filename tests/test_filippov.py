@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -93,7 +94,7 @@ def test_memory_follows_the_mixture() -> None:
     trace, friction = run.sample(times, ("trace", "friction"))[0]
     step = times[1]
     kept = [0.0]
-    for f, g in zip(friction, friction[1:], strict=False):
+    for f, g in pairwise(friction):
         kept.append(kept[-1] + step * ((f + g) / 2 - kept[-1]) / (1 + step / 2))
     np.testing.assert_allclose(trace, kept, atol=2e-3)
 

@@ -27,7 +27,8 @@ ALIKE = 1e-12  # relative: friction that differs by no more is continuous
 
 def with_sliding_modes(modes: Sequence[M]) -> tuple[M, ...]:
     """The modes of a law, with one between each two that go over into each other at a speed where friction jumps."""
-    known, added = {mode.name: mode for mode in modes}, list[Any]()
+    known: dict[str, M] = {mode.name: mode for mode in modes}
+    added: list[M] = []
     for low in modes:
         for exit_ in low.exits:
             up, speed = known[exit_.to], _speed(exit_.quantity)
@@ -59,18 +60,18 @@ def _through(mode: M, to: str, speed: float, between: str) -> M:
     return replace(mode, exits=tuple(there))
 
 
-def _between(low: Any, up: Any, speed: float) -> Mode | CurvedMode | None:
+def _between(low: Any, up: Any, speed: float) -> Any:
     """The mode between two; None where friction does not jump, or where no mode of their kind can tell the mixture."""
     if low.friction is None or up.friction is None:
         return None
-    made = _linear(low, up, speed) if isinstance(low, Mode) else _curved(low, up, speed)
+    made: Any = _linear(low, up, speed) if isinstance(low, Mode) else _curved(low, up, speed)
     if made is None:
         return None
     name, side = f"between {low.name} and {up.name}", int(math.copysign(1, speed)) if speed else 0
     exits = [e for mode in (low, up) for e in mode.exits if e.to not in (low.name, up.name)]
     others = {(e.to, tuple(e.quantity.items())): e for e in exits}
-    named = {"name": name, "kind": "slip" if speed else "stick", "side": side, "speed": speed}
-    return replace(made, **named, exits=(*made.exits, *others.values()))
+    every = (*made.exits, *others.values())
+    return replace(made, name=name, kind="slip" if speed else "stick", side=side, speed=speed, exits=every)
 
 
 def _linear(low: Mode, up: Mode, speed: float) -> Mode | None:
@@ -110,7 +111,8 @@ def _ratio(form: Row, of: Row) -> float | None:
 
 
 def _curved(low: CurvedMode, up: CurvedMode, speed: float) -> CurvedMode | None:
-    assert low.friction is not None and up.friction is not None
+    assert low.friction is not None
+    assert up.friction is not None
     at = {"v": lifted(speed)}
     below, above = low.friction.put(at), up.friction.put(at)
     if not _jumps(below, above):
