@@ -39,8 +39,8 @@ def with_sliding_modes(modes: Sequence[M]) -> tuple[M, ...]:
                 added.append(between)
                 known[low.name] = _through(known[low.name], up.name, speed, between.name)
                 known[up.name] = _through(known[up.name], low.name, speed, between.name)
-    every: list[M] = [*(known[mode.name] for mode in modes), *added]
-    return tuple(every)
+    every = [known[mode.name] for mode in modes]
+    return tuple(every + added)
 
 
 def _speed(quantity: Row) -> float | None:
