@@ -116,7 +116,7 @@ def _curved(low: CurvedMode, up: CurvedMode, speed: float) -> CurvedMode | None:
     assert up.friction is not None
     at = {"v": lifted(speed)}
     below, above = low.friction.put(at), up.friction.put(at)
-    if not _jumps(below, above):
+    if not differs(below, above):
         return None
     share = (symbol("f") - below) / (above - below)
     rates = dict[str, Expression]()
@@ -127,7 +127,7 @@ def _curved(low: CurvedMode, up: CurvedMode, speed: float) -> CurvedMode | None:
     return CurvedMode("", "", 0, None, exits, rates, levels={"above": above, "below": below})
 
 
-def _jumps(below: Expression, above: Expression) -> bool:
+def differs(below: Expression, above: Expression) -> bool:
     """Whether two expressions differ, at values of their symbols at which both have one."""
     names = sorted(below.symbols | above.symbols)
     for values in _values(names):

@@ -17,6 +17,8 @@ from numpy.typing import NDArray
 from stickslip.errors import ModelError
 from stickslip.laws.base import Mode
 from stickslip.laws.curved import CurvedLaw
+from stickslip.oscillator import Oscillator
+from stickslip.solve.bound import stilled
 from stickslip.solve.cells import DEGREE, cells_of, derivatives, derive
 from stickslip.solve.settling import settled
 from stickslip.solve.tables import (
@@ -28,6 +30,8 @@ from stickslip.solve.tables import (
     Tables,
     batch_of,
     by_value,
+    is_curved,
+    laws_of,
     numbered,
     reached,
     systems_of,
@@ -41,15 +45,14 @@ WHOLE = 1e3 * float(np.finfo(np.longdouble).eps)  # a part this close to a whole
 
 def table_of(system: System) -> Tables:
     """The flat tables of one system."""
-    if isinstance(system, Structure):
-        return _built(system)
-    if isinstance(system.law, CurvedLaw):
+    if is_curved(system):
+        curved = [type(law).__name__ for law in laws_of(system) if isinstance(law, CurvedLaw)]
         raise ModelError(
-            f"{type(system.law).__name__} has curved modes",
+            f"{' and '.join(curved)} with curved modes",
             "this question needs a law of linear modes",
             "ask simulate(), or make a polygon of the curve with Tabulated.of()",
         )
-    return _known(system) if by_value(system) else _built(system)
+    return _known(system) if isinstance(system, Oscillator) and by_value(system) else _built(system)
 
 
 def _built(system: System) -> Tables:
@@ -285,23 +288,12 @@ class _Builder:
         return tuple(sorted(held.items()))
 
     def _stilled(self, held: Mapping[int, float]) -> Rows:
-        """The state with the velocities of some contacts, none where they hold, but for the rounding of its own terms.
-
-        One degree of freedom after the other takes the velocity that the rest leave it, contacts that see the fewest
-        first. No projection: that would mix in the rounding of velocities that a contact does not see, and rounding
-        must not decide what follows.
-        """
-        still = np.tile(self.unit, (self.count, 1, 1))
-        speeds = slice(self.degrees, 2 * self.degrees)
-        for c in sorted(held, key=lambda c: int(np.count_nonzero(self.contacts[c].tangent))):
-            contact = self.contacts[c]
-            left = contact.carried * self.face[1] + held[c] * self.one - contact.tangent @ still[:, speeds]
-            p = self.degrees + int(np.argmax(np.abs(left[0, speeds])))
-            if abs(left[0, p]) > 1e-12 * np.max(np.abs(contact.tangent)):
-                taken = -left / left[:, p, None]
-                taken[:, p] = -1.0
-                still += still[:, :, p, None] * taken[:, None]
-        return still
+        """The state with the velocities of some contacts told, none where they hold."""
+        told = {
+            c: (self.contacts[c].tangent, self.contacts[c].carried * self.face[1] + speed * self.one)
+            for c, speed in held.items()
+        }
+        return np.asarray(stilled(np.tile(self.unit, (self.count, 1, 1)), self.degrees, told))
 
     def build(self) -> Tables:
         joints, count, size = self.joints, self.count, self.size

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from stickslip.drives.kinds import Drive, Motion
 from stickslip.errors import ModelError
 from stickslip.laws.base import Exit, Law, Mode
-from stickslip.laws.curved import CurvedMode
+from stickslip.laws.curved import CurvedLaw, CurvedMode
 from stickslip.laws.filippov import with_sliding_modes
 from stickslip.oscillator import Oscillator
 from stickslip.solve.cells import Linear
@@ -278,6 +278,16 @@ class Systems:
     share: Array
     seeds: tuple[tuple[str, ...], ...]
     joint: bool
+
+
+def is_curved(system: System) -> bool:
+    """Whether a contact has a law of curved modes: then Taylor series are marched, not closed forms."""
+    return any(isinstance(law, CurvedLaw) for law in laws_of(system))
+
+
+def laws_of(system: System) -> list[Any]:
+    """The law of each contact."""
+    return [contact.law for contact in system.contacts] if isinstance(system, Structure) else [system.law]
 
 
 def by_value(system: Oscillator) -> bool:
