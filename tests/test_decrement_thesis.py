@@ -1,4 +1,4 @@
-"""Chapter 6 of the thesis: what its tables do not say. The tables themselves are judged with the chapters (stickslip_thesis)."""
+"""Chapter 6 of the thesis: what its tables do not say. The tables themselves are judged with the chapters."""
 
 from __future__ import annotations
 
