@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from stickslip.errors import RecordError
 from stickslip.record.channels import Channel
 from stickslip.record.clock import Clock, fit_clock
+from stickslip.record.log import Log
 from stickslip.record.metadata import (
     KEY,
     Digests,
@@ -421,6 +422,7 @@ def metadata_to_record(metadata: Mapping[str, Any], samples: Mapping[str, Array]
             stamps,
             restored(metadata["truth"]),
             StatedRig(**restored(rig)) if (rig := metadata.get("rig")) else None,
+            Log.of(log) if (log := metadata.get("log")) is not None else None,
         )
 
 

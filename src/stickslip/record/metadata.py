@@ -43,6 +43,7 @@ def record_to_metadata(record: Record) -> dict[str, Any]:
         "history": [_plain(step.to_dict()) for step in record.history],
         "truth": _plain(record.truth),
         "rig": None if record.rig is None else _plain(vars(record.rig)),
+        "log": None if record.log is None else record.log.entries(),
         "sha256": Digests({time_column(record): record.time, **record.samples}).told(),
     }
 

@@ -16,6 +16,7 @@ from stickslip.errors import RecordError
 from stickslip.record import metadata
 from stickslip.record.channels import VOCABULARY, Channel, checked_name, described
 from stickslip.record.check import Fault, clock_cure, cure, find_faults
+from stickslip.record.log import Log
 from stickslip.units import parse_unit
 
 if TYPE_CHECKING:
@@ -152,6 +153,8 @@ class Record:
         True values behind a simulated record, by name; empty for a measured one.
     rig : StatedRig or None
         What the friction force was found with; None where no balance of forces was drawn up.
+    log : Log or None
+        What was written down beside the measurement: surfaces, lubrication, air, load, remarks.
 
     Examples
     --------
@@ -168,6 +171,7 @@ class Record:
     stamps: Array | None = None
     truth: Mapping[str, Any] = field(default_factory=dict)
     rig: StatedRig | None = None
+    log: Log | None = None
 
     def __post_init__(self) -> None:
         if not self.samples:
@@ -344,6 +348,19 @@ class Record:
             self, channels=channels, history=(*self.history, Step("with_details", {"name": name, **details}))
         )
 
+    def with_log(self, log: Log | Mapping[str, Any]) -> Record:
+        """This record with what was written down beside it; entries stated before stay where they are not named.
+
+        Examples
+        --------
+        >>> record = Record.of({"x": [0.0, 1.0]}, fs=2.0).with_log({"surface": "steel on steel", "humidity": "45 %"})
+        >>> record.log.rows()
+        [('Surfaces', 'steel on steel'), ('Relative humidity', '45 %')]
+        """
+        added = log.entries() if isinstance(log, Log) else dict(log)
+        known = self.log.entries() if self.log is not None else {}
+        return replace(self, log=Log.of({**known, **added}))
+
     def with_samples(
         self,
         samples: Mapping[str, Array],
@@ -360,7 +377,7 @@ class Record:
         """
         fs, start = self.fs if fs is None else fs, self.start if start is None else start
         channels = {n: replace(c, noise=None) for n, c in self.channels.items()} if filtered else self.channels
-        return Record(samples, channels, fs, start, (*self.history, step), stamps, self.truth, self.rig)
+        return Record(samples, channels, fs, start, (*self.history, step), stamps, self.truth, self.rig, self.log)
 
     def rows(self, first: int = 0, last: int | None = None) -> Record:
         """Rows ``first`` up to, not including, ``last`` (negative from the end, as in a slice)."""
@@ -410,7 +427,7 @@ class Record:
         return metadata.to_sep005(self)
 
     def equals(self, other: object) -> bool:
-        """Whether another record holds exactly the same samples, channels, clock, history, truth and rig."""
+        """Whether another record holds exactly the same samples, channels, clock, history, truth, rig and log."""
         if not isinstance(other, Record) or list(self.samples) != list(other.samples):
             return False
         pairs = [(self.samples[name], other.samples[name]) for name in self.samples]
@@ -420,7 +437,7 @@ class Record:
             pairs.append((self.stamps, other.stamps))
         same = all(np.array_equal(mine, theirs, equal_nan=True) for mine, theirs in pairs)
         details = [
-            (dict(r.channels), r.fs, r.start, [s.to_dict() for s in r.history], dict(r.truth), r.rig)
+            (dict(r.channels), r.fs, r.start, [s.to_dict() for s in r.history], dict(r.truth), r.rig, r.log)
             for r in (self, other)
         ]
         return same and details[0] == details[1]

@@ -97,6 +97,12 @@ def tried(what: str, verdicts: Sequence[Sequence[str]]) -> Table:
     return Table("What was tried", (f"{what} tried", "verdict"), verdicts)
 
 
+def logged(record: Record) -> list[Table]:
+    """What was written down beside a measurement; nothing where nothing was."""
+    rows = record.log.rows() if record.log is not None else []
+    return [Table("What was logged of the experiment?", ("entry", "written down"), rows, folded=True)] if rows else []
+
+
 def _nothing_more(folder: Path) -> None:
     """Of most results page, numbers and figures are all."""
 
