@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from stickslip.errors import FormatError
 from stickslip.record.channels import Channel
+from stickslip.record.log import Log
 from stickslip.record.record import Record, StatedRig, Step
 
 Array = NDArray[np.float64]
@@ -34,6 +35,7 @@ def record_to_metadata(record: Record) -> dict[str, Any]:
         "history": [_plain(step.to_dict()) for step in record.history],
         "truth": _plain(record.truth),
         "rig": None if record.rig is None else _plain(vars(record.rig)),
+        "log": None if record.log is None else record.log.entries(),
         "sha256": Digests({time_column(record): record.time, **record.samples}).told(),
     }
 
@@ -99,6 +101,7 @@ def metadata_to_record(metadata: Mapping[str, Any], samples: Mapping[str, Array]
             stamps,
             _restored(metadata["truth"]),
             StatedRig(**_restored(rig)) if (rig := metadata.get("rig")) else None,
+            Log.of(log) if (log := metadata.get("log")) is not None else None,
         )
 
 

@@ -13,7 +13,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from stickslip.errors import RecordError
+from stickslip.printing import html_table
 from stickslip.record.channels import VOCABULARY, Channel, checked_name, described
+from stickslip.record.log import Log
 from stickslip.units import parse_unit
 
 if TYPE_CHECKING:
@@ -148,6 +150,8 @@ class Record:
         True values behind a simulated record, by name; empty for a measured one.
     rig : StatedRig or None
         What the friction force was found with; None where no balance of forces was drawn up.
+    log : Log or None
+        What was written down beside the measurement: surfaces, lubrication, air, load, remarks.
 
     Examples
     --------
@@ -164,6 +168,7 @@ class Record:
     stamps: Array | None = None
     truth: Mapping[str, Any] = field(default_factory=dict)
     rig: StatedRig | None = None
+    log: Log | None = None
 
     def __post_init__(self) -> None:
         if not self.samples:
@@ -344,6 +349,19 @@ class Record:
             self, channels=channels, history=(*self.history, Step("with_details", {"name": name, **details}))
         )
 
+    def with_log(self, log: Log | Mapping[str, Any]) -> Record:
+        """This record with what was written down beside it; entries stated before stay where they are not named.
+
+        Examples
+        --------
+        >>> record = Record.of({"x": [0.0, 1.0]}, fs=2.0).with_log({"surface": "steel on steel", "humidity": "45 %"})
+        >>> record.log.rows()
+        [('Surfaces', 'steel on steel'), ('Relative humidity', '45 %')]
+        """
+        added = log.entries() if isinstance(log, Log) else dict(log)
+        known = self.log.entries() if self.log is not None else {}
+        return replace(self, log=Log.of({**known, **added}))
+
     def with_samples(
         self,
         samples: Mapping[str, Array],
@@ -360,7 +378,7 @@ class Record:
         """
         fs, start = self.fs if fs is None else fs, self.start if start is None else start
         channels = {n: replace(c, noise=None) for n, c in self.channels.items()} if filtered else self.channels
-        return Record(samples, channels, fs, start, (*self.history, step), stamps, self.truth, self.rig)
+        return Record(samples, channels, fs, start, (*self.history, step), stamps, self.truth, self.rig, self.log)
 
     def rows(self, first: int = 0, last: int | None = None) -> Record:
         """Rows ``first`` up to, not including, ``last`` (negative from the end, as in a slice)."""
@@ -418,7 +436,7 @@ class Record:
         return to_sep005(self)
 
     def equals(self, other: object) -> bool:
-        """Whether another record holds exactly the same samples, channels, clock, history, truth and rig."""
+        """Whether another record holds exactly the same samples, channels, clock, history, truth, rig and log."""
         if not isinstance(other, Record) or list(self.samples) != list(other.samples):
             return False
         pairs = [(self.samples[name], other.samples[name]) for name in self.samples]
@@ -428,15 +446,44 @@ class Record:
             pairs.append((self.stamps, other.stamps))
         same = all(np.array_equal(mine, theirs, equal_nan=True) for mine, theirs in pairs)
         details = [
-            (dict(r.channels), r.fs, r.start, [s.to_dict() for s in r.history], dict(r.truth), r.rig)
+            (dict(r.channels), r.fs, r.start, [s.to_dict() for s in r.history], dict(r.truth), r.rig, r.log)
             for r in (self, other)
         ]
         return same and details[0] == details[1]
+
+    def _repr_html_(self) -> str:
+        rows = [
+            (name, f"[{self.channels[name].unit}]", self.channels[name].quantity, f"{np.nanmin(values):.5g}",
+             f"{np.nanmax(values):.5g}")
+            for name, values in self.samples.items() if np.isfinite(values).any()
+        ]  # fmt: skip
+        clock = f"{len(self)} samples, {self.fs:g} Hz, {self.time[0]:g} to {self.time[-1]:g} s"
+        title = f"Record: {clock}{', broken clock' if self.stamps is not None else ''}"
+        return html_table(title, ("channel", "unit", "quantity", "least", "greatest"), rows)
 
     def __repr__(self) -> str:
         names = ", ".join(f"{channel.name} [{channel.unit}]" for channel in self.channels.values())
         clock = "broken clock, about " if self.stamps is not None else ""
         return f"Record({names}; {len(self)} samples, {clock}{self.fs:g} Hz, from {self.start:g} s)"
+
+
+def require_record(*things: object) -> None:
+    """Refuse what is no Record, and say how one is made; a sequence is looked into."""
+    for thing in things:
+        if isinstance(thing, list | tuple):
+            require_record(*thing)
+        elif not isinstance(thing, Record):
+            frame = type(thing).__module__.partition(".")[0]
+            made = {
+                "dict": 'stickslip.Record.of({"x": [...]}, fs=1000, units={"x": "mm"})',
+                "str": "stickslip.read_record(path)", "PosixPath": "stickslip.read_record(path)",
+                "DataFrame": f"stickslip.record.from_{frame}(frame)", "Dataset": f"stickslip.record.from_{frame}(data)",
+            }  # fmt: skip
+            raise RecordError(
+                f"a {type(thing).__name__} where a Record belongs",
+                "a question is asked of a Record, whose channels have units and one clock",
+                f"make one: {made.get(type(thing).__name__, made['dict'])}",
+            )
 
 
 def _require_size(channel: Channel, values: Array, question: str) -> None:
