@@ -36,7 +36,7 @@ from stickslip.cycle.sticks import find_sticks
 from stickslip.errors import TOO_SHORT, EstimateError, StickslipError
 from stickslip.estimate import Constant
 from stickslip.record.flaws import constant
-from stickslip.record.record import RIG_UNITS, Record
+from stickslip.record.record import RIG_UNITS, Record, require_record
 from stickslip.rig.settings import RigSettings
 
 STRETCH = 1 << 14  # samples in which the contact is fitted
@@ -101,6 +101,7 @@ def analyze(
     >>> round(analyze(record).level.value, 2)
     1.5
     """
+    require_record(record)
     given = {"mass": mass, "stiffness": stiffness, "damping": damping, "damper": damper, "contact": contact}
     rig = _settings(rig, {key: value for key, value in given.items() if value is not None})
     asked, name, faults = Asked(), record_name(record), tuple(record.check())

@@ -12,7 +12,7 @@ import numpy as np
 from stickslip.answers.many import Batch, Row
 from stickslip.errors import ModelError, RecordError
 from stickslip.estimate import Estimate
-from stickslip.plot.many import plates_of
+from stickslip.figures.many import plates_of
 from stickslip.story.findings import plain
 from stickslip.story.story import Line, Story, Table
 from stickslip.story.words import Caution, interval_of, value_of
