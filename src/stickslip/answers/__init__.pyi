@@ -1,4 +1,3 @@
-from stickslip.answers.comparison import against_load as against_load
 from stickslip.answers.decay_comparison import compare_decays as compare_decays
 from stickslip.answers.decays import Decay as Decay
 from stickslip.answers.experiment import ExperimentPlan as ExperimentPlan
@@ -12,6 +11,7 @@ from stickslip.answers.long_records import analyze_blocks as analyze_blocks
 from stickslip.answers.many import Batch as Batch
 from stickslip.answers.many import Kept as Kept
 from stickslip.answers.many import Row as Row
+from stickslip.answers.many import spread as spread
 from stickslip.answers.mending import mend as mend
 from stickslip.answers.predictions import Prediction as Prediction
 from stickslip.answers.predictions import Predictions as Predictions

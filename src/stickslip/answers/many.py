@@ -3,13 +3,23 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping, Sequence
+import os
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field
+from itertools import islice
 from pathlib import Path
-from typing import Any, Self
+from typing import Any, Self, TypeVar
 
-from stickslip.errors import RecordError
+from stickslip.answers.comparison import against_load
+from stickslip.errors import ModelError, RecordError
 from stickslip.estimate import Estimate, Result
+from stickslip.maps.engines import AHEAD, client_of
+from stickslip.workers import processors
+from stickslip.workers import workers as processes
+
+Task = TypeVar("Task")
+CLUSTERS = ("cluster", "dask")  # names of the engine that asks a Dask cluster, an address behind "://"
 
 
 @dataclass(frozen=True)
@@ -89,6 +99,14 @@ class Batch(Result):
     together: Mapping[str, Estimate] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
 
+    @classmethod
+    def of(cls, question: str, rows: Sequence[Row], axes: tuple[str, str], notes: Sequence[str] = ()) -> Self:
+        """With the coefficient of friction over the records whose normal load is known."""
+        loaded = [row for row in rows if row.counts and row.normal is not None]
+        together, more = against_load(loaded) if len(loaded) > 1 else ({}, ())
+        found = {name: each for name, each in together.items() if each is not None}
+        return cls(question, tuple(rows), axes, found, (*more, *notes))
+
     @property
     def estimates(self) -> tuple[Estimate, ...]:
         """What they tell together."""
@@ -111,6 +129,75 @@ class Batch(Result):
     def table(self) -> list[dict[str, Any]]:
         """A row a record for a spreadsheet: of each quantity the value and the ends of its 95 % interval."""
         return [dict(_cells(row, self.names)) for row in self.rows]
+
+
+def spread(
+    answer: Callable[[Task], Row], *, tasks: Sequence[Task], engine: str = "processes", workers: int | None = None
+) -> Iterator[Row]:
+    """Answer tasks on several processors, each row as soon as it is there.
+
+    Parameters
+    ----------
+    answer : callable
+        Answers one task; on several processes it must be picklable, and so must its tasks.
+    tasks : sequence
+        What is to be answered.
+    engine : str
+        "processes", "cluster" (Dask, on this machine) or "cluster://HOST:PORT".
+    workers : int, optional
+        Processes; all processors where left out.
+
+    Returns
+    -------
+    iterator of Row
+
+    Raises
+    ------
+    ModelError
+        No such engine, or no cluster.
+
+    Examples
+    --------
+    >>> [row.name for row in spread(lambda name: Row(name, name), tasks=["a.csv", "b.csv"], workers=1)]
+    ['a.csv', 'b.csv']
+    """
+    word, _, address = engine.partition("://")
+    if word == "processes" and not address:
+        return _by_processes(answer, tasks, workers or processors())
+    if word in CLUSTERS:
+        return _by_cluster(answer, tasks, address or None)
+    raise ModelError(f"engine '{engine}'", "it is processes, cluster or cluster://HOST:PORT", "choose one of them")
+
+
+def _by_processes(answer: Callable[[Task], Row], tasks: Sequence[Task], count: int) -> Iterator[Row]:
+    with _one_thread_each(), processes(min(count, len(tasks)), answer.__module__) as over:
+        yield from over(answer, tasks)
+
+
+@contextmanager
+def _one_thread_each() -> Iterator[None]:
+    """Linear algebra on one thread in each process: on several, full processes stand in each other's way."""
+    names = [name for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS") if name not in os.environ]
+    os.environ.update(dict.fromkeys(names, "1"))
+    try:
+        yield
+    finally:
+        for name in names:
+            del os.environ[name]
+
+
+def _by_cluster(answer: Callable[[Task], Row], tasks: Sequence[Task], address: str | None) -> Iterator[Row]:
+    if not tasks:
+        return
+    with client_of(address) as client:
+        from distributed import as_completed
+
+        waiting = iter(tasks)
+        count = AHEAD * max(1, sum(client.nthreads().values()))
+        running = as_completed([client.submit(answer, task, pure=False) for task in islice(waiting, count)])
+        for future in running:
+            yield future.result()
+            running.update([client.submit(answer, task, pure=False) for task in islice(waiting, 1)])
 
 
 def _cells(row: Row, names: Sequence[str]) -> Iterator[tuple[str, Any]]:

@@ -15,9 +15,6 @@ from stickslip.cli.options import reading_options
 from stickslip.cli.records import RIG_FILE, groups_of, read, rig_of
 from stickslip.cli.terminal import aligned, complain, say, wrapped
 from stickslip.cli.words import spoken
-from stickslip.record.channels import VOCABULARY
-from stickslip.record.record import RIG_UNITS
-from stickslip.units import prefixed
 
 if TYPE_CHECKING:
     from stickslip import Record
@@ -26,6 +23,9 @@ if TYPE_CHECKING:
 
 NONE = "-"  # what is typed for a column that is left out
 LOOKED_AT = 64  # rows of each further file
+USUAL = {"x": "m", "z": "m", "v": "m/s", "a": "m/s^2", "theta": "rad"} | dict.fromkeys(
+    ("load", "force", "friction", "normal"), "N"
+)
 ASKED = ("x", "z", "v", "a", "load", "force", "friction", "normal", "theta", "sound")
 CONSTANTS = {
     "mass": "Mass that moves (kg, or with its unit; ± its uncertainty)",
@@ -82,9 +82,7 @@ def init(files: tuple[str, ...], yes: bool, output: Path, force: bool, **options
 def _show(files: Sequence[Path], record: Record, guesses: Sequence[Guess]) -> None:
     say(" + ".join(map(str, files)))
     say(f"{len(record)} samples at {record.fs:.6g} Hz, {record.duration:.4g} s.")
-    rows = [
-        (each.column, each.unit + ("" if each.stated else " ?"), _span(record, each), _words(each)) for each in guesses
-    ]
+    rows = [(each.column, each.unit + ("" if each.stated else " ?"), each.spanned, _words(each)) for each in guesses]
     for line in aligned(("column", "unit", "span", "taken for"), rows) if rows else ():
         say(line)
     suspicious = [
@@ -104,13 +102,7 @@ def _unsure(guess: Guess) -> bool:
 
 
 def _words(guess: Guess) -> str:
-    return f"{guess.channel}, {VOCABULARY[guess.channel].words}" if guess.channel else "nothing known"
-
-
-def _span(record: Record, guess: Guess) -> str:
-    unit = record.channels[guess.name].unit
-    factor, text = prefixed(guess.span, unit)
-    return f"{factor * guess.span:.4g}{'' if text == '1' or not guess.stated else ' ' + text}"
+    return f"{guess.channel}, {guess.words}" if guess.channel else guess.words
 
 
 # ---- what is asked
@@ -125,15 +117,13 @@ def _asked(guess: Guess) -> Guess:
     )  # fmt: skip
     if channel == NONE:
         return replace(guess, channel="")
-    unit = (
-        guess.unit if guess.stated else click.prompt("  its unit", default=guess.unit or VOCABULARY[channel].units[0])
-    )
+    unit = guess.unit if guess.stated else click.prompt("  its unit", default=guess.unit or USUAL.get(channel, "1"))
     return replace(guess, channel=channel, unit=unit, why="your word")
 
 
 def _a_channel(text: str) -> str:
-    if text != NONE and text not in VOCABULARY:
-        raise click.UsageError(f"'{text}' is none of {', '.join(VOCABULARY)}, {NONE}")
+    if text != NONE and text not in ASKED:
+        raise click.UsageError(f"'{text}' is none of {', '.join(ASKED)}, {NONE}")
     return text
 
 
@@ -171,7 +161,7 @@ def _a(name: str) -> Callable[[str], str]:
 def _settings(
     options: Mapping[str, Any], stated: RigSettings, guesses: Sequence[Guess], answers: Mapping[str, str]
 ) -> dict[str, Any]:
-    given = {name: options[name] for name in (*RIG_UNITS, "damper", "contact") if options[name] is not None}
+    given = {name: options[name] for name in (*CONSTANTS, "damper", "contact") if options[name] is not None}
     known = {key: value for key, value in stated.model_dump(exclude_unset=True).items() if key not in given}
     channels = {each.channel: each.text for each in guesses if each.channel}
     return {**known, **given, **answers, **({"channels": channels} if channels else {})}

@@ -2,12 +2,8 @@
 
 from __future__ import annotations
 
-import os
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
-from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,10 +11,9 @@ import click
 import numpy as np
 
 import stickslip as ss
-from stickslip.answers.many import Batch, Kept, Row
+from stickslip.answers import Batch, Kept, Row
 from stickslip.cli.records import checksum, names_of, read
 from stickslip.cli.show import show
-from stickslip.workers import processors, workers
 
 if TYPE_CHECKING:
     from stickslip import Record
@@ -27,7 +22,6 @@ if TYPE_CHECKING:
 MANY = 20  # records from which each is a row of a table, and has no page of its own
 POINTS = 120  # of a small picture
 SHOWN = 3.0  # cycles in it, where there are cycles
-CLUSTERS = ("cluster", "dask")  # names of the engine that asks a Dask cluster, an address behind "://"
 
 
 def many_options(command: Callable[..., None]) -> Callable[..., None]:
@@ -89,7 +83,6 @@ def ask_many(
     """One row a record; those that an earlier run has kept are not asked again."""
     if places.table is not None:
         ss.story.check_table(places.table)
-    run = _engine(places)
     tasks = [
         Task(question, tuple(group), tuple(names), "+".join(map(checksum, group)), rig, options)
         for group, names in zip(groups, names_of(groups), strict=True)
@@ -97,13 +90,12 @@ def ask_many(
     asked = {"question": question, "rig": rig.model_dump(), "options": dict(options), "version": ss.__version__}
     with Kept(_kept(folder), asked) as kept:
         left = list({task.key: task for task in reversed(tasks) if task.key not in kept.rows}.values())[::-1]
-        for done, row in enumerate(run(left), start=len(tasks) - len(left) + 1):
+        answers = ss.answers.spread(answered, tasks=left, engine=places.engine, workers=places.workers)
+        for done, row in enumerate(answers, start=len(tasks) - len(left) + 1):
             kept.add(row)
             tell(f"{question}: {row.name}", done)
     rows = tuple(_rows(tasks, kept.rows))
-    together, notes = ss.answers.against_load([row for row in rows if row.counts]) if _loaded(rows) else ({}, ())
-    found = {name: each for name, each in together.items() if each is not None}
-    return Batch(question, rows, AXES[question], found, (*notes, *_untried(options)))
+    return Batch.of(question, rows, AXES[question], _untried(options))
 
 
 def _kept(folder: Path) -> Path:
@@ -129,64 +121,10 @@ def _rows(tasks: Sequence[Task], kept: Mapping[str, Row]) -> Iterator[Row]:
         first.setdefault(task.key, name)
 
 
-def _loaded(rows: Iterable[Row]) -> bool:
-    return sum(row.counts and row.normal is not None for row in rows) > 1
-
-
 def _untried(options: Mapping[str, Any]) -> tuple[str, ...]:
     if options.get("twins") != 0:
         return ()
     return ("The answers of so many records are not tried on twins; --twins 40 does that, for some seconds each.",)
-
-
-# ---- where they are asked
-
-
-Run = Callable[[Sequence[Task]], Iterator[Row]]
-
-
-def _engine(places: Places) -> Run:
-    word, _, address = places.engine.partition("://")
-    if word == "processes" and not address:
-        return partial(_by_processes, places.workers or processors())
-    if word in CLUSTERS:
-        return partial(_by_cluster, address or None)
-    raise click.BadParameter(
-        f"'{places.engine}' is not processes, cluster or cluster://HOST:PORT", param_hint="--engine"
-    )
-
-
-def _by_processes(count: int, tasks: Sequence[Task]) -> Iterator[Row]:
-    with _one_thread_each(), workers(min(count, len(tasks)), __name__) as spread:
-        yield from spread(answered, tasks)
-
-
-@contextmanager
-def _one_thread_each() -> Iterator[None]:
-    """Linear algebra on one thread in each process: on several, full processes stand in each other's way."""
-    names = [name for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS") if name not in os.environ]
-    os.environ.update(dict.fromkeys(names, "1"))
-    try:
-        yield
-    finally:
-        for name in names:
-            del os.environ[name]
-
-
-def _by_cluster(address: str | None, tasks: Sequence[Task]) -> Iterator[Row]:
-    from stickslip.maps.engines import AHEAD, client_of
-
-    if not tasks:
-        return
-    with client_of(address) as client:
-        from distributed import as_completed
-
-        waiting = iter(tasks)
-        count = AHEAD * max(1, sum(client.nthreads().values()))
-        running = as_completed([client.submit(answered, task, pure=False) for task in islice(waiting, count)])
-        for future in running:
-            yield future.result()
-            running.update([client.submit(answered, task, pure=False) for task in islice(waiting, 1)])
 
 
 # ---- one of them

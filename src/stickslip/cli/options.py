@@ -99,18 +99,21 @@ def result_options(folder: str, *, short: bool = True) -> Callable[[Callable[...
     return lambda command: output(as_json(all_option(command) if short else command))
 
 
+changes_option = click.option(
+    "--set",
+    "changes",
+    multiple=True,
+    metavar='"NAME=VALUE"',
+    help='Another value of a parameter: "kinetic=1.3", "amplitude=0.7 mm", "law.stiffness=2 N/um". Repeatable.',
+)
+
+
 def case_options(command: Callable[..., None]) -> Callable[..., None]:
     """The options that say how long it runs and what is changed of it."""
     options = [
         click.option("--duration", metavar="TIME", help="Time to simulate in s, or with its unit."),
         click.option("--cycles", type=click.FloatRange(min=0, min_open=True), help="The same in periods of the drive."),
-        click.option(
-            "--set",
-            "changes",
-            multiple=True,
-            metavar='"NAME=VALUE"',
-            help='Another value of a parameter: "kinetic=1.3", "amplitude=0.7 mm", "law.stiffness=2 N/um". Repeatable.',
-        ),
+        changes_option,
     ]
     for option in reversed(options):
         command = option(command)

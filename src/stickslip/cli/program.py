@@ -11,12 +11,14 @@ from stickslip.cli.analyze import analyze, demo
 from stickslip.cli.decay import decay
 from stickslip.cli.exchange import check, convert, datasets
 from stickslip.cli.fit import fit
+from stickslip.cli.impact import impact
 from stickslip.cli.init import init
 from stickslip.cli.interrupted import INTERRUPTED, SENTENCE
 from stickslip.cli.lab import lab
 from stickslip.cli.mended import mended
 from stickslip.cli.predict import predict
 from stickslip.cli.progress import compiling
+from stickslip.cli.regimes import bifurcation, dither, stability
 from stickslip.cli.rig import rig
 from stickslip.cli.simulate import simulate
 from stickslip.cli.squeak import squeak
@@ -80,18 +82,22 @@ def main() -> None:
 
 for _command in (
     analyze,
+    bifurcation,
     check,
     convert,
     datasets,
     decay,
     demo,
+    dither,
     fit,
+    impact,
     init,
     lab,
     predict,
     rig,
     simulate,
     squeak,
+    stability,
     sweep,
     thesis,
     wavelet,

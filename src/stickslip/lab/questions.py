@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 
 import stickslip as ss
 from stickslip.lab.asked import AS_WRITTEN, PART, Asked, on_the_page
-from stickslip.record.channels import UNSTATED
 
 if TYPE_CHECKING:
     from stickslip import Record
@@ -107,7 +106,7 @@ def shown(name: str, parts: Iterable[Record]) -> dict[str, Any]:
                 "name": channel.name,
                 "unit": channel.unit,
                 "words": channel.quantity,
-                "column": channel.name if restored else channel.source.partition(UNSTATED)[0] or channel.name,
+                "column": channel.name if restored else channel.column or channel.name,
                 "low": plain(np.fmin.reduce(curves[channel.name])),
                 "high": plain(np.fmax.reduce(curves[channel.name])),
             }

@@ -87,6 +87,11 @@ class Channel:
     gain_sd: float = 0.0
     assumed: bool = False
 
+    @property
+    def column(self) -> str:
+        """The column that it came from, as a channel map names it."""
+        return self.source.partition(UNSTATED)[0]
+
     def __post_init__(self) -> None:
         described(checked_name(self.name), self.unit)
         for detail in ("unit", "quantity", "source", "sensitivity"):

@@ -8,8 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from stickslip.record.channels import UNSTATED, VOCABULARY, Channel
+from stickslip.record.channels import VOCABULARY, Channel
 from stickslip.record.record import Record
+from stickslip.units import prefixed
 
 # The first word that stands in a column's name decides, where its unit fits; the narrower ones come first.
 WORDS = (
@@ -45,7 +46,9 @@ class Guess:
     why : str
         What speaks for it.
     span : float
-        From its least to its greatest value, in `unit` as read.
+        From its least to its greatest value, in `si`.
+    si : str
+        Unit in which it was read.
     stated : bool
         Whether the file states the unit.
     """
@@ -56,7 +59,19 @@ class Guess:
     channel: str
     why: str
     span: float
+    si: str
     stated: bool
+
+    @property
+    def spanned(self) -> str:
+        """Its span, in a readable unit where one is stated."""
+        factor, unit = prefixed(self.span, self.si)
+        return f"{factor * self.span:.4g} {unit}" if self.stated and unit != "1" else f"{self.span:.4g}"
+
+    @property
+    def words(self) -> str:
+        """What it measures, in words."""
+        return VOCABULARY[self.channel].words if self.channel else "nothing known"
 
     @property
     def text(self) -> str:
@@ -67,24 +82,25 @@ class Guess:
 def guess_columns(record: Record) -> list[Guess]:
     """What the columns of a record that was read without a channel map may be.
 
-    Parameters
-    ----------
-    record : Record
-        From ``read_record(path)``.
+        Parameters
+        ----------
+        record : Record
+            From ``read_record(path)``.
 
-    Returns
-    -------
-    list of Guess
-        One a channel, in the file's order; no channel is guessed twice.
+        Returns
+        -------
+        list of Guess
+            One a channel, in the file's order; no channel is guessed twice.
 
-    Examples
-    --------
-    >>> from stickslip.record.record import Record
-    >>> wave = 1e-3 * np.sin(np.arange(100.0))
-    >>> units = {"Weg_Tisch": "mm", "plate": "mm", "acc": "m/s^2"}
-    >>> record = Record.of(dict.fromkeys(units, wave), fs=100.0, units=units)
-    >>> [(guess.name, guess.channel) for guess in guess_columns(record)]
-    [('Weg_Tisch', 'z'), ('plate', 'x'), ('acc', 'a')]
+        Examples
+        --------
+        >>> from stickslip.record.record import Record
+    from stickslip.units import prefixed
+        >>> wave = 1e-3 * np.sin(np.arange(100.0))
+        >>> units = {"Weg_Tisch": "mm", "plate": "mm", "acc": "m/s^2"}
+        >>> record = Record.of(dict.fromkeys(units, wave), fs=100.0, units=units)
+        >>> [(guess.name, guess.channel) for guess in guess_columns(record)]
+        [('Weg_Tisch', 'z'), ('plate', 'x'), ('acc', 'a')]
     """
     taken: dict[str, tuple[str, str]] = {}
     for find in (_by_itself, _by_word, _by_unit):
@@ -108,7 +124,7 @@ def _by_word(channel: Channel, taken: set[str]) -> tuple[str, str]:
 
 
 def _by_unit(channel: Channel, taken: set[str]) -> tuple[str, str]:
-    if channel.assumed or UNSTATED in channel.source:
+    if channel.column != channel.source:
         return "", ""
     free: Sequence[str] = [name for name in BY_UNIT.get(channel.unit, ()) if name not in taken]
     return (free[0], "its unit alone") if free else ("", "")
@@ -121,11 +137,11 @@ def _fits(channel: Channel, name: str) -> bool:
 def _guess(record: Record, channel: Channel, name: str, why: str) -> Guess:
     finite = record[channel.name][np.isfinite(record[channel.name])]
     span = float(np.ptp(finite)) if len(finite) else 0.0
-    source = channel.source.partition(UNSTATED)[0] or channel.name
+    source = channel.column or channel.name
     title, _, unit = source.partition(" [")
     stated = bool(unit)
     usual = VOCABULARY[name].units[0] if name else ""
     if not stated and usual:
         unit = SMALLER[usual] if span > WIDE.get(usual, float("inf")) else usual
     column = title if re.fullmatch(r"[A-Za-z_]\w*|#\d+", title) else f"`{title}`"
-    return Guess(channel.name, column, unit.rstrip("]"), name, why, span, stated)
+    return Guess(channel.name, column, unit.rstrip("]"), name, why, span, channel.unit, stated)

@@ -93,10 +93,19 @@ def _data(batch: Batch) -> Mapping[str, Any]:
 def check_table(path: Path) -> None:
     """Refuse a table of no known kind, or whose program is not installed, before the work.
 
+    Parameters
+    ----------
+    path : Path
+        Ends in .csv, .parquet or .xlsx.
+
     Raises
     ------
     ModelError
         A suffix that is not known, or an optional package that is absent.
+
+    Examples
+    --------
+    >>> check_table(Path("all.csv"))
     """
     if path.suffix not in WRITERS:
         raise ModelError(
@@ -133,6 +142,16 @@ def write_table(batch: Batch, path: Path) -> Path:
         Another suffix, or an optional package that is absent.
     RecordError
         The file can not be written.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from stickslip.estimate import Estimate
+    >>> level = Estimate.normal("sliding friction", 1.3, sd=0.1, unit="N", method="by hand")
+    >>> batch = Batch.of("analyze", [Row("run.csv", "0", "It slides.", (level,))], ("displacement", "friction"))
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     write_table(batch, Path(folder) / "all.csv").read_text()[:38]
+    'file,answer,same as,sha256,normal load'
     """
     import pandas as pd
 

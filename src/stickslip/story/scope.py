@@ -18,7 +18,6 @@ from stickslip.figures.contact import across
 from stickslip.figures.style import Array, envelope, prefixed, spelled
 from stickslip.files.expression import shifted, split_spec, times
 from stickslip.printing import printable
-from stickslip.record.channels import UNSTATED
 from stickslip.record.record import RIG_UNITS, Record
 from stickslip.rig.rig import Rig
 from stickslip.rig.sensor import Digitiser, Noise, Sensor
@@ -292,7 +291,7 @@ def _loaded(findings: Findings) -> Iterator[str]:
 
 def _sources(record: Record) -> dict[str, str]:
     """The columns that channels were read from, where the command named none."""
-    sources = {name: channel.source.partition(UNSTATED)[0] for name, channel in record.channels.items()}
+    sources = {name: channel.column for name, channel in record.channels.items()}
     return {name: source for name, source in sources.items() if source and is_measured(record, name)}
 
 
@@ -305,7 +304,7 @@ def _read(record: Record) -> Mapping[str, Any]:
 def _asked(record: Record, question: str, options: Sequence[str], read: Mapping[str, Any] | None = None) -> list[str]:
     """The words of a command about the record's file, `read` otherwise where that is given."""
     read = _read(record) if read is None else read
-    if not read:
+    if not read.get("files"):
         return []
     words = ["stickslip", question, "+".join(file["name"] for file in read["files"])]
     for option in READING:

@@ -30,7 +30,8 @@ TELLERS = {
     "Outcome": "simulation.of_outcome", "Trajectory": "simulation.of_run",
     "Record": "rig.of_record", "ExperimentPlan": "rig.of_plan",
     "Bifurcation": "regimes.of_bifurcation", "Basins": "regimes.of_basins", "Boundary": "regimes.of_boundary",
-    "Dither": "regimes.of_dither", "Dataset": "maps.of_map",
+    "Dither": "regimes.of_dither", "Stability": "regimes.of_stability",
+    "ImpactTest": "estimates.of_tap", "Dataset": "maps.of_map",
     "Estimate": "estimates.of_one", "list": "estimates.of_several", "tuple": "estimates.of_several",
 }  # fmt: skip
 
