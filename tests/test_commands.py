@@ -17,8 +17,15 @@ SLIDER = """
 mass = 1.0
 stiffness = 1.0
 damping = 0.02
-law = { name = "Coulomb", kinetic = 1.0, static = 1.5 }
-drive = { name = "Belt", speed = 0.5 }
+
+[law]
+name = "Coulomb"
+kinetic = 1.0
+static = 1.5
+
+[drive]
+name = "Belt"
+speed = 0.5
 """
 
 
@@ -80,7 +87,7 @@ def test_a_tap_tells_whose_resonance_each_is() -> None:
     assert "3 resonances ring after the tap: coupled contact at 47.0" in text
     assert "mount of the accelerometer at 12" in text
     told = json.loads(ask("impact", "tap.csv", "--mass", "2.42", "--json").stdout)
-    assert [each["name"] for each in told["resonances"]][0] == "coupled contact"
+    assert told["resonances"][0]["name"] == "coupled contact"
 
 
 @pytest.mark.parametrize("stated", [(), ("--offset", "-100 ms")])

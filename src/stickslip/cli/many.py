@@ -8,15 +8,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
-import numpy as np
 
 import stickslip as ss
-from stickslip.answers import Batch, Kept, Row
 from stickslip.cli.records import checksum, names_of, read
 from stickslip.cli.show import show
 
 if TYPE_CHECKING:
     from stickslip import Record
+    from stickslip.answers import Batch, Row
     from stickslip.rig import RigSettings
 
 MANY = 20  # records from which each is a row of a table, and has no page of its own
@@ -88,14 +87,14 @@ def ask_many(
         for group, names in zip(groups, names_of(groups), strict=True)
     ]
     asked = {"question": question, "rig": rig.model_dump(), "options": dict(options), "version": ss.__version__}
-    with Kept(_kept(folder), asked) as kept:
+    with ss.answers.Kept(_kept(folder), asked) as kept:
         left = list({task.key: task for task in reversed(tasks) if task.key not in kept.rows}.values())[::-1]
         answers = ss.answers.spread(answered, tasks=left, engine=places.engine, workers=places.workers)
         for done, row in enumerate(answers, start=len(tasks) - len(left) + 1):
             kept.add(row)
             tell(f"{question}: {row.name}", done)
     rows = tuple(_rows(tasks, kept.rows))
-    return Batch.of(question, rows, AXES[question], _untried(options))
+    return ss.answers.Batch.of(question, rows, AXES[question], _untried(options))
 
 
 def _kept(folder: Path) -> Path:
@@ -136,14 +135,14 @@ def answered(task: Task) -> Row:
     try:
         record = read(task.files, task.rig, task.names)
         found = ASK[task.question](record, task.rig, **task.options)
-        return Row(
+        return ss.answers.Row(
             name, task.key, ss.summary(found).answer, found.quoted, found.level, found.normal,
             picture=PICTURES[task.question](found),
         )  # fmt: skip
     except ss.errors.ModelError:
         raise
     except ss.StickslipError as error:
-        return Row(name, task.key, refusal=str(error))
+        return ss.answers.Row(name, task.key, refusal=str(error))
 
 
 def _analyzed(record: Record, rig: RigSettings, *, method: str, twins: int) -> Any:
@@ -190,6 +189,8 @@ def _trace(found: Any) -> Picture:
 
 
 def _thinned(x: Any, y: Any) -> Picture:
+    import numpy as np  # the command line starts without it
+
     rows = np.linspace(0, len(x) - 1, min(POINTS, len(x))).astype(int)
     kept = np.isfinite(x[rows]) & np.isfinite(y[rows])
     return [float(f"{v:.5g}") for v in x[rows][kept]], [float(f"{v:.5g}") for v in y[rows][kept]]

@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
-import numpy as np
 
 import stickslip as ss
 from stickslip.cli.options import changes_option, folder_name, result_options, wanted_case
@@ -75,7 +74,8 @@ def bifurcation(
     """
     wanted = _case(case, options["changes"])
     low, high = (wanted.number(parameter, options.pop(key)) for key in ("low", "high"))
-    values = np.linspace(low, high, options["steps"])
+    last = options["steps"] - 1
+    values = [low + (high - low) * place / last for place in range(last + 1)]
     chosen = {key: options[key] for key in ("transient", "branches")}
     _answer(
         wanted, "bifurcation", lambda: ss.bifurcation(wanted.system, parameter, values=values, **chosen),

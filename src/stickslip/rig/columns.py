@@ -82,25 +82,24 @@ class Guess:
 def guess_columns(record: Record) -> list[Guess]:
     """What the columns of a record that was read without a channel map may be.
 
-        Parameters
-        ----------
-        record : Record
-            From ``read_record(path)``.
+    Parameters
+    ----------
+    record : Record
+        From ``read_record(path)``.
 
-        Returns
-        -------
-        list of Guess
-            One a channel, in the file's order; no channel is guessed twice.
+    Returns
+    -------
+    list of Guess
+        One a channel, in the file's order; no channel is guessed twice.
 
-        Examples
-        --------
-        >>> from stickslip.record.record import Record
-    from stickslip.units import prefixed
-        >>> wave = 1e-3 * np.sin(np.arange(100.0))
-        >>> units = {"Weg_Tisch": "mm", "plate": "mm", "acc": "m/s^2"}
-        >>> record = Record.of(dict.fromkeys(units, wave), fs=100.0, units=units)
-        >>> [(guess.name, guess.channel) for guess in guess_columns(record)]
-        [('Weg_Tisch', 'z'), ('plate', 'x'), ('acc', 'a')]
+    Examples
+    --------
+    >>> from stickslip.record.record import Record
+    >>> wave = 1e-3 * np.sin(np.arange(100.0))
+    >>> units = {"Weg_Tisch": "mm", "plate": "mm", "acc": "m/s^2"}
+    >>> record = Record.of(dict.fromkeys(units, wave), fs=100.0, units=units)
+    >>> [(guess.name, guess.channel) for guess in guess_columns(record)]
+    [('Weg_Tisch', 'z'), ('plate', 'x'), ('acc', 'a')]
     """
     taken: dict[str, tuple[str, str]] = {}
     for find in (_by_itself, _by_word, _by_unit):
