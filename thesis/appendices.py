@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from scipy.optimize import brentq
 
-from stickslip.plot.plate import Plate
-from stickslip.plot.style import BLUE, ORANGE, styled
+from stickslip.figures.plate import Plate
+from stickslip.figures.style import BLUE, ORANGE, styled
 from stickslip.signals.derivatives import five_point_response
 from thesis.drawing import figure, panels, tag
 from thesis.printed import Given, Ours

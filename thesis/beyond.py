@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 import stickslip as ss
-from stickslip.plot.plate import Plate
-from stickslip.plot.style import BLUE, FAINT, GREEN, ORANGE, PURPLE, styled
+from stickslip.figures.plate import Plate
+from stickslip.figures.style import BLUE, FAINT, GREEN, ORANGE, PURPLE, styled
 from thesis import chapter3
 from thesis.drawing import around, exact, figure, panels, tag
 from thesis.printed import Given, Ours

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 import stickslip as ss
-from stickslip.plot.plate import Plate
-from stickslip.plot.style import BLUE, GREEN, INK, ORANGE, PURPLE, envelope, styled
+from stickslip.figures.plate import Plate
+from stickslip.figures.style import BLUE, GREEN, INK, ORANGE, PURPLE, envelope, styled
 from stickslip.signals.derivatives import five_point_average
 from thesis.drawing import figure, panels, tag
 from thesis.printed import Given, Ours

@@ -13,8 +13,8 @@ from scipy.optimize import brentq
 
 import stickslip as ss
 from stickslip.contact.contact import branch_slopes
-from stickslip.plot.plate import Plate
-from stickslip.plot.style import BLUE, FAINT, GREEN, ORANGE, PURPLE, styled
+from stickslip.figures.plate import Plate
+from stickslip.figures.style import BLUE, FAINT, GREEN, ORANGE, PURPLE, styled
 from thesis.drawing import RESPONSES, around, characteristics, exact, figure, panels, responses, tag
 from thesis.printed import Given, Ours
 from thesis.sketches import massless_contact

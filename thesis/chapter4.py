@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 import stickslip as ss
-from stickslip.plot.plate import Plate
-from stickslip.plot.style import BLUE, GREEN, INK, ORANGE, PURPLE, styled
+from stickslip.figures.plate import Plate
+from stickslip.figures.style import BLUE, GREEN, INK, ORANGE, PURPLE, styled
 from thesis.drawing import around, characteristics, figure, panels, responses, tag
 from thesis.printed import Given, Ours
 from thesis.sketches import contact_with_inertia

@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 import stickslip as ss
-from stickslip.plot.plate import Plate
-from stickslip.plot.style import BLUE, FAINT, ORANGE, PURPLE, styled
-from stickslip.plot.wavelet import plot_wavelet
+from stickslip.figures.plate import Plate
+from stickslip.figures.style import BLUE, FAINT, ORANGE, PURPLE, styled
+from stickslip.figures.wavelet import plot_wavelet
 from thesis import chapter4
 from thesis.drawing import figure, panels, tag
 from thesis.printed import Given, Ours

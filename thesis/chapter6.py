@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 
 import stickslip as ss
 from stickslip.decay import extremes as ex
-from stickslip.plot.decay import plot_bounds, plot_decay, plot_differences, plot_identified
-from stickslip.plot.plate import Plate
-from stickslip.plot.style import BLUE, ORANGE, styled
+from stickslip.figures.decay import plot_bounds, plot_decay, plot_differences, plot_identified
+from stickslip.figures.plate import Plate
+from stickslip.figures.style import BLUE, ORANGE, styled
 from thesis.drawing import figure, panels
 from thesis.printed import Given, Ours
 from thesis.sketches import system_i, system_ii

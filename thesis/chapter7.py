@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 import stickslip as ss
-from stickslip.plot.plate import Plate
-from stickslip.plot.style import BLUE, GREEN, INK, ORANGE, PURPLE, envelope, styled
+from stickslip.figures.plate import Plate
+from stickslip.figures.style import BLUE, GREEN, INK, ORANGE, PURPLE, envelope, styled
 from thesis.drawing import figure, panels, responses, tag
 from thesis.printed import Given, Ours
 from thesis.sketches import transducers

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from stickslip.plot.plate import Plate, plate
-from stickslip.plot.style import BLUE, GREEN, ORANGE, PURPLE, WIDTH, envelope, styled
-from stickslip.plot.trajectory import curve
+from stickslip.figures.plate import Plate, plate
+from stickslip.figures.style import BLUE, GREEN, ORANGE, PURPLE, WIDTH, envelope, styled
+from stickslip.figures.trajectory import curve
 from thesis.printed import captions
 
 if TYPE_CHECKING:

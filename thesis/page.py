@@ -11,7 +11,7 @@ from types import ModuleType
 from typing import Any
 
 from stickslip import __version__
-from stickslip.plot.plate import Plate
+from stickslip.figures.plate import Plate
 from stickslip.story.folder import check_folder, results_folder, write_figures
 from stickslip.story.page import templates
 from thesis.drawing import caption_of

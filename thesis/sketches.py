@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from stickslip import Rig
-from stickslip.plot.style import BLUE, FAINT, GREEN, INK, ORANGE, PURPLE, SHADE, WIDTH, styled
+from stickslip.figures.style import BLUE, FAINT, GREEN, INK, ORANGE, PURPLE, SHADE, WIDTH, styled
 from thesis.printed import Given
 
 if TYPE_CHECKING:

@@ -22,7 +22,7 @@ from stickslip.decay.start import SEEN
 from stickslip.decay.which_motion import DecayMotion, choose_motion
 from stickslip.errors import EstimateError, StickslipError
 from stickslip.estimate import Constant, Estimate, Result
-from stickslip.record.record import Record
+from stickslip.record.record import Record, require_record
 from stickslip.units import parse_constant
 
 EXTREMES = "extremes alone"
@@ -268,6 +268,7 @@ def analyze_decay(
     >>> round(found.decay.best.damping_ratio.value, 3), round(found.decay.dry_force.value, 2)
     (0.032, 0.2)
     """
+    require_record(record)
     if method not in METHODS:
         raise EstimateError(f"method = '{method}'", f"it is {', '.join(METHODS)}", "choose one of them")
     if restoring == "pendulum" and method == "thesis":

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from stickslip.errors import RecordError
+from stickslip.printing import html_table
 from stickslip.record.channels import VOCABULARY, Channel, checked_name, described
 from stickslip.record.log import Log
 from stickslip.units import parse_unit
@@ -450,10 +451,39 @@ class Record:
         ]
         return same and details[0] == details[1]
 
+    def _repr_html_(self) -> str:
+        rows = [
+            (name, f"[{self.channels[name].unit}]", self.channels[name].quantity, f"{np.nanmin(values):.5g}",
+             f"{np.nanmax(values):.5g}")
+            for name, values in self.samples.items() if np.isfinite(values).any()
+        ]  # fmt: skip
+        clock = f"{len(self)} samples, {self.fs:g} Hz, {self.time[0]:g} to {self.time[-1]:g} s"
+        title = f"Record: {clock}{', broken clock' if self.stamps is not None else ''}"
+        return html_table(title, ("channel", "unit", "quantity", "least", "greatest"), rows)
+
     def __repr__(self) -> str:
         names = ", ".join(f"{channel.name} [{channel.unit}]" for channel in self.channels.values())
         clock = "broken clock, about " if self.stamps is not None else ""
         return f"Record({names}; {len(self)} samples, {clock}{self.fs:g} Hz, from {self.start:g} s)"
+
+
+def require_record(*things: object) -> None:
+    """Refuse what is no Record, and say how one is made; a sequence is looked into."""
+    for thing in things:
+        if isinstance(thing, list | tuple):
+            require_record(*thing)
+        elif not isinstance(thing, Record):
+            frame = type(thing).__module__.partition(".")[0]
+            made = {
+                "dict": 'stickslip.Record.of({"x": [...]}, fs=1000, units={"x": "mm"})',
+                "str": "stickslip.read_record(path)", "PosixPath": "stickslip.read_record(path)",
+                "DataFrame": f"stickslip.record.from_{frame}(frame)", "Dataset": f"stickslip.record.from_{frame}(data)",
+            }  # fmt: skip
+            raise RecordError(
+                f"a {type(thing).__name__} where a Record belongs",
+                "a question is asked of a Record, whose channels have units and one clock",
+                f"make one: {made.get(type(thing).__name__, made['dict'])}",
+            )
 
 
 def _require_size(channel: Channel, values: Array, question: str) -> None:

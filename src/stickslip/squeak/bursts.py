@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from stickslip.errors import EstimateError, RecordError
 from stickslip.estimate import Estimate, Result, Status, plain
-from stickslip.record.record import Record
+from stickslip.record.record import Record, require_record
 from stickslip.squeak.hearing import LASTS, PARTIALS, Hearing, Span, clipped_rows, filtered
 from stickslip.squeak.sound import REFERENCES, level
 from stickslip.statistics import mean_of_cycles
@@ -273,6 +273,7 @@ def find_squeaks(
     >>> found.kind, all(475 < burst.frequency < 500 for burst in found.of("squeak"))
     ('squeak', True)
     """
+    require_record(record)
     name = chosen_channel(record, channel)
     record.require_clean(name, question="hearing squeaks", samples=256)
     low, high = frequencies or (LOWEST, 0.45 * record.fs)

@@ -14,9 +14,9 @@ from stickslip.answers.findings import Findings
 from stickslip.balance.motion import is_measured
 from stickslip.consistent.checks import Slip
 from stickslip.errors import StickslipError
+from stickslip.figures.contact import across
+from stickslip.figures.style import Array, envelope, prefixed, spelled
 from stickslip.files.expression import split_spec, times
-from stickslip.plot.contact import across
-from stickslip.plot.style import Array, envelope, prefixed, spelled
 from stickslip.printing import printable
 from stickslip.record.record import RIG_UNITS, Record
 from stickslip.rig.rig import Rig

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from stickslip.plot.plate import Plate, captioned
-from stickslip.plot.style import (
+from stickslip.figures.plate import Plate, captioned
+from stickslip.figures.style import (
     BLUE,
     FAINT,
     GREEN,

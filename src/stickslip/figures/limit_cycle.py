@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from stickslip.errors import ModelError
-from stickslip.plot.style import (
+from stickslip.figures.style import (
     BLUE,
     FAINT,
     GREEN,

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from contextvars import ContextVar
 from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 
 import numpy as np
@@ -52,8 +54,25 @@ def styled(draw: Callable[Arguments, Drawn]) -> Callable[Arguments, Drawn]:
     return drawing
 
 
+_shown: ContextVar[bool] = ContextVar("shown", default=False)
+
+
+@contextmanager
+def known_to_pyplot() -> Iterator[None]:
+    """Within it a new figure is pyplot's, which shows it; elsewhere nobody keeps it."""
+    token = _shown.set(True)
+    try:
+        yield
+    finally:
+        _shown.reset(token)
+
+
 def empty_figure(height: float) -> Figure:
-    """A figure of the report's width, not known to pyplot."""
+    """A figure of the report's width."""
+    if _shown.get():
+        from matplotlib import pyplot
+
+        return pyplot.figure(figsize=(WIDTH, height), layout="constrained")
     from matplotlib.figure import Figure
 
     return Figure(figsize=(WIDTH, height), layout="constrained")

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from stickslip.plot.style import (
+from stickslip.figures.style import (
     BLUE,
     FAINT,
     GREEN,

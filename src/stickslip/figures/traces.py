@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from stickslip.balance.motion import is_measured
-from stickslip.plot.style import (
+from stickslip.figures.style import (
     BLUE,
     FAINT,
     GREEN,

@@ -12,11 +12,8 @@ import numpy as np
 from stickslip.consistent.sliding_balance import Slider
 from stickslip.drives.kinds import HarmonicBase, HarmonicForce
 from stickslip.errors import ModelError
-from stickslip.laws.coulomb import Coulomb
-from stickslip.maps.measures import UNKNOWN
-from stickslip.oscillator import Oscillator
-from stickslip.plot.plate import Plate, plate
-from stickslip.plot.style import (
+from stickslip.figures.plate import Plate, plate
+from stickslip.figures.style import (
     BLUE,
     INK,
     ORANGE,
@@ -28,6 +25,9 @@ from stickslip.plot.style import (
     prefixed,
     styled,
 )
+from stickslip.laws.coulomb import Coulomb
+from stickslip.maps.measures import UNKNOWN
+from stickslip.oscillator import Oscillator
 from stickslip.solve.tables import System
 
 if TYPE_CHECKING:

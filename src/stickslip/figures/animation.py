@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stickslip.errors import ModelError, RecordError
-from stickslip.plot.style import (
+from stickslip.figures.style import (
     BLUE,
     FAINT,
     GREEN,
@@ -26,7 +26,7 @@ from stickslip.plot.style import (
     prefixed,
     styled,
 )
-from stickslip.plot.trajectory import MASSES, contacts_of, curve, kinds_of, last_cycles, numbered_words, sampled
+from stickslip.figures.trajectory import MASSES, contacts_of, curve, kinds_of, last_cycles, numbered_words, sampled
 from stickslip.structure import Structure
 from stickslip.whole import whole_file
 

@@ -8,14 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from stickslip.maps.basins import Attractor, Basins
-from stickslip.maps.bifurcation import Bifurcation
-from stickslip.maps.boundaries import Boundary
-from stickslip.maps.dither import Dither, dithered_friction
-from stickslip.oscillator import Oscillator
-from stickslip.parameters import unit as unit_of
-from stickslip.plot.maps import den_hartog
-from stickslip.plot.style import (
+from stickslip.figures.maps import den_hartog
+from stickslip.figures.style import (
     BLUE,
     FAINT,
     GREEN,
@@ -35,6 +29,12 @@ from stickslip.plot.style import (
     spelled,
     styled,
 )
+from stickslip.maps.basins import Attractor, Basins
+from stickslip.maps.bifurcation import Bifurcation
+from stickslip.maps.boundaries import Boundary
+from stickslip.maps.dither import Dither, dithered_friction
+from stickslip.oscillator import Oscillator
+from stickslip.parameters import unit as unit_of
 from stickslip.solve.tables import System
 
 if TYPE_CHECKING:

@@ -16,7 +16,7 @@ from stickslip.answers.findings import Comparison, Findings
 from stickslip.balance.force import FUSIONS
 from stickslip.consistent.checks import APART
 from stickslip.estimate import UNSTATED, kinds
-from stickslip.plot.contact import (
+from stickslip.figures.contact import (
     plot_breakaway,
     plot_displacement_loop,
     plot_micro_slips,
@@ -24,8 +24,8 @@ from stickslip.plot.contact import (
     plot_transition_speed,
     plot_velocity_loop,
 )
-from stickslip.plot.plate import Plate, captioned
-from stickslip.plot.style import (
+from stickslip.figures.plate import Plate, captioned
+from stickslip.figures.style import (
     BARS,
     BLUE,
     FAINT,
@@ -41,7 +41,7 @@ from stickslip.plot.style import (
     prefixed,
     styled,
 )
-from stickslip.plot.traces import (
+from stickslip.figures.traces import (
     MOST_SHADES,
     close_up,
     force_balance,

@@ -14,7 +14,7 @@ from importlib.resources import files
 from typing import TYPE_CHECKING, Any
 
 from stickslip.errors import StickslipError
-from stickslip.plot.style import styled
+from stickslip.figures.style import styled
 
 # what drawing ends in where numbers are beyond all measure: limits of NaN, ticks without end, paths too long
 UNDRAWN = (ArithmeticError, LookupError, RuntimeError, TypeError, ValueError, StickslipError)
@@ -152,7 +152,7 @@ def captioned(family: str, kind: str, draw: Callable[[], Figure | Axes], *, name
 
 @functools.cache
 def _captions() -> dict[str, dict[str, dict[str, str]]]:
-    return tomllib.loads((files("stickslip.plot") / "captions.toml").read_text("utf-8"))
+    return tomllib.loads((files("stickslip.figures") / "captions.toml").read_text("utf-8"))
 
 
 def compact(svg: str) -> str:

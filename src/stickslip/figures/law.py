@@ -7,11 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from stickslip.law.fit_curve import CurveFit
-from stickslip.law.law import LawFit
-from stickslip.law.which_law import LawComparison
-from stickslip.plot.plate import Plate, captioned
-from stickslip.plot.style import (
+from stickslip.figures.plate import Plate, captioned
+from stickslip.figures.style import (
     BLUE,
     FAINT,
     GREEN,
@@ -27,6 +24,9 @@ from stickslip.plot.style import (
     prefixed,
     styled,
 )
+from stickslip.law.fit_curve import CurveFit
+from stickslip.law.law import LawFit
+from stickslip.law.which_law import LawComparison
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

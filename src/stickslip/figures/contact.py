@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from stickslip.balance.motion import contact_motion
-from stickslip.plot.style import (
+from stickslip.figures.style import (
     BARS,
     BLUE,
     FAINT,

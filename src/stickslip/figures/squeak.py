@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from stickslip.estimate import decimals
-from stickslip.plot.contact import plot_displacement_loop, plot_velocity_loop
-from stickslip.plot.plate import Plate, captioned
-from stickslip.plot.style import (
+from stickslip.figures.contact import plot_displacement_loop, plot_velocity_loop
+from stickslip.figures.plate import Plate, captioned
+from stickslip.figures.style import (
     BARS,
     BLUE,
     FAINT,

@@ -10,8 +10,8 @@ import numpy as np
 
 from stickslip.contact.mechanisms import UNTOLD
 from stickslip.errors import RecordError
-from stickslip.plot.plate import Plate, captioned
-from stickslip.plot.style import (
+from stickslip.figures.plate import Plate, captioned
+from stickslip.figures.style import (
     BLUE,
     INK,
     ORANGE,
