@@ -93,7 +93,8 @@ class Uploads:
         upload = self.get(key)
         del self._kept[key], self._used[key]
         self._size -= upload.size
-        upload.path.unlink(missing_ok=True)
+        for path in upload.path.parent.glob(f"{upload.path.name}*"):  # and what we wrote beside it
+            path.unlink(missing_ok=True)
 
     def remove_unused(self, *, before: float) -> None:
         """Remove what nobody asked about since that time."""
