@@ -140,7 +140,7 @@ for (const place of document.querySelectorAll(".scope")) {
     const { found, digits } = ticks(time(view[0]), time(view[1]), width / 90);
     pen.fillStyle = colour("soft");
     pen.textAlign = "center";
-    for (const value of found) if (x(row(value)) > LEFT + 12) pen.fillText(value.toFixed(digits), x(row(value)), height - 8);
+    for (const value of found) if (x(row(value)) > LEFT + 12) pen.fillText(value.toFixed(digits), Math.min(x(row(value)), width - pen.measureText(value.toFixed(digits)).width / 2), height - 8);
     pen.textAlign = "right";
     pen.fillText("t [s]", LEFT - 6, height - 8);
     if (pointer !== null) {
