@@ -22,7 +22,6 @@ from stickslip.record.record import RIG_UNITS, Record
 from stickslip.rig.rig import Rig
 from stickslip.rig.sensor import Digitiser, Noise, Sensor
 from stickslip.statistics import follows
-from stickslip.story.words import REPAIRS
 from stickslip.twin.belief import Belief
 
 DETAILED = 270_000  # values that the page holds one by one, of all lines; else the least and the most of each column
@@ -281,7 +280,7 @@ def _asked(
             words += [word for name, value in told.items() for word in (f"--{option}", f"{name}={value}")]
         elif told is not None:
             words += [f"--{option}", f"{told:.12g}" if isinstance(told, float) else str(told)]
-    repairs = [REPAIRS[step.action] for step in record.history if step.action in REPAIRS]
+    repairs = [step.repair for step in record.history if step.repair]
     words += ["--repair", ",".join(dict.fromkeys(repairs))] if repairs else []
     return [*words, *options]
 
