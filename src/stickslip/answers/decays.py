@@ -19,7 +19,7 @@ from stickslip.decay.fit_decay import fit_decay
 from stickslip.decay.motions import Restoring
 from stickslip.decay.release import Releases, find_releases
 from stickslip.decay.start import SEEN
-from stickslip.decay.which_motion import DecayMotion, choose_motion, whichever
+from stickslip.decay.which_motion import PLAIN, DecayMotion, choose_motion, whichever
 from stickslip.errors import EstimateError, StickslipError
 from stickslip.estimate import Constant, Estimate, Result
 from stickslip.record.record import Record, require_record
@@ -28,7 +28,6 @@ from stickslip.units import parse_constant
 
 EXTREMES = "extremes alone"
 LOST = 0.1  # of the motion: a fit that leaves more of it does not follow it
-PLAIN = ("viscous", "dry", "both", "static")  # motions that viscous and dry friction together hold
 CLEAR = 1e-3  # p-value below which a motion's rejection is no chance of one true motion in twenty
 CHANCE = 0.01  # of a record without dry friction to be told to have some
 ONE_IN_100 = 2.33 / 1.96  # by which the lower end of 95 % lies farther off where one in a hundred lies beyond it
