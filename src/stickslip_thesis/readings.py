@@ -35,7 +35,7 @@ class Reading:
     @property
     def formula(self) -> str:
         """As the page writes it."""
-        return f"{self.factor:g} ζ √(m {'(k + K_y)' if self.coupled else 'k'})"
+        return f"{self.factor:g}ζ√(m{'(k + K_y)' if self.coupled else 'k'})"
 
     def damping(self, ratio: float, *, mass: float, spring: float, stiffness: float) -> float:
         """The contact's damping [N s/m]."""
@@ -101,7 +101,9 @@ def drawn(given: Given) -> Any:
                 kinetic, place, f"{pair[0]}·{pair[1]}", ha="center", va="center", fontsize=7,
                 color=BLUE if as_printed else INK, fontweight="bold" if as_printed else "normal",
             )  # fmt: skip
-    ax.set(xlabel="friction f_k [N]", xlim=(FRICTIONS[0] - 0.02, FRICTIONS[-1] + 0.02), ylim=(len(rows) - 0.4, -0.6))
-    ax.set_yticks(range(len(rows)), [f"{reading.formula}, {stiffness / 1e3:g} kN/m" for reading, stiffness in rows])
-    ax.tick_params(axis="y", labelsize=7)
+        label = f"{reading.formula}, {stiffness / 1e3:g} kN/m"
+        ax.text(FRICTIONS[0] - 0.02, place, label, ha="right", va="center", fontsize=7)
+    ax.set(xlabel="friction f_k [N]", xlim=(FRICTIONS[0] - 0.12, FRICTIONS[-1] + 0.02), ylim=(len(rows) - 0.4, -0.6))
+    ax.set(yticks=[], xticks=[1.06, 1.1, 1.15, 1.2, 1.25, 1.3])
+    ax.grid(visible=False)
     return sheet
