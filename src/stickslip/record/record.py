@@ -14,15 +14,15 @@ from numpy.typing import ArrayLike, NDArray
 
 from stickslip.errors import RecordError
 from stickslip.printing import html_table
+from stickslip.record import metadata
 from stickslip.record.channels import VOCABULARY, Channel, checked_name, described
+from stickslip.record.check import Fault, clock_cure, cure, find_faults
 from stickslip.record.log import Log
 from stickslip.units import parse_unit
 
 if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
-
-    from stickslip.record.check import Fault
 
 Array = NDArray[np.float64]
 
@@ -52,15 +52,18 @@ class Step:
         What it was called with.
     outcome : str
         What came of it, in words.
+    repair : str
+        The name by which :func:`~stickslip.answers.mend` and ``--repair`` know it; empty of what is no repair.
     """
 
     action: str
     arguments: Mapping[str, Any] = field(default_factory=dict)
     outcome: str = ""
+    repair: str = ""
 
     def __post_init__(self) -> None:
         named = isinstance(self.arguments, Mapping) and all(isinstance(key, str) for key in self.arguments)
-        if not (named and isinstance(self.action, str) and isinstance(self.outcome, str)):
+        if not (named and all(isinstance(text, str) for text in (self.action, self.outcome, self.repair))):
             raise RecordError(
                 f"a step {str(self.action)[:40]!r} with {str(self.arguments)[:40]!r}",
                 "a step is a function's name, its arguments by name, and what came of it in words",
@@ -69,7 +72,8 @@ class Step:
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON."""
-        return {"action": self.action, "arguments": dict(self.arguments), "outcome": self.outcome}
+        mends = {"repair": self.repair} if self.repair else {}
+        return {"action": self.action, "arguments": dict(self.arguments), "outcome": self.outcome, **mends}
 
     def __str__(self) -> str:
         arguments = ", ".join(f"{key}={value!r}" for key, value in self.arguments.items())
@@ -291,8 +295,6 @@ class Record:
                 f"the record has {len(self)} samples", f"{question} needs at least {samples}", "give a longer record"
             )
         if self.stamps is not None:
-            from stickslip.record.check import clock_cure
-
             raise RecordError(
                 "the time stamps are not uniform",
                 f"{question} needs one sampling rate",
@@ -301,8 +303,6 @@ class Record:
         for name in names:
             bad = np.flatnonzero(~np.isfinite(self.samples[name]))
             if len(bad):
-                from stickslip.record.check import cure
-
                 many = (
                     f"{len(bad)} values that are not numbers, the first"
                     if len(bad) > 1
@@ -413,27 +413,19 @@ class Record:
     @cached_property
     def _faults(self) -> tuple[Fault, ...]:
         """Looked for once: a record does not change, and every question asks."""
-        from stickslip.record.check import find_faults
-
         return tuple(find_faults(self))
 
     def to_pandas(self) -> pd.DataFrame:
         """A DataFrame indexed by time [s]; units and history in ``.attrs``."""
-        from stickslip.record.exchange import to_pandas
-
-        return to_pandas(self)
+        return metadata.to_pandas(self)
 
     def to_xarray(self) -> xr.Dataset:
         """An xarray Dataset over ``time`` [s] with units and history as attributes."""
-        from stickslip.record.exchange import to_xarray
-
-        return to_xarray(self)
+        return metadata.to_xarray(self)
 
     def to_sep005(self) -> list[dict[str, Any]]:
         """The list of channel dictionaries of SDyPy's SEP 005."""
-        from stickslip.record.exchange import to_sep005
-
-        return to_sep005(self)
+        return metadata.to_sep005(self)
 
     def equals(self, other: object) -> bool:
         """Whether another record holds exactly the same samples, channels, clock, history, truth, rig and log."""

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from stickslip.errors import RecordError
-from stickslip.record.exchange import labelled_arrays
+from stickslip.record.metadata import labelled_arrays
 from stickslip.record.record import Record, require_record
 from stickslip.signals.morlet import REACH, normalised_gain, transform
 from stickslip.signals.wavelet_grid import CENTRE, LEAST, QUESTION, Grid, attributes_of, check_centre, grid_of, labelled

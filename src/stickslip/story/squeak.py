@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 
 from stickslip.answers.findings import Comparison, Findings
-from stickslip.answers.squeak_comparison import Condition
-from stickslip.answers.squeaks import trend_of
+from stickslip.answers.squeaks import Condition, trend_of
 from stickslip.estimate import Estimate, decimals, doubts_of
 from stickslip.figures.squeak import plates_of, plates_together
 from stickslip.squeak.bursts import WORDS, Squeak, Squeaks

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from stickslip.figures.plate import Plate, plate
 from stickslip.figures.style import BLUE, GREEN, ORANGE, PURPLE, WIDTH, envelope, styled
 from stickslip.figures.trajectory import curve
-from thesis.printed import captions
+from stickslip_thesis.printed import captions
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

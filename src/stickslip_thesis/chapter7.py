@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 import stickslip as ss
 from stickslip.figures.plate import Plate
 from stickslip.figures.style import BLUE, GREEN, INK, ORANGE, PURPLE, envelope, styled
-from thesis.drawing import figure, panels, responses, tag
-from thesis.printed import Given, Ours
-from thesis.sketches import transducers
+from stickslip_thesis.drawing import figure, panels, responses, tag
+from stickslip_thesis.printed import Given, Ours
+from stickslip_thesis.sketches import transducers
 
 Array = NDArray[np.float64]
 
@@ -38,8 +38,9 @@ def numbers(given: Given) -> Ours:
         "friction over the bearing's": [level[surface] / bearing for surface in ("dry", "wet")],
         "harmonic": [strongest(squeaking, name) for name in ("a", "friction", "normal_acceleration", "sound")],
         "torsion": strongest(squeaking, "torsion_velocity"),
-        "sound level": float(20 * np.log10(np.std(squeaking["sound"]) / 20e-6)),
-        "not modelled": None,
+        "sound level": level_of(squeaking["sound"]),
+        "bending": bending(ss.squeak.squeak_rig()),
+        "surroundings": level_of(record_of(given, "dry", "light")["sound"]),
     }
 
 
@@ -65,6 +66,16 @@ def plates(given: Given) -> Iterator[Plate]:
         f"{words} The printed 250 Hz of (b) are of the beam that carries the reflector, which the model does not have.",
     )
     yield figure("7.11", _spectra(wet, ("friction", "a", "sound")), words)
+
+
+def level_of(sound: Array) -> float:
+    """Sound pressure level [dB re 20 µPa]."""
+    return float(20 * np.log10(np.std(sound) / 20e-6))
+
+
+def bending(rig: ss.Structure) -> float:
+    """Frequency of the beam's mode across the mass without its contacts [Hz]."""
+    return float(np.sqrt(rig.stiffness[1, 1] / rig.mass[1, 1]) / (2 * np.pi))
 
 
 def record_of(given: Given, surface: str, load: str) -> ss.Record:

@@ -14,9 +14,10 @@ from stickslip import __version__
 from stickslip.figures.plate import Plate
 from stickslip.story.folder import check_folder, results_folder, write_figures
 from stickslip.story.page import templates
-from thesis.drawing import caption_of
-from thesis.printed import CHANGED, CORRECTED, NOT_REPRODUCIBLE, SAME, Given, Number, Ours, Table, given, judged, tables
-from thesis.starting import starts
+from stickslip_thesis.drawing import caption_of
+from stickslip_thesis.printed import CHANGED as CHANGED
+from stickslip_thesis.printed import MEANINGS, Given, Number, Ours, Table, given, judged, tables
+from stickslip_thesis.starting import starts
 
 CHAPTERS = {
     "2": "chapter2",
@@ -28,7 +29,7 @@ CHAPTERS = {
     "appendices": "appendices",
     "beyond": "beyond",
 }  # scripts
-VERDICTS = (SAME, CORRECTED, NOT_REPRODUCIBLE, CHANGED)
+VERDICTS = (*MEANINGS, CHANGED)
 TEMPLATE = "thesis.html.jinja"
 
 Tell = Callable[[str, float], None]
@@ -58,8 +59,14 @@ class Chapter:
 
     @property
     def counts(self) -> Counter[str]:
-        """How many numbers have each verdict."""
-        return Counter(verdict for _, rows in self.tables for row in rows for _, verdict in row)
+        """How many numbers have each verdict; one that is printed twice counts once."""
+        return Counter(
+            verdict
+            for table, rows in self.tables
+            for row, entries in zip(table.rows, rows, strict=True)
+            if not row.again
+            for _, verdict in entries
+        )
 
     def entries(self) -> Iterator[dict[str, Any]]:
         """Each number with its verdict, as plain data."""
@@ -69,7 +76,7 @@ class Chapter:
                     yield {
                         "chapter": self.name, "place": table.name, "quantity": row.quantity, "entry": number.label,
                         "unit": row.unit, "printed": number.printed, "ours": value, "verdict": verdict,
-                        "why": number.why,
+                        "why": number.why, "again": row.again,
                     }  # fmt: skip
 
 
@@ -88,7 +95,7 @@ def run_chapter(name: str, *, start: Given | None = None, draw: bool = True, tel
 
 def module_of(name: str) -> ModuleType:
     """The script of a chapter."""
-    return importlib.import_module(f"thesis.{CHAPTERS[name]}")
+    return importlib.import_module(f"stickslip_thesis.{CHAPTERS[name]}")
 
 
 def reproduce(chapters: Sequence[str], *, folder: Path | None, tell: Tell) -> tuple[Chapter, ...]:
@@ -98,7 +105,7 @@ def reproduce(chapters: Sequence[str], *, folder: Path | None, tell: Tell) -> tu
     done = []
     for place, name in enumerate(chapters):
         tell(f"chapter {name}, numbers", place)
-        done.append(run_chapter(name, draw=folder is not None, tell=lambda words, _, at=place: tell(words, at)))
+        done.append(run_chapter(name, draw=folder is not None, tell=_at(tell, place)))
     if folder is not None:
         tell("writing the page", len(chapters))
         with results_folder(folder, results(done)) as draft:
@@ -107,6 +114,11 @@ def reproduce(chapters: Sequence[str], *, folder: Path | None, tell: Tell) -> tu
             for chapter in done:
                 write_figures(draft / "figures", f"{chapter.name}-", chapter.plates)
     return tuple(done)
+
+
+def _at(tell: Tell, place: int) -> Tell:
+    """The progress of a chapter, which counts as one."""
+    return lambda words, _: tell(words, place)
 
 
 def results(chapters: Sequence[Chapter]) -> dict[str, Any]:
@@ -126,7 +138,7 @@ def render(chapters: Sequence[Chapter]) -> str:
     environment.globals.update(digits_of=digits_of, reasons=reasons, starts=starts)
     total = sum((chapter.counts for chapter in chapters), Counter())
     return environment.get_template(TEMPLATE).render(
-        chapters=chapters, total=total, verdicts=VERDICTS, version=__version__
+        chapters=chapters, total=total, verdicts=VERDICTS, meanings=MEANINGS, version=__version__
     )
 
 

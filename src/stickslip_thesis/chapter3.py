@@ -15,12 +15,14 @@ import stickslip as ss
 from stickslip.contact.contact import branch_slopes
 from stickslip.figures.plate import Plate
 from stickslip.figures.style import BLUE, FAINT, GREEN, ORANGE, PURPLE, styled
-from thesis.drawing import RESPONSES, around, characteristics, exact, figure, panels, responses, tag
-from thesis.printed import Given, Ours
-from thesis.sketches import massless_contact
+from stickslip_thesis.drawing import RESPONSES, around, characteristics, exact, figure, panels, responses, tag
+from stickslip_thesis.printed import Given, Ours
+from stickslip_thesis.sketches import massless_contact
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+
+    from stickslip.signals import Harmonics
 
 Array = NDArray[np.float64]
 
@@ -34,17 +36,17 @@ def numbers(given: Given) -> Ours:
     told = given["sliding"]
     orbits = [sliding(given, case) for case in CASES]
     slopes = [slopes_of_sticks(measured(given, case)) for case in CASES]
-    speeds = [ss.contact.transition_speed(measured(given, case)).curve for case in CASES]
+    speeds = [ss.contact.transition_speed(measured(given, case)).turns for case in CASES]
     return {
         "stiffness": [float(np.mean(each)) / 1e4 for each in slopes],
         "stiffness scatter": [float(np.std(each, ddof=1)) / 1e4 for each in slopes],
         "mean stiffness": float(np.mean(told["stiffness"])),
         "amplitude": [1e3 * orbit.amplitude for orbit in orbits],
         "speed by equation": [equation_3_4(told, case) for case in CASES],
-        "speed read off": [speed.value for speed in speeds],
-        "no speed scatter": None,
+        "speed read off": [float(np.mean(each)) for each in speeds],
+        "speed scatter": [float(np.std(each, ddof=1)) for each in speeds],
         "base": [1e3 * base_for(given, case) for case in CASES],
-        "harmonics": third_harmonic(given),
+        "harmonics": harmonics(given).ratio(2),
     }  # fmt: skip
 
 
@@ -59,8 +61,8 @@ def plates(given: Given) -> Iterator[Plate]:
             yield figure(
                 "3.9",
                 _spectra(given),
-                f"{sensors}The fundamental is {third_harmonic(given):.0f} times the "
-                "third harmonic; by symmetry there is no second.",
+                f"{sensors}The fundamental is {harmonics(given).ratio(2):.0f} times the second harmonic, which the "
+                f"roughness makes alone, and {harmonics(given).ratio(3):.0f} times the third.",
             )
     for number, case in (("3.12", 0), ("3.13", 1), ("3.14", 2)):
         record = measured(given, case)
@@ -151,12 +153,9 @@ def slopes_of_sticks(record: ss.Record) -> Array:
     return branch_slopes(record["x"], record["friction"] - loops.offset.value, loops.level.value)
 
 
-def third_harmonic(given: Given) -> float:
-    """How many times the third harmonic of the displacement goes into the fundamental, at 5.61 Hz."""
-    orbit = sliding(given, 0, base=base_for(given, 0))
-    x = orbit.orbit.sample(np.arange(4096) / 4096 * orbit.period, ("x",))[0][0]
-    first, third = np.abs(np.fft.rfft(x))[[1, 3]]
-    return float(first / third)
+def harmonics(given: Given) -> Harmonics:
+    """Of the displacement in the twin's record at 5.61 Hz (Figure 3.9c)."""
+    return ss.signals.harmonics(measured(given, 0), frequency=given["sliding"]["frequency"][0])
 
 
 def _of_orbit(orbit: ss.solve.SteadyState) -> str:

@@ -14,9 +14,9 @@ import stickslip as ss
 from stickslip.figures.plate import Plate
 from stickslip.figures.style import BLUE, GREEN, INK, ORANGE, PURPLE, envelope, styled
 from stickslip.signals.derivatives import five_point_average
-from thesis.drawing import figure, panels, tag
-from thesis.printed import Given, Ours
-from thesis.sketches import apparatus
+from stickslip_thesis.drawing import figure, panels, tag
+from stickslip_thesis.printed import Given, Ours
+from stickslip_thesis.sketches import apparatus
 
 Array = NDArray[np.float64]
 

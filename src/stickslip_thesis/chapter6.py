@@ -15,9 +15,9 @@ from stickslip.decay import extremes as ex
 from stickslip.figures.decay import plot_bounds, plot_decay, plot_differences, plot_identified
 from stickslip.figures.plate import Plate
 from stickslip.figures.style import BLUE, ORANGE, styled
-from thesis.drawing import figure, panels
-from thesis.printed import Given, Ours
-from thesis.sketches import system_i, system_ii
+from stickslip_thesis.drawing import figure, panels
+from stickslip_thesis.printed import Given, Ours
+from stickslip_thesis.sketches import system_i, system_ii
 
 Array = NDArray[np.float64]
 
@@ -37,7 +37,7 @@ def numbers(given: Given) -> Ours:
         measured = measured_extremes(given, kind)
         columns = [table_column(given, kind, m) for m in given["errors"]["steps"]]
         found |= {f"{kind}.{key}": [column[key] for column in columns] for key in columns[0]}
-        found[f"{kind}.measured"] = None if kind == "random" else measured
+        found[f"{kind}.measured"] = measured
         found[f"{kind}.errors"] = np.round(true, 5) - measured
     found |= {f"{kind}.largest": np.max(np.abs(found[f"{kind}.errors"])) for kind in ("random", "sampling")}
     found |= {
@@ -220,9 +220,24 @@ def _of_paper(given: Given) -> Ours:
         "paper.dry": [1e3 * found.dry_displacement.value for found in dry],
         "paper.zeta of both": [found.damping_ratio.value for found in both],
         "paper.dry of both": [1e3 * found.dry_displacement.value for found in both],
+        **{f"paper.{key}": values for key, values in _scatters(given).items()},
         "paper.zeta off": [100 * abs(1 - each["estimated_ratio"] / each["damping_ratio"]) for each in told],
         "paper.dry off": [100 * abs(1 - each["estimated_dry"] / each["dry"]) for each in told],
-        "not on paper": None,
+    }
+
+
+def _scatters(given: Given) -> dict[str, list[float]]:
+    """The scatter of single estimates along one decay, of the friction alone and of both (equations 6.11 and 6.9)."""
+    scatter = {
+        (case, kind): ss.decrement(on_paper(given, case, kind)).scatter
+        for case in (1, 2)
+        for kind in ("viscous", "dry", "both")
+    }
+    return {
+        "zeta scatter": [float(np.std(scatter[case, "viscous"].damping_ratio)) for case in (1, 2)],
+        "dry scatter": [1e3 * float(np.std(scatter[case, "dry"].dry_displacement)) for case in (1, 2)],
+        "zeta of both scatter": [float(np.std(scatter[case, "both"].damping_ratio)) for case in (1, 2)],
+        "dry of both scatter": [1e3 * float(np.std(scatter[case, "both"].dry_displacement)) for case in (1, 2)],
     }
 
 
@@ -233,6 +248,8 @@ def _of_bearing(given: Given) -> Ours:
     return {
         "bearing.zeta": zeta,
         "bearing.beta": zeta / math.sqrt(1 - zeta**2),
+        "bearing.zeta scatter": float(np.std(found.scatter.damping_ratio)),
+        "bearing.friction scatter": told["stiffness"] * float(np.std(found.scatter.dry_displacement)),
         "bearing.friction": told["stiffness"] * found.dry_displacement.value,
         "bearing.coefficient": told["kinetic"] / (told["mass"] * told["gravity"]),
     }

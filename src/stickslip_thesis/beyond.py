@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 import stickslip as ss
 from stickslip.figures.plate import Plate
 from stickslip.figures.style import BLUE, FAINT, GREEN, ORANGE, PURPLE, styled
-from thesis import chapter3
-from thesis.drawing import around, exact, figure, panels, tag
-from thesis.printed import Given, Ours
+from stickslip_thesis import chapter3
+from stickslip_thesis.drawing import around, exact, figure, panels, tag
+from stickslip_thesis.printed import Given, Ours
 
 Array = NDArray[np.float64]
 
@@ -146,7 +146,7 @@ def stick_slip(given: Given, *, stiffness: float = 1.0, load: float = 1.0) -> ss
     """Case 2 of chapter 4 with another contact stiffness or, of hemispheres, another load; both relative."""
     told = given["stick_slip"]
     stiff = told["stiffness"] * stiffness * load ** (1 / 3)
-    damping = 2 * told["case2"] * math.sqrt(told["mass"] * (told["spring"] + stiff))
+    damping = told["critical"] * told["case2"] * math.sqrt(told["mass"] * (told["spring"] + stiff))
     law = ss.laws.CompliantContact(told["kinetic"] * load, stiffness=stiff, damping=damping)
     drive = ss.drives.HarmonicBase(told["base"] * load, frequency=told["frequency"])
     return ss.Oscillator(mass=told["mass"], stiffness=told["spring"], law=law, drive=drive)

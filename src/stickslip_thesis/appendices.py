@@ -12,8 +12,8 @@ from scipy.optimize import brentq
 from stickslip.figures.plate import Plate
 from stickslip.figures.style import BLUE, ORANGE, styled
 from stickslip.signals.derivatives import five_point_response
-from thesis.drawing import figure, panels, tag
-from thesis.printed import Given, Ours
+from stickslip_thesis.drawing import figure, panels, tag
+from stickslip_thesis.printed import Given, Ours
 
 TITLE = "Appendices: the moving average, and the discharge of the load cell"
 STARTS_FROM = ("rig", "discharge")  # sections of given.toml

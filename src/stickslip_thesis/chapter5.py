@@ -14,9 +14,9 @@ import stickslip as ss
 from stickslip.figures.plate import Plate
 from stickslip.figures.style import BLUE, FAINT, ORANGE, PURPLE, styled
 from stickslip.figures.wavelet import plot_wavelet
-from thesis import chapter4
-from thesis.drawing import figure, panels, tag
-from thesis.printed import Given, Ours
+from stickslip_thesis import chapter4
+from stickslip_thesis.drawing import figure, panels, tag
+from stickslip_thesis.printed import Given, Ours
 
 Array = NDArray[np.float64]
 

@@ -12,7 +12,18 @@ from typing import Any
 import numpy as np
 
 HERE = Path(__file__).parent
-SAME, CORRECTED, NOT_REPRODUCIBLE, CHANGED = "same", "corrected", "not reproducible", "changed"
+SAME, PUT_IN, CORRECTED, AMBIGUOUS = "same", "put in", "corrected", "ambiguous"
+CONTRADICTS, NOT_PRINTED, DIFFERS = "contradicts itself", "not printed", "ours differs"
+CHANGED = "changed"  # of a number whose verdict our number does not bear out
+MEANINGS = {
+    SAME: "ours comes out of the printed parameters and rounds to the printed digits",
+    PUT_IN: "the model or its twin starts from this number, and its records give it back: no test of it",
+    CORRECTED: "another number should have been printed, and is ours",
+    AMBIGUOUS: "follows under one reading of the text and not under others",
+    CONTRADICTS: "the printed parameters that it should follow from give another number",
+    NOT_PRINTED: "what it was taken from is not printed; ours, where there is one, is of a twin",
+    DIFFERS: "measured on the rig, and the model gives another number",
+}
 
 Given = Mapping[str, Mapping[str, Any]]
 Ours = Mapping[str, float | Sequence[float] | None]
@@ -29,7 +40,7 @@ class Number:
     printed : str
         As printed, with its digits.
     expected : str
-        The verdict that holds: "same", "corrected" or "not reproducible".
+        The verdict that holds, one of `MEANINGS`.
     instead : str or None
         What should have been printed, with its digits: ours has to round to it.
     tolerance : float
@@ -48,11 +59,11 @@ class Number:
     def verdict(self, ours: float | None) -> str:
         """The expected verdict if our number bears it out; "changed" if it does not."""
         near = _agrees(ours, self.printed, self.tolerance)
-        if self.expected == SAME:
-            return SAME if near else CHANGED
         if self.instead is not None:
             return self.expected if not near and _agrees(ours, self.instead, half_unit(self.instead)) else CHANGED
-        return self.expected if ours is None or near else CHANGED
+        if self.expected in (NOT_PRINTED, CONTRADICTS) and ours is None:
+            return self.expected
+        return self.expected if near else CHANGED
 
 
 @dataclass(frozen=True)
@@ -67,12 +78,15 @@ class Row:
         Its name among the numbers of its chapter.
     numbers : tuple of Number
         Its entries.
+    again : str
+        The table that prints the same numbers before: they are counted there.
     """
 
     quantity: str
     unit: str
     ours: str
     numbers: tuple[Number, ...]
+    again: str
 
 
 @dataclass(frozen=True)
@@ -83,6 +97,8 @@ class Table:
     ----------
     chapter, name, about : str
         Where it stands and what it is.
+    rounding : str
+        What was rounded before it was taken further, where that decides a digit.
     rows : tuple of Row
         Its rows.
     """
@@ -90,6 +106,7 @@ class Table:
     chapter: str
     name: str
     about: str
+    rounding: str
     rows: tuple[Row, ...]
 
 
@@ -144,7 +161,7 @@ def _values(row: Row, ours: Ours) -> list[float | None]:
 def _table(entry: Mapping[str, Any]) -> Table:
     labels = entry.get("each", [""])
     rows = tuple(_row(row, labels) for row in entry["row"])
-    return Table(str(entry["chapter"]), entry["name"], entry["about"], rows)
+    return Table(str(entry["chapter"]), entry["name"], entry["about"], entry.get("rounding", ""), rows)
 
 
 def _row(row: Mapping[str, Any], labels: Sequence[str]) -> Row:
@@ -154,7 +171,7 @@ def _row(row: Mapping[str, Any], labels: Sequence[str]) -> Row:
         _number(label, text, {**of_all, **row.get("except", {}).get(label, {})})
         for label, text in zip(labels, printed, strict=True)
     ]
-    return Row(row["quantity"], row.get("unit", "1"), row["ours"], tuple(numbers))
+    return Row(row["quantity"], row.get("unit", "1"), row["ours"], tuple(numbers), row.get("again", ""))
 
 
 def _number(label: str, printed: str, told: Mapping[str, Any]) -> Number:

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from stickslip.units import prefixed, spelled
-from thesis.printed import HERE, Given
+from stickslip_thesis.printed import HERE, Given
 
 WITHOUT_UNITS = ("decay", "errors", "schematic", "inertial")  # sections whose equations have none
 UNITS = {

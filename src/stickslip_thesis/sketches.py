@@ -9,7 +9,7 @@ import numpy as np
 
 from stickslip import Rig
 from stickslip.figures.style import BLUE, FAINT, GREEN, INK, ORANGE, PURPLE, SHADE, WIDTH, styled
-from thesis.printed import Given
+from stickslip_thesis.printed import Given
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -14,16 +14,15 @@ from scipy.optimize import brentq
 import stickslip as ss
 from stickslip.figures.plate import Plate
 from stickslip.figures.style import BLUE, GREEN, INK, ORANGE, PURPLE, styled
-from thesis.drawing import around, characteristics, figure, panels, responses, tag
-from thesis.printed import Given, Ours
-from thesis.sketches import contact_with_inertia
+from stickslip_thesis import readings
+from stickslip_thesis.drawing import around, characteristics, figure, panels, responses, tag
+from stickslip_thesis.printed import Given, Ours
+from stickslip_thesis.sketches import contact_with_inertia
 
 Array = NDArray[np.float64]
 
 TITLE = "The same contact where it sticks, and laws with a memory"
 STARTS_FROM = ("stick_slip", "state_variable", "inertial")  # sections of given.toml
-FRICTIONS = (1.06, 1.10, 1.28)  # Table 3.2's, for the map of micro-slips
-DAMPINGS = np.linspace(0, 400, 81)
 
 
 def numbers(given: Given) -> Ours:
@@ -34,9 +33,9 @@ def numbers(given: Given) -> Ours:
     return {
         "coupled frequency": math.sqrt((told["spring"] + told["stiffness"]) / told["mass"]) / (2 * math.pi),
         "free frequency": strongest(time, friction),
-        "not tuned": None,
+        "bases of stick-slip": [1e3 * told["base"], 1e3 * given["state_variable"]["base"][0], math.nan],
         "base of the state variable": [base_of_state_variable(given, case) for case in (1, 2)],
-        "micro-slips": [micro_slips(stick_slip(given, told[name])) for name in ("case1", "case2")],
+        "micro-slips": [readings.micro_slips(stick_slip(given, told[name])) for name in ("case1", "case2")],
         "abnormal stops": orbits[0].stops[1] / 2,
         "static deflection": inertial["kinetic"] / inertial["stiffness"],
     }
@@ -48,10 +47,11 @@ def plates(given: Given) -> Iterator[Plate]:
     told = given["stick_slip"]
     for time, loops, name in (("4.4", "4.5", "case1"), ("4.6", "4.7", "case2")):
         orbit = stick_slip(given, told[name])
+        slips = readings.micro_slips(orbit)
         words = (
-            f"Steady motion, exactly solved, with the damping ratio {told[name]} of m and k + K_y and "
-            f"f_k = {told['kinetic']:g} N (ours: none is printed). In each sticking interval the contact slips "
-            f"{micro_slips(orbit)} times."
+            f"Steady motion, exactly solved, with the damping ratio {told[name]} and f_k = {told['kinetic']:g} N, read "
+            f"as c = {told['critical']:g} ζ √(m (k + K_y)): in each sticking interval the contact slips "
+            f"{slips or 'no'} time{'s' * (slips != 1)}{', and the ringing dies away' * (slips == 0)}."
         )
         yield figure(time, responses(*around(orbit, cycles=2)), words)
         yield figure(
@@ -61,12 +61,11 @@ def plates(given: Given) -> Iterator[Plate]:
         )
     yield figure(
         "micro-slips",
-        _map(given),
-        "Not in the thesis: micro-slips in each sticking interval against the contact's damping, for the frictions of "
-        "Table 3.2 and the mean contact stiffness. Dotted: .0174 and .0558 of m and k + K_y. Two slips at the "
-        "first and none at the second hold for no friction of the three. At 1.28 N a "
-        "slip ends near 79 N s/m and another stop begins soon after, so that the count falls, rises and falls again.",
-        title="How many micro-slips",
+        readings.drawn(given),
+        "Not in the thesis: micro-slips in each sticking interval of case 1 (.0558) and case 2 (.0174), one before the "
+        "other, by what the damping ratio is of, the contact's stiffness (Table 3.1's least, mean and largest) and the "
+        "friction, which is not printed (shaded: Table 3.2's range). Bold: none and two, as printed.",
+        title="Which reading gives the printed micro-slips",
     )
     for case, (time, loops) in enumerate((("4.8", "4.9"), ("4.10", "4.11"), ("4.12", "4.13"))):
         orbit = state_variable(given, case)
@@ -84,28 +83,21 @@ def plates(given: Given) -> Iterator[Plate]:
     yield from _inertial(given)
 
 
-def stick_slip(given: Given, ratio: float, *, kinetic: float | None = None) -> ss.solve.SteadyState:
-    """The motion of section 4.3 with a damping ratio of m and k + K_y in the contact."""
+def stick_slip(given: Given, ratio: float) -> ss.solve.SteadyState:
+    """The motion of section 4.3 with a damping ratio in the contact."""
     told = given["stick_slip"]
-    damping = 2 * ratio * math.sqrt(told["mass"] * (told["spring"] + told["stiffness"]))
-    return _steady(told["mass"], told["spring"], _contact(given, damping, kinetic), told["base"], told["frequency"])
+    return _steady(told["mass"], told["spring"], _contact(given, ratio), told["base"], told["frequency"])
 
 
-def _contact(given: Given, damping: float, kinetic: float | None = None) -> ss.laws.CompliantContact:
+def _contact(given: Given, ratio: float) -> ss.laws.CompliantContact:
     told = given["stick_slip"]
-    kinetic = told["kinetic"] if kinetic is None else kinetic
-    return ss.laws.CompliantContact(kinetic, stiffness=told["stiffness"], damping=damping)
+    return ss.laws.CompliantContact(
+        told["kinetic"], stiffness=told["stiffness"], damping=readings.damping(given, ratio)
+    )
 
 
-@functools.lru_cache(1024)
 def _steady(mass: float, spring: float, law: Any, base: float, frequency: float) -> ss.solve.SteadyState:
-    drive = ss.drives.HarmonicBase(base, frequency=frequency)
-    return ss.steady_state(ss.Oscillator(mass=mass, stiffness=spring, law=law, drive=drive))
-
-
-def micro_slips(orbit: ss.solve.SteadyState) -> int:
-    """Slips within a macroscopic sticking interval: one less than its microsticks, of which a cycle has two sets."""
-    return orbit.orbit.event_counts()["microstick"] // 2 - 1
+    return readings.stick_slip(law, base, frequency, mass, spring)
 
 
 def state_variable(given: Given, case: int, *, base: float | None = None) -> ss.solve.SteadyState:
@@ -127,7 +119,7 @@ def base_of_state_variable(given: Given, case: int) -> float | None:
         return state_variable(given, case, base=base).amplitude - wanted
 
     most = given["state_variable"]["base"][case]
-    found = brentq(excess, 0.7 * most, most, xtol=1e-7)
+    found = float(brentq(excess, 0.7 * most, most, xtol=1e-7))
     return 1e3 * found if abs(excess(found)) < 0.01 * wanted else None
 
 
@@ -140,8 +132,7 @@ def _free(mass: float, spring: float, law: Any, release: float) -> ss.Record:
 def free_vibration(given: Given) -> tuple[Array, Array, Array]:
     """Figure 4.2: time, smoothed acceleration and friction as the load cell feels it, of a released mass."""
     told = given["stick_slip"]
-    damping = 2 * told["case2"] * math.sqrt(told["mass"] * (told["spring"] + told["stiffness"]))
-    record = _free(told["mass"], told["spring"], _contact(given, damping), told["release"])
+    record = _free(told["mass"], told["spring"], _contact(given, told["case2"]), told["release"])
     smooth = np.convolve(record["a"], np.full(5, 0.2), mode="same")
     return record.time, smooth, record["load"]
 
@@ -174,8 +165,7 @@ def _measured(mass: float, spring: float, law: Any, base: float, frequency: floa
 def measured(given: Given) -> ss.Record:
     """What the virtual rig makes of case 2: two seconds, with friction."""
     told = given["stick_slip"]
-    damping = 2 * told["case2"] * math.sqrt(told["mass"] * (told["spring"] + told["stiffness"]))
-    return _measured(told["mass"], told["spring"], _contact(given, damping), told["base"], told["frequency"])
+    return _measured(told["mass"], told["spring"], _contact(given, told["case2"]), told["base"], told["frequency"])
 
 
 def _experiments(given: Given) -> Iterator[Plate]:
@@ -209,36 +199,6 @@ def _free_vibration(given: Given) -> Any:
     axes[2].set(xlabel="frequency [Hz]", ylabel="power [dB]", ylim=(-60, 3))
     for ax, letter in zip(axes, "abc", strict=True):
         tag(ax, letter)
-    return drawn
-
-
-@styled
-def _map(given: Given) -> Any:
-    """Micro-slips in each sticking interval against the contact's damping."""
-    told = given["stick_slip"]
-    drawn, ax = panels(1, height=3.2)
-    for place, (kinetic, colour) in enumerate(zip(FRICTIONS, (BLUE, ORANGE, GREEN), strict=True)):
-        counts = [
-            micro_slips(
-                _steady(
-                    told["mass"],
-                    told["spring"],
-                    _contact(given, float(damping), kinetic),
-                    told["base"],
-                    told["frequency"],
-                )
-            )
-            for damping in DAMPINGS
-        ]
-        ax.step(
-            DAMPINGS, np.array(counts) + 0.04 * (place - 1), where="mid", color=colour, label=f"f_k = {kinetic:.2f} N"
-        )
-    whole = math.sqrt(told["mass"] * (told["spring"] + told["stiffness"]))
-    for name in ("case1", "case2"):
-        ax.axvline(2 * told[name] * whole, color=INK, linestyle=":", linewidth=0.9)
-    ax.set(xlabel="contact damping [N s/m]", ylabel="micro-slips")
-    ax.yaxis.get_major_locator().set_params(integer=True)
-    ax.legend()
     return drawn
 
 
