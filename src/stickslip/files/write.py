@@ -11,13 +11,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stickslip.errors import FormatError, ModelError
-<<<<<<< HEAD
 from stickslip.files.table import Table, optional
-from stickslip.record.metadata import KEY, Digests, record_to_metadata, time_column, units_told
-=======
-from stickslip.files.table import optional
-from stickslip.record.metadata import BEGINS, KEY, described_beside, record_to_metadata, time_column
->>>>>>> main
+from stickslip.record.metadata import (
+    BEGINS,
+    KEY,
+    Digests,
+    described_beside,
+    record_to_metadata,
+    time_column,
+    units_told,
+)
 from stickslip.record.record import Record, require_record
 from stickslip.whole import whole_file
 
