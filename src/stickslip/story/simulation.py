@@ -24,7 +24,7 @@ from stickslip.figures.trajectory import (
     plates_of,
     pressed,
     sampled,
-)  # fmt: skip
+)
 from stickslip.files.write import require_form, write_record
 from stickslip.laws.formula import Formula
 from stickslip.parameters import PARTS
