@@ -6,7 +6,7 @@ import io
 import re
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from datetime import date
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO
@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from stickslip.errors import FormatError
 from stickslip.files.table import FREE, Block, Column, Options, Table
-from stickslip.record.metadata import KEY, parse_metadata
+from stickslip.record.metadata import read_beside
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -131,10 +131,8 @@ SUFFIXES = (".csv", ".txt", ".tsv", ".dat", ".asc", ".prn", ".log", ".out")
 Array = NDArray[np.float64]
 
 HEAD = 1 << 18  # bytes looked at to find the layout
-LONGEST_COMMENT = 1 << 26  # bytes of a record's own description
 LONGEST_ROW = 1 << 24  # bytes; the parser holds a whole row, and a disk that was full leaves holes of any length
 DAY = 86400.0
-_OURS = f"# {KEY} ".encode()
 
 
 def recognise(path: Path, head: bytes) -> bool:
@@ -145,13 +143,9 @@ def recognise(path: Path, head: bytes) -> bool:
 def read(path: Path, options: Options) -> Table:
     """The columns of a text file; its rows are read block by block when asked for."""
     with path.open("rb") as file:
-        described = file.readline(LONGEST_COMMENT) if file.read(len(_OURS)) == _OURS else b""
-        begin = len(_OURS) + len(described) if described else 0
-        file.seek(begin)
         head = file.read(HEAD)
         whole = not file.read(1)
     layout = find_layout(head, whole, options, path.name)
-    layout = replace(layout, offset=layout.offset + begin, header=layout.header + (1 if begin else 0))
     columns = tuple(Column(layout.names[index], layout.units[index]) for index in layout.used)
     notes = [f"decimal sign '{layout.decimal}'"] if layout.decimal != "." else []
     notes += [f"clock times in {layout.names[index]} as seconds since the first" for index in sorted(layout.clocks)]
@@ -161,7 +155,7 @@ def read(path: Path, options: Options) -> Table:
     def blocks(names: Sequence[str], size: int) -> Iterator[Block]:
         return _blocks(path, layout, stop, names, size)
 
-    return Table(columns, blocks, {}, tuple(notes), parse_metadata(described) if described else {}, cut)
+    return Table(columns, blocks, {}, tuple(notes), read_beside(path), cut)
 
 
 def _blocks(path: Path, layout: Layout, stop: int, names: Sequence[str], size: int) -> Iterator[Block]:
