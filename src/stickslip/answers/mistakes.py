@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 from stickslip.consistent.contradictions import Consistency
 from stickslip.consistent.slips import MILLISECONDS, Slip
@@ -14,7 +14,30 @@ from stickslip.rig.settings import RigSettings
 LATEST = 0.1  # of a record's length: a sensor that is said to be later, and tells of no cycle, is late by milliseconds
 SHORTEST_DELAY = 0.05  # s: a true delay of more than a cycle is shorter than this, where the motion is fast
 HALF_TURN = math.pi  # rad: what swings farther, and is called an angle in rad, is one in degrees
+BALANCED = ("balance", "energy")  # checks that a wrong mass, spring or sensor fails
+FAR = 2.0  # times by which two sides that should be one differ, from which no force is given
 NEAR = 0.1  # by which a ratio of frequencies may miss the one that a slip makes
+
+
+def slipped(slips: Sequence[Slip]) -> str:
+    """What one slip of the hand would explain, in words; nothing without one."""
+    return f"something is stated wrongly: probably {' or '.join(slip.words for slip in slips)}" if slips else ""
+
+
+def untrue(told: Consistency | None) -> str:
+    """What of channels and constants can not all be true, in words; a clipped sensor says so itself."""
+    failed = told.failed if told is not None else ()
+    if any("range" in check.name for check in failed):
+        return ""
+    apart = [check.sentence for check in failed if any(word in check.name for word in BALANCED)]
+    return f"the record and the rig's constants contradict each other: {apart[0]}" if apart else ""
+
+
+def hopeless(told: Consistency | None) -> str:
+    """What of channels and constants can not all be true, where it is so far off that no force is worth a headline."""
+    failed = told.failed if told is not None else ()
+    apart = [check for check in failed if any(word in check.name for word in BALANCED) and check.right]
+    return untrue(told) if any(not 1 / FAR < check.left / check.right < FAR for check in apart) else ""
 
 
 def mistakes(record: Record, rig: RigSettings, consistent: Consistency | None, loops: Loops | None) -> tuple[Slip, ...]:

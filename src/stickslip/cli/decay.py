@@ -88,4 +88,4 @@ def decay(files: tuple[str, ...], output: Path | None, as_json: bool, everything
         results = with_left_out(ss.answers.compare_decays(found) if len(found) > 1 else found[0], refused)
         written = ss.publish(results, folder=folder) if output or not as_json else None
     name_left_out(refused)
-    show(results, written, as_json=as_json, everything=everything, files=groups)
+    show(results, written, as_json=as_json, everything=everything)

@@ -7,8 +7,10 @@ from typing import Any
 import click
 
 import stickslip as ss
+from stickslip.cli.acquire import acquire
 from stickslip.cli.analyze import analyze, demo
 from stickslip.cli.decay import decay
+from stickslip.cli.devices import devices
 from stickslip.cli.exchange import check, convert, datasets
 from stickslip.cli.fit import fit
 from stickslip.cli.impact import impact
@@ -81,6 +83,7 @@ def main() -> None:
 
 
 for _command in (
+    acquire,
     analyze,
     bifurcation,
     check,
@@ -89,6 +92,7 @@ for _command in (
     decay,
     demo,
     dither,
+    devices,
     fit,
     impact,
     init,

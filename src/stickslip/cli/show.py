@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-import shlex
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import stickslip as ss
-from stickslip.cli.records import names_of
 from stickslip.cli.terminal import aligned, say, say_json, say_styled, wrapped
 from stickslip.cli.words import spoken
 
@@ -31,20 +28,9 @@ def print_json(told: Mapping[str, Any]) -> None:
     say_json({"program": "stickslip", "version": ss.__version__, **told})
 
 
-def show(
-    result: Any,
-    written: Path | None,
-    *,
-    as_json: bool,
-    everything: bool = False,
-    files: Sequence[Sequence[Path]] = (),
-    **context: Any,
-) -> None:
-    """A result as its story tells it, in short or with `everything`; `context` as in ``publish``.
-
-    A command that mends something names the `files` of each record as they were given.
-    """
-    story = _from_here(ss.summary(result, **context), files)
+def show(result: Any, written: Path | None, *, as_json: bool, everything: bool = False, **context: Any) -> None:
+    """A result as its story tells it, in short or with `everything`; `context` as in ``publish``."""
+    story = ss.summary(result, **context)
     if as_json:
         print_json(story.data())
         return
@@ -55,17 +41,6 @@ def show(
         _print_short(story)
     if written is not None:
         say(f"Report: {written / 'report.html'}")
-
-
-def _from_here(story: Story, files: Sequence[Sequence[Path]]) -> Story:
-    """With the files by their paths in the command that mends something: it is typed where this one was."""
-    called = {"+".join(names): "+".join(map(str, group)) for group, names in zip(files, names_of(files), strict=True)}
-
-    def told(remedy: str) -> str:
-        return shlex.join(called.get(word, word) for word in shlex.split(remedy))
-
-    parts = [replace(part, remedy=told(part.remedy)) for part in story.parts]
-    return replace(story, remedy=told(story.remedy), parts=parts)
 
 
 def _print_short(story: Story) -> None:

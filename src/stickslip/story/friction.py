@@ -6,8 +6,8 @@ import math
 from collections.abc import Iterator
 from typing import Any
 
-from stickslip.answers.doubts import hopeless
 from stickslip.answers.findings import Comparison, Findings
+from stickslip.answers.mistakes import hopeless
 from stickslip.balance.balance import Pull
 from stickslip.consistent.slips import Slip
 from stickslip.cycle.before_slip import Presliding
@@ -40,10 +40,11 @@ def of_comparison(comparison: Comparison) -> Story:
     """Several records side by side."""
     levels = [(each, each.level) for each in comparison.findings if each.level is not None]
     return Story(
-        f"{len(comparison.findings)} records compared", list(_together(comparison)),
+        f"{len(comparison.findings)} records compared",
+        list(_together(comparison)),
         lines=[Line.of(level, each.true_value(level), name=f"{level.name}, {each.name}") for each, level in levels],
         draw=lambda: plates_together(comparison),
-    )  # fmt: skip
+    )
 
 
 def _settings(findings: Findings) -> dict[str, str]:

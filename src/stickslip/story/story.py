@@ -29,8 +29,8 @@ TELLERS = {
     "Predictions": "prediction.of_predictions", "Batch": "many.of_batch",
     "Outcome": "simulation.of_outcome", "Trajectory": "simulation.of_run",
     "Record": "rig.of_record", "ExperimentPlan": "rig.of_plan",
-    "Bifurcation": "regimes.of_bifurcation", "Basins": "regimes.of_basins", "Boundary": "regimes.of_boundary",
-    "Dither": "regimes.of_dither", "Stability": "regimes.of_stability",
+    "Bifurcation": "maps.of_bifurcation", "Basins": "maps.of_basins", "Boundary": "maps.of_boundary",
+    "Dither": "maps.of_dither", "Stability": "maps.of_stability",
     "ImpactTest": "estimates.of_tap", "Dataset": "maps.of_map",
     "Estimate": "estimates.of_one", "list": "estimates.of_several", "tuple": "estimates.of_several",
 }  # fmt: skip

@@ -4,11 +4,12 @@ import { start as startPlay } from "./play.js";
 
 if (location.pathname !== "/") localStorage.setItem("inside", location.pathname); // for enter.js; other ports do not see it
 const $ = (id) => document.getElementById(id);
-const TABS = ["play", "map", "data"];
+const TABS = ["play", "map", "data", "live"];
 const LEADS = {
   play: "Move a slider: the motion is computed anew, exactly, while you drag.",
   map: "Which motion is where: choose two parameters, then click a point to play it.",
   data: "Drop a record: get its friction.",
+  live: "Watch a rig as it is measured, and record it.",
 };
 const onTheme = [];
 
@@ -74,10 +75,14 @@ const opened = {
     opened.data = null;
     import("./data.js").then((page) => page.start($("data"), lab));
   },
+  live: () => {
+    opened.live = null;
+    import("./live.js").then((page) => page.start($("live"), lab));
+  },
 };
 
 // A chart over time for any tab: {title, unit, time, series: [{label, values, colour, dash}]}.
-function plot(element, { title, unit, time, series }) {
+function plot(element, { title, unit, time, series, chosen }) {
   const palette = colours();
   const axis = {
     stroke: palette.soft, grid: { stroke: palette.line, width: 1 }, ticks: { stroke: palette.line },
@@ -89,6 +94,8 @@ function plot(element, { title, unit, time, series }) {
   const chart = new uPlot({
     width: element.clientWidth || 600, height: 220, title, legend: { show: true }, scales: { x: { time: false } },
     axes: [{ ...axis, label: "time [s]" }, { ...axis, label: unit, size: 70 }], series: [{ label: "time" }, ...lines],
+    cursor: { drag: { x: true, y: false, setScale: !chosen } },
+    hooks: chosen ? { setSelect: [({ select: { left, width }, posToVal }) => { if (width > 4) chosen(posToVal(left, "x"), posToVal(left + width, "x")); }] } : {},
   }, [time, ...series.map((line) => line.values)], element);
   new ResizeObserver(() => chart.setSize({ width: element.clientWidth, height: 220 })).observe(element);
   return chart;
@@ -98,6 +105,8 @@ export const lab = {
   ask, say, busy, COMPILES, colours, show, plot,
   onTheme: (then) => onTheme.push(then),
   openInPlay: null, // by play.js
+  sessions: {}, // by tab: {save, load} of what a session's file holds of it
+  restored: null, // the session that was opened last: a tab that opens later takes its part
   onShow: {}, // by tab: what it does when it is shown again
 };
 
