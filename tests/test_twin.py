@@ -77,7 +77,7 @@ def test_static_friction_that_is_not_there_is_not_claimed(rig: stepped.Rig) -> N
 
 def test_static_friction_that_is_there_is_found() -> None:
     _, tried = asked(BEARS)
-    assert tried.trial.static.claimed
+    assert tried.trial.felt[RATIO].claimed
     ratio = tried.breakaway.ratio
     assert ratio.value == pytest.approx(1.5, abs=0.04)
 
@@ -173,7 +173,7 @@ def test_bristles_whose_static_friction_x_does_not_show_leave_it_open() -> None:
 def test_a_rigid_contact_is_rigid_up_to_what_would_have_been_seen() -> None:
     _, tried = asked(STOPS)
     assert tried.presliding.verdict == "rigid"
-    assert 0 < tried.trial.yields.felt < 1e-3 * STOPS.amplitude / STOPS.kinetic
+    assert 0 < tried.trial.felt["compliance"].felt < 1e-3 * STOPS.amplitude / STOPS.kinetic
 
 
 def test_a_contact_of_another_kind_is_unlike_its_twins() -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import fields, replace
 from typing import Any
 
@@ -12,12 +12,15 @@ from stickslip.balance.balance import ALONE
 from stickslip.balance.likely_contact import STRAYING
 from stickslip.consistent.contradictions import Consistency
 from stickslip.errors import StickslipError
-from stickslip.estimate import Doubt, Estimate, Status, stands
+from stickslip.estimate import UNTRIED, Doubt, Estimate, Status, doubts_of, stands
 from stickslip.record.record import Record
 
 BY_FORCE = (
     "loops", "breakaway", "stiffness", "contact_damping", "transition", "coupled", "cause", "presliding",
 )  # fmt: skip
+DRIVEN = "forcing frequency"  # no matter of friction
+NOT_TRIED = Doubt("not tried on twins: rigs that never stick, that slide at one level or on a rigid contact may seem "
+                  "to do so as well", UNTRIED)  # fmt: skip
 ONSETS = ("sticks", "breakaway", "presliding")  # when it sticks, and what it does until it slips
 BALANCED = ("balance", "energy")  # checks that a wrong mass, spring or sensor fails
 GOES_ON = 0.8  # of the motion at first that is left at last, where something drives it
@@ -52,19 +55,47 @@ def _reasons(
         yield f"{strays[0]}: a mass, a spring or a sensor is not as stated, or the contact no spring", ONSETS
 
 
-def flagged(found: Any, reason: Doubt | str) -> Any:
-    """An answer with each of its numbers flagged that was thought to be sure; that of the drive stays sure."""
-    if isinstance(found, Estimate):
-        lesser = stands(found.status)
-        if found.name == "forcing frequency" or not (lesser or not found.known):
-            return found
-        return replace(found, status=Status(reason) if lesser else Status(reason, found.status))
+def untried(answers: dict[str, Any]) -> dict[str, Any]:
+    """The answers, with a doubt at those that rigs of another kind give too."""
+    return {**answers, **{key: _with(answers.get(key), NOT_TRIED) for key in ONSETS}}
+
+
+def without(found: Any, kind: str) -> Any:
+    """An answer without doubts of a kind."""
+
+    def left(number: Estimate) -> Estimate:
+        return replace(number, status=Status(*(each for each in doubts_of(number.status) if each.kind != kind)))
+
+    return _each(found, left)
+
+
+def _with(found: Any, doubt: Doubt) -> Any:
+    return _each(found, lambda number: replace(number, status=Status(number.status, doubt)))
+
+
+def _each(found: Any, change: Callable[[Estimate], Estimate]) -> Any:
+    """An answer with each of its numbers changed, but for that of the drive."""
     if found is None:
         return None
     numbers = {each.name: getattr(found, each.name) for each in fields(found)}
     return replace(
-        found, **{name: flagged(value, reason) for name, value in numbers.items() if isinstance(value, Estimate)}
-    )  # fmt: skip
+        found,
+        **{
+            name: change(value)
+            for name, value in numbers.items()
+            if isinstance(value, Estimate) and value.name != DRIVEN
+        },
+    )
+
+
+def flagged(found: Any, reason: Doubt | str) -> Any:
+    """An answer with each of its numbers flagged that was thought to be sure; that of the drive stays sure."""
+    if isinstance(found, Estimate):
+        lesser = stands(found.status)
+        if found.name == DRIVEN or not (lesser or not found.known):
+            return found
+        return replace(found, status=Status(reason) if lesser else Status(reason, found.status))
+    return _each(found, lambda number: flagged(number, reason))
 
 
 def _contradiction(told: Consistency | None) -> str:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Self
 
 from stickslip.errors import EstimateError
-from stickslip.estimate import Estimate, Result
+from stickslip.estimate import UNTRIED, Estimate, Result, kinds
 from stickslip.record.record import Record
 
 if TYPE_CHECKING:
@@ -127,6 +127,11 @@ class Findings(Answers):
         """The answers that are not sure as wholes, and what each says of it."""
         told = ((name, getattr(self.results.get(key), "status", "ok")) for key, name in WHOLES.items())
         return tuple((name, status) for name, status in told if status != "ok")
+
+    @property
+    def untried(self) -> bool:
+        """Whether it has twins that were not asked."""
+        return any(UNTRIED in kinds(estimate.status) for estimate in self.estimates)
 
     @property
     def contradiction(self) -> str:

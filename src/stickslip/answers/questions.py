@@ -8,7 +8,7 @@ from functools import cache, partial
 from typing import Any
 
 from stickslip.answers.asked import Asked
-from stickslip.answers.doubts import doubted
+from stickslip.answers.doubts import doubted, untried
 from stickslip.answers.findings import Findings, record_name
 from stickslip.answers.preparation import (
     AT_ONCE,
@@ -37,6 +37,7 @@ from stickslip.estimate import Constant, Status
 from stickslip.record.flaws import constant
 from stickslip.record.record import Record
 from stickslip.rig.settings import RigSettings
+from stickslip.twin.search import lacking
 
 STRETCH = 1 << 14  # samples in which the contact is fitted
 
@@ -113,6 +114,7 @@ def analyze(
         if led and answers.get(question.unless) is None and question.fits(whole):
             answers[question.key] = asked.ask(question.name, partial(_answer, question, whole, fused, slid))
     answers = doubted(answers, whole, unknown=made.doubt, refusals=asked.refusals)
+    answers = untried(answers) if lacking(whole) is None else answers
     answers["loops"] = _late(answers.get("loops"), record, rig)
     if all(answer is None for answer in answers.values()):
         raise _nothing(name, record, asked.refusals)
