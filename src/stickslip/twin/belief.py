@@ -52,13 +52,15 @@ GAUSS = 2.0  # exponent of the bristles' curve
 SLIDES = 0.2  # of the largest speed, above which friction is that of sliding: below, sticks and smoothing are in it
 FALL = 0.02  # of friction, over the speeds at which it slides
 EVENTS = 1000  # in a cycle, beyond which a rig that is tried is given up
-FOLLOWED = 1e-9  # tolerance to which curved laws are followed: well below any sensor's noise
+FOLLOWED = 1e-12  # tolerance to which curved laws are followed: the error of a difference is this over its step
 NEAR = 1.1  # times a sensor's noise, that a search may leave to have come to its end
 TINY = 1e-9  # of the motion: noise below is rounding
 FURTHEST = 30.0  # step of a logarithm: beyond it nothing is told
 REACH = 3.0  # standard deviations by which a search may move a constant at once
 FINELY = 4  # instants in a sample, at which the power of friction is looked at: where it is held it bends
-NUDGE = 1e-3  # of a value, by which it is moved to see what the displacement does: well above rounding
+# Of a value, by which it is moved to see what x does. With 1e-3 the bend of x over that step made x tell the scale of
+# all forces, which it can not: intervals of rigs whose constants are off were a third as wide as they had to be.
+NUDGE = 1e-5
 
 
 @dataclass(frozen=True, eq=False)
