@@ -19,15 +19,14 @@ from stickslip.decay.fit_decay import fit_decay
 from stickslip.decay.motions import Restoring
 from stickslip.decay.release import Releases, find_releases
 from stickslip.decay.start import SEEN
-from stickslip.decay.which_motion import DecayMotion, choose_motion
+from stickslip.decay.which_motion import PLAIN, DecayMotion, choose_motion
 from stickslip.errors import EstimateError, StickslipError
 from stickslip.estimate import Constant, Estimate, Result
-from stickslip.record.record import Record
+from stickslip.record.record import Record, require_record
 from stickslip.units import parse_constant
 
 EXTREMES = "extremes alone"
 LOST = 0.1  # of the motion: a fit that leaves more of it does not follow it
-PLAIN = ("viscous", "dry", "both", "static")  # motions that viscous and dry friction together hold
 CLEAR = 1e-3  # p-value below which a motion's rejection is no chance of one true motion in twenty
 CHANCE = 0.01  # of a record without dry friction to be told to have some
 ONE_IN_100 = 2.33 / 1.96  # by which the lower end of 95 % lies farther off where one in a hundred lies beyond it
@@ -268,6 +267,7 @@ def analyze_decay(
     >>> round(found.decay.best.damping_ratio.value, 3), round(found.decay.dry_force.value, 2)
     (0.032, 0.2)
     """
+    require_record(record)
     if method not in METHODS:
         raise EstimateError(f"method = '{method}'", f"it is {', '.join(METHODS)}", "choose one of them")
     if restoring == "pendulum" and method == "thesis":

@@ -82,7 +82,8 @@ def ready(record: Record, rig: RigSettings, method: str, asked: Asked) -> Ready:
 
 
 def with_sensors(record: Record, rig: RigSettings) -> Record:
-    """The record with what the settings state of its sensors."""
+    """The record with what the settings state of its sensors, and with their log."""
+    record = rig.logged(record)
     for name, told in rig.sensors.items():
         if name in record:
             record = record.with_details(name, **told.model_dump(exclude_unset=True))
@@ -341,5 +342,7 @@ def normal_load(record: Record, rig: RigSettings, name: str, notes: list[str]) -
         if mean:
             return abs(mean)
         notes.append("The channel normal tells no load: it holds " + ("zeros." if len(finite) else "no numbers."))
+    if record.log is not None and isinstance(record.log.normal, float):
+        return record.log.normal
     loads = (rig.normal_load(part) for part in [*name.split(" + "), name])
     return next((load for load in loads if load is not None), None)

@@ -35,7 +35,7 @@ from stickslip.cycle.sticks import find_sticks
 from stickslip.errors import EstimateError, StickslipError
 from stickslip.estimate import Constant, Status
 from stickslip.record.flaws import constant
-from stickslip.record.record import Record
+from stickslip.record.record import Record, require_record
 from stickslip.rig.settings import RigSettings
 from stickslip.twin.search import lacking
 
@@ -101,6 +101,7 @@ def analyze(
     >>> round(analyze(record).level.value, 2)
     1.5
     """
+    require_record(record)
     given = {"mass": mass, "stiffness": stiffness, "damping": damping, "damper": damper, "contact": contact}
     rig = _settings(rig, {key: value for key, value in given.items() if value is not None})
     asked, name, faults = Asked(), record_name(record), tuple(record.check())

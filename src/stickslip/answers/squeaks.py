@@ -12,7 +12,7 @@ from stickslip.answers.findings import Findings, record_name
 from stickslip.cycle.loops import NO_SLOPE, friction_loops
 from stickslip.errors import EstimateError
 from stickslip.estimate import Estimate, kinds
-from stickslip.record.record import Record
+from stickslip.record.record import Record, require_record
 from stickslip.squeak.bursts import HEARD, Squeaks, find_squeaks
 from stickslip.squeak.couplings import coupling
 from stickslip.squeak.quality import SoundQuality, impulsiveness, sound_quality
@@ -73,6 +73,7 @@ def analyze_squeaks(
     >>> found.squeaks.kind, bool(475 < found.squeaks.frequency.value < 500), found.coefficient.includes(8 / 6.13)
     ('squeak', True, True)
     """
+    require_record(record)
     band = parse_range(frequencies, "Hz") if isinstance(frequencies, str) else frequencies
     lever = None if lever is None else parse_constant("lever", lever, "m")
     faults = tuple(record.check())

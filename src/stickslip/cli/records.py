@@ -137,7 +137,7 @@ def folder_after(file: Path, ending: str) -> Path:
 def read(files: Sequence[Path], rig: RigSettings, names: Sequence[str] = ()) -> Record:
     """The record, its files called by their names or by those given."""
     record = ss.read_record(_paths(files), rows=rig.row_range(), **_told(rig))
-    return ss.answers.mend(_with_source(record, files, names), repairs=rig.repair)
+    return rig.logged(ss.answers.mend(_with_source(record, files, names), repairs=rig.repair))
 
 
 def is_long(files: Sequence[Path]) -> bool:
@@ -154,7 +154,7 @@ def read_parts(
         return
     told = {**_told(rig), **({} if size is None else {"size": size})}
     for part in ss.read_blocks(_paths(files), **told):
-        yield _with_source(part, files, names)
+        yield rig.logged(_with_source(part, files, names))
 
 
 def _paths(files: Sequence[Path]) -> Any:

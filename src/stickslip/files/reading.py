@@ -19,15 +19,8 @@ from stickslip.files.table import FREE, Block, Budget, supplied
 from stickslip.printing import printable
 from stickslip.record.channels import Channel
 from stickslip.record.clock import Clock, fit_clock, resolution
-from stickslip.record.metadata import (
-    Digests,
-    channels_told,
-    history_of,
-    metadata_to_record,
-    require_columns,
-    require_rows,
-    units_told,
-)
+from stickslip.record.exchange import history_of, metadata_to_record
+from stickslip.record.metadata import Digests, channels_told, require_columns, require_rows, units_told
 from stickslip.record.record import DETAILS, Record, Step
 
 Array = NDArray[np.float64]

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from stickslip.errors import FormatError, ModelError
 from stickslip.files.table import optional
 from stickslip.record.metadata import KEY, record_to_metadata, time_column
-from stickslip.record.record import Record
+from stickslip.record.record import Record, require_record
 from stickslip.whole import whole_file
 
 Array = NDArray[np.float64]
@@ -56,6 +56,7 @@ def write_record(record: Record, path: str | Path, *, overwrite: bool = False) -
     ...     ss.read_record(ss.write_record(record, folder + "/slide.csv")).equals(record)
     True
     """
+    require_record(record)
     path = Path(path)
     writer = WRITERS.get(path.suffix.lower())
     if writer is None:

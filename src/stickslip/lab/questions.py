@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 import json
 import math
-import re
 import shutil
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
@@ -131,9 +130,7 @@ def _untold(channel: ss.record.Channel) -> bool:
 
 
 def _fault(fault: Fault) -> dict[str, Any]:
-    match = re.search(rf"\b({'|'.join(ss.story.REPAIRS)})\(record", fault.message)
-    repair = ss.story.REPAIRS[match[1]] if match else ""
-    return {"message": on_the_page(fault.message), "severity": fault.severity, "repair": repair}
+    return {"message": on_the_page(fault.message), "severity": fault.severity, "repair": fault.repair}
 
 
 class Thinned:

@@ -32,7 +32,7 @@ from stickslip.law.trials import (
 )
 from stickslip.laws.guessing import family_of, hypotheses
 from stickslip.oscillator import Oscillator
-from stickslip.record.record import Record, Step
+from stickslip.record.record import Record, Step, require_record
 
 Array = NDArray[np.float64]
 
@@ -215,6 +215,7 @@ def compare_laws(
     >>> compare_laws(record, slider, laws=["Coulomb", "compliant"]).family
     'rigid'
     """
+    require_record(record)
     records = [record] if isinstance(record, Record) else list(record)
     if not records:
         raise EstimateError("no record", "laws are compared by one record at least", "give one")

@@ -3,6 +3,7 @@ from stickslip.rig.sensor import Mount as Mount
 from stickslip.rig.sensor import Noise as Noise
 from stickslip.rig.sensor import Sensor as Sensor
 from stickslip.rig.settings import RigSettings as RigSettings
+from stickslip.rig.settings import ShakerSettings as ShakerSettings
 from stickslip.rig.settings import read_rig as read_rig
 from stickslip.rig.settings import rig_settings as rig_settings
 

@@ -10,10 +10,11 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, BeforeValidator, Field, PlainSerializer, PlainValidator
 
-from stickslip.errors import ModelError
+from stickslip.errors import ModelError, RecordError
 from stickslip.estimate import Estimate
 from stickslip.printing import printable
-from stickslip.record.record import RIG_UNITS
+from stickslip.record.log import Log
+from stickslip.record.record import RIG_UNITS, Record
 from stickslip.settings import STRICT, checked, quantity, read_toml
 
 REPAIRS = ("clock", "gaps", "missing", "spikes", "clipping", "drift")
@@ -85,6 +86,45 @@ class SensorSettings(BaseModel):
     gain_sd: Annotated[float, quantity("1"), Field(ge=0, lt=1)] = 0.0
 
 
+class ShakerSettings(BaseModel):
+    """What moves the base, and how far it can; see :class:`stickslip.bench.Shaker`.
+
+    Attributes
+    ----------
+    stroke : float
+        Largest amplitude of the displacement [m].
+    lowest, highest : float
+        Frequencies [Hz] between which its motion is a sine.
+    velocity : float or None
+        Largest velocity [m/s].
+    force : float or None
+        Largest force [N].
+    moving_mass : float
+        Of armature, table and base [kg].
+    """
+
+    model_config = STRICT
+
+    stroke: Annotated[float, quantity("m"), Field(gt=0)]
+    lowest: Annotated[float, quantity("Hz"), Field(ge=0)] = 0.0
+    highest: Annotated[float, quantity("Hz"), Field(gt=0)] | None = None
+    velocity: Annotated[float, quantity("m/s"), Field(gt=0)] | None = None
+    force: Annotated[float, quantity("N"), Field(gt=0)] | None = None
+    moving_mass: Annotated[float, quantity("kg"), Field(ge=0)] = 0.0
+
+
+def _log(value: Any) -> Log:
+    """The experiment's log, from a table of entries."""
+    if isinstance(value, Log):
+        return value
+    if not isinstance(value, Mapping):
+        raise ValueError("a log is a table of entries: surface, lubrication, temperature ...")
+    try:
+        return Log.of(value)
+    except RecordError as error:
+        raise ValueError(printable(f"{error.value}; {error.rule}")) from error
+
+
 class RigSettings(BaseModel):
     """What is known of a rig before any record is read; every entry may be left out.
 
@@ -110,12 +150,19 @@ class RigSettings(BaseModel):
     repair : tuple of str
         Repairs made to every record after reading, in the order given: clock, gaps, missing, spikes, clipping,
         drift; see :func:`mend`.
+    devices : dict of str to dict
+        What measures it, by name: the table that a driver takes, ``kind`` among it.
     time : str or None
         The column that holds the time, where its header does not say so.
     delimiter, decimal : str or None
         Of text files, where they can not be told from the file.
     rows : str or None
         Rows to keep of each file, as "FIRST:LAST".
+    log : Log or None
+        What was written down beside the measurements: surfaces, lubrication, air, load. What a file says of itself
+        goes before it.
+    shaker : ShakerSettings or None
+        What moves the base.
 
     Examples
     --------
@@ -139,10 +186,20 @@ class RigSettings(BaseModel):
         default_factory=dict
     )
     repair: tuple[Annotated[str, BeforeValidator(_repair)], ...] = ()
+    devices: dict[str, dict[str, Any]] = Field(default_factory=dict)
     time: Annotated[str, Field(min_length=1)] | None = None
     delimiter: Annotated[str, Field(min_length=1)] | None = None
     decimal: Literal[".", ","] | None = None
     rows: Annotated[str, BeforeValidator(_row_range)] | None = None
+    log: Annotated[Log, PlainValidator(_log), PlainSerializer(lambda log: log.entries())] | None = None
+    shaker: ShakerSettings | None = None
+
+    def logged(self, record: Record) -> Record:
+        """The record with the log; what it says of itself stays."""
+        if self.log is None:
+            return record
+        own = record.log.entries() if record.log is not None else {}
+        return record.with_log({**self.log.entries(), **own})
 
     def normal_load(self, name: str) -> float | None:
         """The normal load [N] stated for a file of this name; the first pattern that fits decides.
@@ -207,6 +264,9 @@ def read_rig(path: str | Path) -> RigSettings:
             mount = ["125 Hz", 0.1]   # what it stands on: resonance and damping ratio
             [normal]
             "*250g*" = "2.45 N"
+            [log]
+            surface = "steel on steel"
+            temperature = "23 °C"
 
     Returns
     -------

@@ -166,9 +166,8 @@ def synchronise(
         outcome += f"; {estimate.status}"
     step = Step("synchronise", {"on": names, "offset": seconds, "offset_interval": interval, "rate": ratio}, outcome)
     theirs = tuple(Step(s.action, {**s.arguments, "record": "b"}, s.outcome) for s in b.history)
-    return Record(
-        samples, channels, a.fs, part.start, (*part.history, *theirs, step), None, {**b.truth, **a.truth}, part.rig
-    )
+    history, truth = (*part.history, *theirs, step), {**b.truth, **a.truth}
+    return Record(samples, channels, a.fs, part.start, history, None, truth, part.rig, a.log or b.log)
 
 
 def _shared_motion(a: Record, b: Record, on: str | tuple[str, str] | None) -> tuple[str, str]:

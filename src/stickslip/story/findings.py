@@ -12,7 +12,7 @@ import numpy as np
 
 from stickslip.answers.findings import Comparison, Findings
 from stickslip.estimate import Estimate
-from stickslip.story.story import Line, Story
+from stickslip.story.story import Line, Story, logged
 from stickslip.story.words import leading, number
 
 # The file that tells findings which hold a result of this name; friction.py tells all others.
@@ -47,6 +47,7 @@ def of_findings(findings: Findings) -> Story:
         faults=[str(fault) for fault in findings.faults],
         notes=[*findings.notes, *own.notes],
         settings={**own.settings, **load, **length},
+        tables=[*own.tables, *logged(record)],
         channels=list(record.channels.values()),
         history=record.history,
         data=lambda: _data(findings, own),
@@ -79,6 +80,7 @@ def _data(findings: Findings, own: Story) -> dict[str, Any]:
         **own.data(),
         "estimates": [estimate.to_dict() for estimate in findings.estimates],
         "truth": findings.record.truth,
+        "log": findings.record.log.entries() if findings.record.log is not None else {},
         "notes": findings.notes,
         "history": [step.to_dict() for step in findings.record.history],
     }

@@ -8,11 +8,11 @@ from typing import Any, TypeAlias
 
 from stickslip.answers.findings import record_name
 from stickslip.estimate import doubts_of
+from stickslip.figures.law import law_plates
 from stickslip.law.fit_curve import CurveFit
 from stickslip.law.law import LawFit
 from stickslip.law.which_law import LawComparison
 from stickslip.parameters import unit
-from stickslip.plot.law import law_plates
 from stickslip.record.record import Record
 from stickslip.story.law_files import write_law
 from stickslip.story.scope import Scope, of_fit

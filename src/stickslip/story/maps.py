@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.plot.maps import plates_of
-from stickslip.plot.plate import Plate
+from stickslip.figures.maps import plates_of
+from stickslip.figures.plate import Plate
 from stickslip.solve.tables import System
 from stickslip.story.story import Story, Table
 

@@ -6,12 +6,12 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any
 
+from stickslip.figures.bifurcation import plot_basins, plot_bifurcation, plot_boundary, plot_dither
+from stickslip.figures.plate import plate
 from stickslip.maps.basins import Basins
 from stickslip.maps.bifurcation import Bifurcation
 from stickslip.maps.boundaries import Boundary
 from stickslip.maps.dither import Dither
-from stickslip.plot.bifurcation import plot_basins, plot_bifurcation, plot_boundary, plot_dither
-from stickslip.plot.plate import plate
 from stickslip.story.story import Story
 
 

@@ -8,11 +8,11 @@ from pathlib import Path
 
 from stickslip.answers.experiment import ExperimentPlan
 from stickslip.answers.findings import record_name
+from stickslip.figures.experiment import plot_plan
+from stickslip.figures.plate import plate
 from stickslip.files.write import require_form, write_record
-from stickslip.plot.experiment import plot_plan
-from stickslip.plot.plate import plate
 from stickslip.record.record import Record
-from stickslip.story.story import Story, Table
+from stickslip.story.story import Story, Table, logged
 
 CAPTION = "Root-mean-square error against the sampling rate, for each choice of sensors."
 
@@ -28,7 +28,7 @@ def of_record(record: Record, *, form: str = "csv") -> Story:
 
     return Story.of_record(
         record_name(record), record, headline=[repr(record)], faults=faults,
-        tables=[Table("What is true", ("what is true", "SI"), true)] if true else [],
+        tables=[*([Table("What is true", ("what is true", "SI"), true)] if true else []), *logged(record)],
         data=lambda: {"fs": record.fs, "truth": dict(record.truth), "faults": faults}, write=write,
     )  # fmt: skip
 

@@ -14,15 +14,14 @@ from stickslip.answers.findings import Findings
 from stickslip.balance.motion import is_measured
 from stickslip.consistent.checks import Slip
 from stickslip.errors import StickslipError
+from stickslip.figures.contact import across
+from stickslip.figures.style import Array, envelope, prefixed, spelled
 from stickslip.files.expression import split_spec, times
-from stickslip.plot.contact import across
-from stickslip.plot.style import Array, envelope, prefixed, spelled
 from stickslip.printing import printable
 from stickslip.record.record import RIG_UNITS, Record
 from stickslip.rig.rig import Rig
 from stickslip.rig.sensor import Digitiser, Noise, Sensor
 from stickslip.statistics import follows
-from stickslip.story.words import REPAIRS
 from stickslip.twin.belief import Belief
 
 DETAILED = 12_000  # samples that the page holds one by one; of the others the least and the most of each column
@@ -269,7 +268,7 @@ def _asked(
             words += [word for name, value in told.items() for word in (f"--{option}", f"{name}={value}")]
         elif told is not None:
             words += [f"--{option}", f"{told:.12g}" if isinstance(told, float) else str(told)]
-    repairs = [REPAIRS[step.action] for step in record.history if step.action in REPAIRS]
+    repairs = [step.repair for step in record.history if step.repair]
     words += ["--repair", ",".join(dict.fromkeys(repairs))] if repairs else []
     return [*words, *options]
 

@@ -13,11 +13,8 @@ import numpy as np
 
 from stickslip import scenarios
 from stickslip.errors import ModelError
-from stickslip.files.write import require_form, write_record
-from stickslip.laws.formula import Formula
-from stickslip.parameters import PARTS
-from stickslip.plot.plate import Plate
-from stickslip.plot.trajectory import (
+from stickslip.figures.plate import Plate
+from stickslip.figures.trajectory import (
     contacts_of,
     cycle_of,
     kinds_of,
@@ -28,6 +25,9 @@ from stickslip.plot.trajectory import (
     pressed,
     sampled,
 )  # fmt: skip
+from stickslip.files.write import require_form, write_record
+from stickslip.laws.formula import Formula
+from stickslip.parameters import PARTS
 from stickslip.record.record import RIG_UNITS
 from stickslip.solve.curved import CurvedTrajectory
 from stickslip.solve.energies import energy
@@ -144,7 +144,7 @@ def of_outcome(
         write_record(run.record(fs=rate), folder / f"record.{form}")
         _write_events(run, folder / "events.csv")
         if animation is not None:
-            from stickslip.plot.animation import animate
+            from stickslip.figures.animation import animate
 
             animate(run, folder / f"animation.{animation}", tell=lambda n, of: tell("animating", 3 + n / of))
         if sound:
@@ -281,7 +281,7 @@ def require_output(
 def _require_record(case: Case, fs: float | None, form: str, animation: str | None) -> None:
     require_form(form)
     if animation is not None:
-        from stickslip.plot.animation import require_writer
+        from stickslip.figures.animation import require_writer
 
         require_writer(f".{animation}")
     rate = fs or case.fs

@@ -1,0 +1,15 @@
+from stickslip.bench.device import Block as Block
+from stickslip.bench.device import Device as Device
+from stickslip.bench.device import Found as Found
+from stickslip.bench.device import Input as Input
+from stickslip.bench.device import Output as Output
+from stickslip.bench.device import Stream as Stream
+from stickslip.bench.device import Tone as Tone
+from stickslip.bench.device import blocks as blocks
+from stickslip.bench.device import devices as devices
+from stickslip.bench.device import find_device as find_device
+from stickslip.bench.device import in_si as in_si
+from stickslip.bench.sim import Fault as Fault
+from stickslip.bench.sim import Sim as Sim
+
+__all__: list[str]
