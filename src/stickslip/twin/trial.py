@@ -208,7 +208,7 @@ def try_on_twins(
     bounded = {name: answer.within(*BOUNDS.get(name, (0.0, math.inf))) for name, answer in tried.items()}
     felt = {**_powers(belief), SHARE: _share_felt(bounded.get(SHARE))}
     if (share := felt[SHARE]) is not None and not share.claimed:
-        bounded[SHARE] = _among(bounded[SHARE], [-bounded[SHARE].value])
+        bounded[SHARE] = _among(bounded[SHARE], [-bounded[SHARE].value]).within(*BOUNDS[SHARE])
     return Trial(count, belief, bounded, felt, misfit.strays)
 
 
