@@ -202,7 +202,7 @@ def test_the_share_that_sticks_is_told_as_its_interval(demo: Findings) -> None:
     assert demo.sticks is not None
     share = Estimate("stuck share of the time", 0.332, (0.26, 0.334), 0.02, "1", "")
     told = " ".join(summary(demo.having(sticks=replace(demo.sticks, share=share))).headline)
-    assert "it seems to stick 26 to 33 % of the time" in told
+    assert "it sticks 26 to 33 % of the time" in told
 
 
 def test_directions_that_differ_are_told_of_a_regression_too() -> None:

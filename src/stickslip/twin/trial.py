@@ -51,7 +51,7 @@ EITHER = (-math.inf, math.inf)
 BOUNDS = {FALL: EITHER, OFFSET: EITHER, SHARE: (0.0, 1.0), RATIO: (1.0, math.inf)}  # of others: zero and more
 ASKED = (*DIRECTIONS, OFFSET, ENERGY, SHARE, STOPS)
 # What moves an answer where the zero of a sensor, and no friction, sets the directions apart: so many times the offset.
-ZERO = {OFFSET: -1.0, DIRECTIONS[0]: -1.0, DIRECTIONS[1]: 1.0, STATIC[0]: 1.0, STATIC[1]: -1.0}
+ZERO = {OFFSET: -1.0, STATIC[0]: 1.0, STATIC[1]: -1.0}  # of sliding, it is the level then
 SIZES = tuple(1e-4 * 1.4**step for step in range(30))  # of friction, or of the motion: parts looked for, to two fifths
 STICKS = ("stick", "microstick")  # kinds of event
 ANSWERED = 0.5  # of the twins, that must answer a question for the record's answer to be tried on them
@@ -205,6 +205,8 @@ def try_on_twins(
             tried[name] = _among(_fitted(answers[name], value, belief, twins, misfit), _apart(belief, value))
     apart = tried[OFFSET].value if OFFSET in tried else 0.0
     tried |= {name: _among(tried[name], [times * apart]) for name, times in ZERO.items() if name in tried}
+    if LEVEL in tried and tried[LEVEL].known:
+        tried |= {name: _holding(tried[name], tried[LEVEL].interval) for name in DIRECTIONS if name in tried}
     bounded = {name: answer.within(*BOUNDS.get(name, (0.0, math.inf))) for name, answer in tried.items()}
     felt = {**_powers(belief), SHARE: _share_felt(bounded.get(SHARE))}
     if (share := felt[SHARE]) is not None and not share.claimed:
@@ -370,6 +372,11 @@ def _counted(belief: Belief, frequency: float) -> dict[str, list[float]]:
     # a contact that gives way holds at each reversal: that is no stop of one that does not
     alike = [other for other, stops in zip(others, rigid, strict=True) if stops or {GIVE, RATE} & belief.values.keys()]
     return {name: [one[name] - true[name] for one in (alike if name in (SHARE, STOPS) else others)] for name in ASKED}
+
+
+def _holding(answer: Estimate, interval: tuple[float, float]) -> Estimate:
+    """The answer with an interval that holds another one."""
+    return _among(answer, [here - own for here, own in zip(interval, answer.interval, strict=True)])
 
 
 def _among(answer: Estimate, apart: list[float]) -> Estimate:
