@@ -205,6 +205,8 @@ def try_on_twins(
             tried[name] = _among(_fitted(answers[name], value, belief, twins, misfit), _apart(belief, value))
     apart = tried[OFFSET].value if OFFSET in tried else 0.0
     tried |= {name: _among(tried[name], [times * apart]) for name, times in ZERO.items() if name in tried}
+    if ENERGY in tried:
+        tried[ENERGY] = _among(tried[ENERGY], [-_work_of_drift(belief, frequency), _work_of_drift(belief, frequency)])
     if LEVEL in tried and tried[LEVEL].known:
         tried |= {name: _holding(tried[name], tried[LEVEL].interval) for name in DIRECTIONS if name in tried}
     bounded = {name: answer.within(*BOUNDS.get(name, (0.0, math.inf))) for name, answer in tried.items()}
@@ -372,6 +374,13 @@ def _counted(belief: Belief, frequency: float) -> dict[str, list[float]]:
     # a contact that gives way holds at each reversal: that is no stop of one that does not
     alike = [other for other, stops in zip(others, rigid, strict=True) if stops or {GIVE, RATE} & belief.values.keys()]
     return {name: [one[name] - true[name] for one in (alike if name in (SHARE, STOPS) else others)] for name in ASKED}
+
+
+def _work_of_drift(belief: Belief, frequency: float) -> float:
+    """What the drift of x's sensor, which twins have not, may add to the work of a cycle that does not close [J]."""
+    x, moved = belief.record["x"], belief.moved
+    line = x - moved - belief.residual
+    return belief.stated.stiffness * float(np.ptp(line)) / (belief.record.duration * frequency) * float(np.ptp(x)) / 2
 
 
 def _holding(answer: Estimate, interval: tuple[float, float]) -> Estimate:
