@@ -9,7 +9,7 @@ import pytest
 
 import stickslip as ss
 from motions import free_decay
-from stickslip.answers.decay_comparison import _apart
+from stickslip.answers.decays import _apart
 
 
 def record(seed, **motion):

@@ -4,15 +4,23 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from stickslip.errors import FormatError, ModelError
-from stickslip.files.table import optional
-from stickslip.record.metadata import KEY, record_to_metadata, time_column
+from stickslip.files.table import Table, optional
+from stickslip.record.metadata import (
+    BEGINS,
+    KEY,
+    Digests,
+    described_beside,
+    record_to_metadata,
+    time_column,
+    units_told,
+)
 from stickslip.record.record import Record, require_record
 from stickslip.whole import whole_file
 
@@ -24,9 +32,9 @@ ROWS_AT_ONCE = 200_000
 def write_record(record: Record, path: str | Path, *, overwrite: bool = False) -> Path:
     """Write a record, with its channels, clock, history and truth, so that read_record gives it back exactly.
 
-    The format follows the suffix: ``.csv`` (a comment line of JSON, then ``name [unit]`` headers),
-    ``.h5``/``.hdf5`` (one dataset a channel) or ``.parquet``. Time [s] is written as a column of its own, for
-    other programs. The file appears whole or not at all.
+    The format follows the suffix: ``.csv`` (plain, with ``name [unit]`` headers, as Excel and pandas read it; history
+    and truth in ``NAME.csv.json`` beside it), ``.h5``/``.hdf5`` (one dataset a channel) or ``.parquet``. Time [s] is
+    written as a column of its own, for other programs. The file appears whole or not at all.
 
     Parameters
     ----------
@@ -65,12 +73,17 @@ def write_record(record: Record, path: str | Path, *, overwrite: bool = False) -
             f"a record is written as {', '.join(WRITERS)}",
             "choose one of these endings",
         )
-    if not overwrite:
-        require_free(path)
+    beside = [described_beside(path)] if writer is _write_csv else []
+    for file in () if overwrite else (path, *beside):
+        require_free(file)
     columns = {time_column(record): ("s", record.time)}
     columns |= {name: (record.channels[name].unit, values) for name, values in record.samples.items()}
-    with whole(path, replace=overwrite) as part:
-        writer(part, columns, json.dumps(record_to_metadata(record)))
+    metadata = json.dumps(record_to_metadata(record))
+    with ExitStack() as files:
+        part = files.enter_context(whole(path, replace=overwrite))
+        for file in beside:  # there first: numbers without history are read as they are, not the other way round
+            files.enter_context(whole(file, replace=overwrite)).write_text(f"{BEGINS}{metadata}}}\n", "utf-8")
+        writer(part, columns, metadata)
     return path
 
 
@@ -105,11 +118,10 @@ def _taken(path: Path) -> FormatError:
 Columns = dict[str, tuple[str, Array]]
 
 
-def _write_csv(path: Path, columns: Columns, metadata: str) -> None:
+def _write_csv(path: Path, columns: Columns, _: str) -> None:
     import pandas as pd
 
     with path.open("w", encoding="utf-8", newline="") as file:
-        file.write(f"# {KEY} {metadata}\n")
         file.write(",".join(f"{name} [{unit}]" for name, (unit, _) in columns.items()) + "\n")
         rows = len(next(iter(columns.values()))[1])
         for first in range(0, rows, ROWS_AT_ONCE):
@@ -124,6 +136,43 @@ def _write_hdf5(path: Path, columns: Columns, metadata: str) -> None:
         file.attrs[KEY] = metadata
         for name, (unit, values) in columns.items():
             file.create_dataset(name, data=values).attrs["unit"] = unit
+
+
+def write_table(table: Table, path: Path) -> Path:
+    """A described table of any length as HDF5, block by block: what a journal becomes.
+
+    Parameters
+    ----------
+    table : Table
+        With the description of the record, of a journal.
+    path : Path
+        Where to; ends in .h5 or .hdf5.
+
+    Returns
+    -------
+    Path
+
+    Raises
+    ------
+    FormatError
+        The file is there already, or the disk can not be written.
+    """
+    h5py = optional("h5py")
+    require_free(path)
+    units, sums = units_told(table.record), Digests()
+    rows = int(table.record["rows"])
+    with whole(path, replace=False) as part, h5py.File(part, "w", libver="latest") as file:
+        for name, unit in units.items():
+            file.create_dataset(name, shape=(rows,), dtype="<f8").attrs["unit"] = unit
+        first = 0
+        for block in table.blocks(list(units), ROWS_AT_ONCE):
+            count = len(next(iter(block.values())))
+            for name, values in block.items():
+                file[name][first : first + count] = values
+            sums.add(block)
+            first += count
+        file.attrs[KEY] = json.dumps({**table.record, "sha256": sums.told()})
+    return path
 
 
 def _write_parquet(path: Path, columns: Columns, metadata: str) -> None:

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from stickslip.errors import EstimateError, ModelError
 from stickslip.estimate import NORMAL_95, Doubt, Estimate, Result, Status
-from stickslip.law.guess import Seen
 from stickslip.law.law import LawFit, answered
 from stickslip.law.search import descend
 from stickslip.law.start import CALIBRATION, Shown, require_apart, seen_damping, too_few, usual_nuisance
@@ -20,6 +19,7 @@ from stickslip.law.stretch import Stretch, channels_of
 from stickslip.law.surety import CALIBRATIONS, Evidence, Misfit, Standing, standings, surety, times, undescribed
 from stickslip.law.trials import (
     PASSES,
+    Seen,
     Trial,
     evidence_of,
     resumed,

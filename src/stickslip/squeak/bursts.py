@@ -569,7 +569,7 @@ def _of_one_contact(bursts: list[Squeak]) -> list[Squeak]:
     """The bursts, those that sound alone made likely to be friction's only where the whole record is like a contact."""
     claimed = [burst for burst in bursts if burst.friction == "likely" and burst.kind in ("squeak", "squeal")]
     alone = [burst for burst in claimed if math.isnan(burst.speed)]
-    why = _unlike_a_contact(bursts) if alone else ""
+    why = _unlike_a_contact(bursts, len(alone)) if alone else ""
     if not why:
         return bursts
     words = f"of sound alone: {why}"
@@ -579,7 +579,7 @@ def _of_one_contact(bursts: list[Squeak]) -> list[Squeak]:
     ]
 
 
-def _unlike_a_contact(bursts: list[Squeak]) -> str:
+def _unlike_a_contact(bursts: list[Squeak], claimed: int) -> str:
     """Why the tones of a record may be those of an instrument, a drive or a signal; empty where they are a contact's.
 
     A contact squeaks at one pitch, each time for as long as it happens to; notes differ in pitch, signals come at even
@@ -592,6 +592,8 @@ def _unlike_a_contact(bursts: list[Squeak]) -> str:
         return "it has several pitches, as an instrument, a voice or a bird has"
     if max(each.duration for each in tones) > GOES_ON:
         return f"it goes on for more than {GOES_ON:g} s, as a drive or a whistle does"
+    if 2 * claimed <= len(tones):
+        return "most of its tones lack what those of a rubbing contact have"
     gaps = np.diff([each.start for each in tones])
     if len(gaps) > 1 and np.ptp(gaps) < EVENLY:
         return "its bursts come at even intervals, as those of a signal do"

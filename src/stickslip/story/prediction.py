@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from stickslip.answers.predictions import Prediction, Predictions
+from stickslip.answers.fits import Prediction, Predictions
 from stickslip.estimate import UNKNOWN
 from stickslip.figures.law import law_plates
 from stickslip.story.scope import Panel, Scope, command_of

@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 
 from stickslip.answers.findings import Comparison, Findings
-from stickslip.answers.squeak_comparison import Condition
-from stickslip.answers.squeaks import trend_of
+from stickslip.answers.squeaks import Condition, trend_of
 from stickslip.estimate import Estimate, decimals, doubts_of
 from stickslip.figures.squeak import plates_of, plates_together
 from stickslip.squeak.bursts import WORDS, Squeak, Squeaks
@@ -38,10 +37,12 @@ def of_findings(findings: Findings) -> Story:
 def of_comparison(comparison: Comparison) -> Story:
     """Several conditions; each by itself on the page, and in a line of the terminal."""
     return Story(
-        f"{len(comparison.conditions)} conditions compared", comparison.verdicts,
+        f"{len(comparison.conditions)} conditions compared",
+        comparison.verdicts,
         tables=[Table("Conditions", *_condition_table(comparison))],
-        draw=lambda: plates_together(comparison), data=lambda: _together(comparison),
-    )  # fmt: skip
+        draw=lambda: plates_together(comparison),
+        data=lambda: _together(comparison),
+    )
 
 
 def _data(found: Findings) -> dict[str, Any]:
