@@ -8,8 +8,7 @@ from dataclasses import replace
 from functools import partial
 from typing import Any, TypeVar
 
-from stickslip.answers.findings import Findings
-from stickslip.answers.questions import BY_FORCE, ONSETS, flagged, without
+from stickslip.answers.findings import BY_FORCE, ONSETS, Findings, flagged, without
 from stickslip.balance.force import friction_force
 from stickslip.cycle.before_slip import Presliding, presliding
 from stickslip.cycle.loops import Loops, friction_loops

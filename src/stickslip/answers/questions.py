@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from functools import cache, partial
 from typing import Any
 
 import numpy as np
 
 from stickslip.answers.asked import Asked
-from stickslip.answers.findings import Findings, record_name
+from stickslip.answers.findings import BY_FORCE, NOT_TRIED, ONSETS, Findings, flagged, record_name, with_doubt
 from stickslip.answers.preparation import (
     AT_ONCE,
     CONSTANTS,
@@ -35,20 +35,13 @@ from stickslip.cycle.onset import breakaway
 from stickslip.cycle.regression import regress_friction
 from stickslip.cycle.sticks import find_sticks
 from stickslip.errors import EstimateError, StickslipError
-from stickslip.estimate import UNTRIED, Constant, Doubt, Estimate, Status, doubts_of, stands
+from stickslip.estimate import Constant, Doubt, Status
 from stickslip.record.flaws import constant
 from stickslip.record.record import Record, require_record
 from stickslip.rig.settings import RigSettings
 from stickslip.twin.search import lacking
 
 STRETCH = 1 << 14  # samples in which the contact is fitted
-BY_FORCE = (
-    "loops", "breakaway", "stiffness", "contact_damping", "transition", "coupled", "cause", "presliding",
-)  # fmt: skip
-DRIVEN = "forcing frequency"  # no matter of friction
-NOT_TRIED = Doubt("not tried on twins: rigs that never stick, that slide at one level or on a rigid contact may seem "
-                  "to do so as well", UNTRIED)  # fmt: skip
-ONSETS = ("sticks", "breakaway", "presliding")  # when it sticks, and what it does until it slips
 BALANCED = ("balance", "energy")  # checks that a wrong mass, spring or sensor fails
 GOES_ON = 0.8  # of the motion at first that is left at last, where something drives it
 NO_BASE = "there is no channel z: the base is taken to be at rest, but something keeps the motion up"
@@ -331,45 +324,7 @@ def _reasons(
 
 def untried(answers: dict[str, Any]) -> dict[str, Any]:
     """The answers, with a doubt at those that rigs of another kind give too."""
-    return {**answers, **{key: _with(answers.get(key), NOT_TRIED) for key in ONSETS}}
-
-
-def without(found: Any, kind: str) -> Any:
-    """An answer without doubts of a kind."""
-
-    def left(number: Estimate) -> Estimate:
-        return replace(number, status=Status(*(each for each in doubts_of(number.status) if each.kind != kind)))
-
-    return _each(found, left)
-
-
-def _with(found: Any, doubt: Doubt) -> Any:
-    return _each(found, lambda number: replace(number, status=Status(number.status, doubt)))
-
-
-def _each(found: Any, change: Callable[[Estimate], Estimate]) -> Any:
-    """An answer with each of its numbers changed, but for that of the drive."""
-    if found is None:
-        return None
-    numbers = {each.name: getattr(found, each.name) for each in fields(found)}
-    return replace(
-        found,
-        **{
-            name: change(value)
-            for name, value in numbers.items()
-            if isinstance(value, Estimate) and value.name != DRIVEN
-        },
-    )
-
-
-def flagged(found: Any, reason: Doubt | str) -> Any:
-    """An answer with each of its numbers flagged that was thought to be sure; that of the drive stays sure."""
-    if isinstance(found, Estimate):
-        lesser = stands(found.status)
-        if found.name == DRIVEN or not (lesser or not found.known):
-            return found
-        return replace(found, status=Status(reason) if lesser else Status(reason, found.status))
-    return _each(found, lambda number: flagged(number, reason))
+    return {**answers, **{key: with_doubt(answers.get(key), NOT_TRIED) for key in ONSETS}}
 
 
 def _contradiction(told: Consistency | None) -> str:
