@@ -64,7 +64,7 @@ def statistics(run: Trajectory) -> Statistics:
     >>> decay = simulate(Oscillator(mass=1, stiffness=4, law=laws.Coulomb(1.0)), duration=10, start={"x": 1.25})
     >>> told = statistics(decay)
     >>> told.pieces, told.events, told.slowest_exit
-    (4, 2, 1.0)
+    (3, 2, 1.0)
     """
     _, widths = run.cells
     leaps, slowest = 0, math.nan

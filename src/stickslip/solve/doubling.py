@@ -8,9 +8,10 @@ from stickslip.errors import ModelError
 from stickslip.solve.continuation import Branch
 from stickslip.solve.orbit import SteadyState, alike
 from stickslip.solve.periodic import closed_orbit
-from stickslip.solve.poincare import derivative, tables
+from stickslip.solve.poincare import derivative, lap, tables
 
 PUSHES = (0.01, 0.03, 0.1, 0.3, 0.003)  # of the orbit's size, along the direction that turns over in each period
+LAPS = 64  # periods of the new orbit in which the motion itself goes near it, where it is stable
 
 
 def period_doublings(branch: Branch) -> tuple[int, ...]:
@@ -93,9 +94,11 @@ def doubled(orbit: SteadyState) -> SteadyState:
     for push in (sign * push for push in PUSHES for sign in (1, -1)):
         state = run.states[0].copy()
         state[: table.physical] += push * direction
-        found = closed_orbit(run.system, table, state, int(run.modes[0]), 2 * orbit.order)
-        if found is not None and found.order == 2 * orbit.order and not alike(found, orbit):
-            return found
+        near = lap(run.system, table, state, int(run.modes[0]), 2 * orbit.order * LAPS).end()
+        for place, mode in ((state, int(run.modes[0])), near):
+            found = closed_orbit(run.system, table, place, mode, 2 * orbit.order)
+            if found is not None and found.order == 2 * orbit.order and not alike(found, orbit):
+                return found
     raise ModelError(
         f"no orbit of {2 * orbit.order} periods beside the one of {orbit.order}",
         "a period doubling sends one off, to one side",
