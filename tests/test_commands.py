@@ -43,12 +43,12 @@ def ask(*words: str) -> Result:
 
 
 def test_stability_names_what_feeds_the_vibration() -> None:
-    told = json.loads(ask("stability", "SHAW-1 b=1.3 below", "--json").stdout)
-    scenario = ss.scenarios.get("SHAW-1 b=1.3 below")
+    told = json.loads(ask("stability", "MC-2 eta=0.02,0.06", "--json").stdout)
+    scenario = ss.scenarios.get("MC-2 eta=0.02,0.06")
     found = ss.stability(scenario.system)
     assert (told["stable"], told["mechanism"]) == (found.stable, found.mechanism)
     assert told["growth"] == pytest.approx(found.growth)
-    text = ask("stability", "SHAW-1 b=1.3 below", "--output", "out").stdout
+    text = ask("stability", "MC-2 eta=0.02,0.06", "--output", "out").stdout
     assert f"Steady sliding is {'stable' if found.stable else 'unstable'}" in text
     assert Path("out/report.html").is_file()
 

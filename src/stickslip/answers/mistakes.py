@@ -60,7 +60,7 @@ def _late(record: Record, rig: RigSettings, loops: Loops | None) -> Slip | None:
     return Slip(words, delays={name: MILLISECONDS * late for name, late in far.items()})
 
 
-def lacking(record: Record, rig: RigSettings) -> tuple[str, ...]:
+def missing(record: Record, rig: RigSettings) -> tuple[str, ...]:
     """What must be stated before a friction force can be found; nothing where one is read or found."""
     if not {"friction", "load", "force"}.isdisjoint(record) or "x" not in record:
         return ()
