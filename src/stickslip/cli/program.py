@@ -7,8 +7,10 @@ from typing import Any
 import click
 
 import stickslip as ss
+from stickslip.cli.acquire import acquire
 from stickslip.cli.analyze import analyze, demo
 from stickslip.cli.decay import decay
+from stickslip.cli.devices import devices
 from stickslip.cli.exchange import check, convert, datasets
 from stickslip.cli.fit import fit
 from stickslip.cli.interrupted import INTERRUPTED, SENTENCE
@@ -72,12 +74,14 @@ def main() -> None:
 
 
 for _command in (
+    acquire,
     analyze,
     check,
     convert,
     datasets,
     decay,
     demo,
+    devices,
     fit,
     lab,
     predict,
