@@ -9,6 +9,10 @@ from stickslip.bench.device import blocks as blocks
 from stickslip.bench.device import devices as devices
 from stickslip.bench.device import find_device as find_device
 from stickslip.bench.device import in_si as in_si
+from stickslip.bench.monitor import Cycle as Cycle
+from stickslip.bench.monitor import Flaw as Flaw
+from stickslip.bench.monitor import Monitor as Monitor
+from stickslip.bench.monitor import answers as answers
 from stickslip.bench.recording import Acquired as Acquired
 from stickslip.bench.recording import Tape as Tape
 from stickslip.bench.recording import Trigger as Trigger
