@@ -2,6 +2,7 @@ from stickslip.rig.sensor import Digitiser as Digitiser
 from stickslip.rig.sensor import Mount as Mount
 from stickslip.rig.sensor import Noise as Noise
 from stickslip.rig.sensor import Sensor as Sensor
+from stickslip.rig.settings import CommissionSettings as CommissionSettings
 from stickslip.rig.settings import RigSettings as RigSettings
 from stickslip.rig.settings import ShakerSettings as ShakerSettings
 from stickslip.rig.settings import read_rig as read_rig

@@ -1,0 +1,29 @@
+from stickslip.bench.at_rest import AtRest as AtRest
+from stickslip.bench.at_rest import SensorAtRest as SensorAtRest
+from stickslip.bench.at_rest import at_rest as at_rest
+from stickslip.bench.calibration import Calibration as Calibration
+from stickslip.bench.calibration import SpringByWeights as SpringByWeights
+from stickslip.bench.calibration import calibrate as calibrate
+from stickslip.bench.calibration import spring_by_weights as spring_by_weights
+from stickslip.bench.walk import Commissioned as Commissioned
+from stickslip.bench.walk import commission as commission
+from stickslip.bench.discharge import DischargeTest as DischargeTest
+from stickslip.bench.discharge import discharge_test as discharge_test
+from stickslip.bench.free import FreeVibration as FreeVibration
+from stickslip.bench.free import MassAndSpring as MassAndSpring
+from stickslip.bench.free import OntoStick as OntoStick
+from stickslip.bench.free import added_mass as added_mass
+from stickslip.bench.free import best_constants as best_constants
+from stickslip.bench.free import free_vibration as free_vibration
+from stickslip.bench.free import onto_stick as onto_stick
+from stickslip.bench.frequency_response import FrequencyResponse as FrequencyResponse
+from stickslip.bench.frequency_response import ModalFit as ModalFit
+from stickslip.bench.frequency_response import frequency_response as frequency_response
+from stickslip.bench.frequency_response import modal_fit as modal_fit
+from stickslip.bench.known import Known as Known
+from stickslip.bench.shaker import Shaker as Shaker
+from stickslip.bench.simulated import SimulatedBench as SimulatedBench
+from stickslip.bench.steps import STEPS as STEPS
+from stickslip.bench.steps import BenchStep as BenchStep
+
+__all__: list[str]
