@@ -5,8 +5,17 @@ from stickslip.bench.calibration import Calibration as Calibration
 from stickslip.bench.calibration import SpringByWeights as SpringByWeights
 from stickslip.bench.calibration import calibrate as calibrate
 from stickslip.bench.calibration import spring_by_weights as spring_by_weights
-from stickslip.bench.walk import Commissioned as Commissioned
-from stickslip.bench.walk import commission as commission
+from stickslip.bench.device import Block as Block
+from stickslip.bench.device import Device as Device
+from stickslip.bench.device import Found as Found
+from stickslip.bench.device import Input as Input
+from stickslip.bench.device import Output as Output
+from stickslip.bench.device import Stream as Stream
+from stickslip.bench.device import Tone as Tone
+from stickslip.bench.device import blocks as blocks
+from stickslip.bench.device import devices as devices
+from stickslip.bench.device import find_device as find_device
+from stickslip.bench.device import in_si as in_si
 from stickslip.bench.discharge import DischargeTest as DischargeTest
 from stickslip.bench.discharge import discharge_test as discharge_test
 from stickslip.bench.free import FreeVibration as FreeVibration
@@ -22,8 +31,12 @@ from stickslip.bench.frequency_response import frequency_response as frequency_r
 from stickslip.bench.frequency_response import modal_fit as modal_fit
 from stickslip.bench.known import Known as Known
 from stickslip.bench.shaker import Shaker as Shaker
+from stickslip.bench.sim import Fault as Fault
+from stickslip.bench.sim import Sim as Sim
 from stickslip.bench.simulated import SimulatedBench as SimulatedBench
 from stickslip.bench.steps import STEPS as STEPS
 from stickslip.bench.steps import BenchStep as BenchStep
+from stickslip.bench.walk import Commissioned as Commissioned
+from stickslip.bench.walk import commission as commission
 
 __all__: list[str]

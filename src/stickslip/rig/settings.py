@@ -180,6 +180,8 @@ class RigSettings(BaseModel):
     repair : tuple of str
         Repairs made to every record after reading, in the order given: clock, gaps, missing, spikes, clipping,
         drift; see :func:`mend`.
+    devices : dict of str to dict
+        What measures it, by name: the table that a driver takes, ``kind`` among it.
     time : str or None
         The column that holds the time, where its header does not say so.
     delimiter, decimal : str or None
@@ -216,6 +218,7 @@ class RigSettings(BaseModel):
         default_factory=dict
     )
     repair: tuple[Annotated[str, BeforeValidator(_repair)], ...] = ()
+    devices: dict[str, dict[str, Any]] = Field(default_factory=dict)
     time: Annotated[str, Field(min_length=1)] | None = None
     delimiter: Annotated[str, Field(min_length=1)] | None = None
     decimal: Literal[".", ","] | None = None
