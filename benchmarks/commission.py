@@ -2,7 +2,7 @@
 
     python benchmarks/commission.py --rigs 100
 
-Every rig has mass, spring, damper, contact, gains, zeros, lags, noise, mounts and discharge of its own, drawn at random.
+Every rig has mass, spring, damper, contact, gains, zeros, lags, noise, mounts and discharge of its own, at random.
 """
 
 from __future__ import annotations

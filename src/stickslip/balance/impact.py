@@ -73,8 +73,9 @@ def impact_test(record: Record, *, mass: Constant | None = None) -> ImpactTest:
     r"""Which resonances does a hammer tap excite, and which sensor shows them?
 
     The thesis's section 2.5: the base held, the contact engaged, a tap on the mass. After it every channel is a sum
-    of the same decaying oscillations, :math:`\sum_j \mathrm{Re}\, c_j e^{p_j t}`, and a straight line; the poles come from
-    the matrix pencil (Hua and Sarkar 1990) of all channels together and are refined by least squares, with intervals.
+    of the same decaying oscillations, :math:`\sum_j \mathrm{Re}\, c_j e^{p_j t}`, and a straight line; the poles come
+    from the matrix pencil (Hua and Sarkar 1990) of all channels together and are refined by least squares, with
+    intervals.
 
     A mode that both sensors show, the force as large against the acceleration as the mass says and opposed to it, is
     the contact's, coupled with the mass; one that only the accelerometer shows, or shows larger than that, is its

@@ -1,6 +1,3 @@
-from stickslip.bench.at_rest import AtRest as AtRest
-from stickslip.bench.at_rest import SensorAtRest as SensorAtRest
-from stickslip.bench.at_rest import at_rest as at_rest
 from stickslip.bench.calibration import Calibration as Calibration
 from stickslip.bench.calibration import SpringByWeights as SpringByWeights
 from stickslip.bench.calibration import calibrate as calibrate
@@ -25,11 +22,14 @@ from stickslip.bench.free import added_mass as added_mass
 from stickslip.bench.free import best_constants as best_constants
 from stickslip.bench.free import free_vibration as free_vibration
 from stickslip.bench.free import onto_stick as onto_stick
-from stickslip.bench.frequency_response import FrequencyResponse as FrequencyResponse
-from stickslip.bench.frequency_response import ModalFit as ModalFit
-from stickslip.bench.frequency_response import frequency_response as frequency_response
-from stickslip.bench.frequency_response import modal_fit as modal_fit
 from stickslip.bench.known import Known as Known
+from stickslip.bench.response import FrequencyResponse as FrequencyResponse
+from stickslip.bench.response import ModalFit as ModalFit
+from stickslip.bench.response import frequency_response as frequency_response
+from stickslip.bench.response import modal_fit as modal_fit
+from stickslip.bench.rest import AtRest as AtRest
+from stickslip.bench.rest import SensorAtRest as SensorAtRest
+from stickslip.bench.rest import at_rest as at_rest
 from stickslip.bench.shaker import Shaker as Shaker
 from stickslip.bench.sim import Fault as Fault
 from stickslip.bench.sim import Sim as Sim

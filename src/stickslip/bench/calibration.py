@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -107,7 +108,7 @@ def calibrate(
     if leaks:
         known, read = np.diff(values), jumps(holds)
         design = known[:, None]
-        weight_sd = np.array([math.hypot(a.sd, b.sd) for a, b in zip(holds[:-1], holds[1:], strict=True)])
+        weight_sd = np.array([math.hypot(a.sd, b.sd) for a, b in itertools.pairwise(holds)])
     else:
         known, read = values, np.array([hold.level for hold in holds])
         design = np.column_stack([known, np.ones(len(known))])
@@ -153,7 +154,7 @@ def _line(design: Array, read: Array, read_sd: Array) -> tuple[Array, Array, Arr
     freedom = max(1, len(read) - design.shape[1])
     scatter, chance = math.sqrt(float(left @ left) / freedom), math.sqrt(float(np.mean(read_sd**2)))
     sd = max(scatter, chance) * np.sqrt(np.diag(np.linalg.inv(design.T @ design)))
-    return fit, sd, left, student(float(freedom))
+    return np.asarray(fit, dtype=float), sd, left, student(float(freedom))
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -15,6 +15,7 @@ from stickslip.record.record import Record
 from stickslip.statistics import mean_uncertainty, student
 
 Array = NDArray[np.float64]
+Rows = NDArray[np.bool_]
 
 QUESTION = "a discharge test"
 BLOCKS = 300  # to which the record is reduced
@@ -77,8 +78,9 @@ def discharge_test(record: Record, *, channel: str = "load") -> DischargeTest:
     Examples
     --------
     >>> t = np.arange(60_000) / 1000
-    >>> load = np.where(t > 10, 5 * np.exp(-(t - 10) / 50), 0) + 0.002 * np.random.default_rng(1).standard_normal(t.size)
-    >>> discharge_test(Record.of({"load": load}, fs=1000)).time_constant.includes(50)
+    >>> load = np.where(t > 10, 5 * np.exp(-(t - 10) / 50), 0)
+    >>> noise = 0.002 * np.random.default_rng(1).standard_normal(t.size)
+    >>> discharge_test(Record.of({"load": load + noise}, fs=1000)).time_constant.includes(50)
     True
     """
     record.require_clean(channel, question=QUESTION, samples=4 * BLOCKS)
@@ -95,7 +97,7 @@ def discharge_test(record: Record, *, channel: str = "load") -> DischargeTest:
             f"{QUESTION} needs rest before the step and the level held after it",
             "begin ten seconds before, and leave the weight on",
         )
-    return _fitted(time - at, blocks, before, after, at, record.channels[channel].unit)
+    return _fitted(np.asarray(time - at, dtype=float), blocks, before, after, at, record.channels[channel].unit)
 
 
 def _step(values: Array, size: int) -> int:
@@ -105,7 +107,7 @@ def _step(values: Array, size: int) -> int:
     return int(np.abs(means[size:] - means[:-size]).argmax()) + size
 
 
-def _fitted(time: Array, blocks: Array, before: Array, after: Array, at: float, unit: str) -> DischargeTest:
+def _fitted(time: Array, blocks: Array, before: Rows, after: Rows, at: float, unit: str) -> DischargeTest:
     from scipy.optimize import least_squares
 
     used = before | after

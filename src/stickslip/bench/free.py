@@ -113,7 +113,8 @@ def free_vibration(
             record = record.with_details(name, mount=pair)
     decay = fit_decay(_punctual(record), channel="x")
     old = _decrement(record)
-    phases, delays, doubts = {}, {}, [decay.status]
+    phases, delays = {}, {}
+    doubts: list[Doubt | str] = [decay.status]
     for name in (name for name in FOLLOWED if name in record):
         try:
             found = sensor_delay(record, channels=("x", name))
@@ -181,7 +182,7 @@ def _mount(mount: Resonance | tuple[float, float]) -> tuple[tuple[float, float],
 
 
 def _lead(found: SensorDelay, name: str, frequency: Estimate, unsure: float) -> tuple[Estimate, Estimate]:
-    """By which time, and which angle, a sensor leads the displacement; its mount is not known better than `unsure` [s]."""
+    """By which time, and which angle, a sensor leads; its mount is not known better than `unsure` [s]."""
     late = found.delay
     lead = Estimate.normal(
         f"lead of {name} over x", -late.value, sd=math.hypot(late.spread, unsure), unit="s", method=late.method,
@@ -236,8 +237,8 @@ def added_mass(bare: Estimate, loaded: Estimate, added: Constant) -> MassAndSpri
 
     Examples
     --------
-    >>> f = [Estimate.normal("f", math.sqrt(2310 / m) / 2 / math.pi, sd=1e-5, unit="Hz", method="") for m in (2.42, 2.92)]
-    >>> found = added_mass(*f, "0.5 ± 0.0005 kg")
+    >>> bare, loaded = (Estimate.normal("f", f, sd=1e-5, unit="Hz", method="") for f in (4.917206, 4.476460))
+    >>> found = added_mass(bare, loaded, "0.5 ± 0.0005 kg")
     >>> round(found.mass.value, 3), round(found.stiffness.value)
     (2.42, 2310)
     """

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -96,7 +97,7 @@ def find_holds(record: Record, channel: str, count: int, *, question: str) -> tu
         )
     edges = [edge * size for edge in _cuts(blocks, count)]
     edges[-1] = len(values)
-    return tuple(_hold(record, values, first, last) for first, last in zip(edges[:-1], edges[1:], strict=True))
+    return tuple(_hold(record, values, first, last) for first, last in itertools.pairwise(edges))
 
 
 def _cuts(blocks: Array, count: int) -> list[int]:
@@ -151,7 +152,7 @@ def _hold(record: Record, values: Array, first: int, last: int) -> Hold:
 
 def jumps(holds: Sequence[Hold]) -> Array:
     """How far each level lies above the one before, both drawn on to the instant between them."""
-    pairs = zip(holds[:-1], holds[1:], strict=True)
+    pairs = itertools.pairwise(holds)
     return np.array(
         [
             after.at(middle) - before.at(middle)

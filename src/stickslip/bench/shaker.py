@@ -92,7 +92,7 @@ class Shaker:
         }
 
     def largest(self, frequency: float, *, pull: float = 0.0) -> float:
-        """The largest amplitude [m] at a frequency [Hz], with a spring that pulls with so much [N]; 0 where there is none."""
+        """The largest amplitude [m] at a frequency [Hz], the spring pulling so much [N]; 0 where there is none."""
         turn = 2 * math.pi * frequency
         if not self.lowest <= frequency <= self.highest or pull >= self.force:
             return 0.0

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import itertools
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
@@ -244,7 +245,7 @@ def _hand(time: Array) -> Array:
 def _levels(levels: Sequence[float], hold: float, time: Array) -> Array:
     """One level after another, each held so long [s]."""
     total = np.full(np.shape(time), float(levels[0]))
-    for number, (before, after) in enumerate(zip(levels[:-1], levels[1:], strict=True), start=1):
+    for number, (before, after) in enumerate(itertools.pairwise(levels), start=1):
         total += (after - before) * _hand(time - number * hold)
     return total
 

@@ -6,12 +6,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from stickslip.balance.impact import impact_test
-from stickslip.bench.at_rest import at_rest
 from stickslip.bench.calibration import calibrate, spring_by_weights
 from stickslip.bench.discharge import discharge_test
 from stickslip.bench.free import free_vibration, onto_stick
-from stickslip.bench.frequency_response import modal_fit
 from stickslip.bench.known import Known
+from stickslip.bench.response import modal_fit
+from stickslip.bench.rest import at_rest
 from stickslip.errors import ModelError
 from stickslip.estimate import Result
 from stickslip.record.record import Record
@@ -141,7 +141,8 @@ STEPS = (
     ),
     BenchStep(
         "sweep", "How does it answer the base?",
-        "Contact off. Sweep the base from 1.5 to 20 Hz in a minute, with 0.2 mm.", ("x", "z"), 60.0, _sweep, "sweep", True,
+        "Contact off. Sweep the base from 1.5 to 20 Hz in a minute, with 0.2 mm.",
+        ("x", "z"), 60.0, _sweep, "sweep", True,
     ),
     BenchStep(
         "stick", "How stiff is the contact?",

@@ -72,9 +72,9 @@ def commission(
     """Which constants, and which sensors, does a rig have?
 
     Every step is a question to a record of its own: the sensors at rest, against gauge blocks, weights and gravity, the
-    discharge of the load cell, the spring under weights, a tap, free vibrations without and with an added mass, a sweep,
-    a free vibration onto a stick. What a step finds is used by those after it: gains and zeros set its record right,
-    mounts are not taken for delays. A step that is refused is told, and the others go on.
+    discharge of the load cell, the spring under weights, a tap, free vibrations without and with an added mass, a
+    sweep, a free vibration onto a stick. What a step finds is used by those after it: gains and zeros set its record
+    right, mounts are not taken for delays. A step that is refused is told, and the others go on.
 
     Parameters
     ----------

@@ -252,8 +252,8 @@ class Rig:
         Parameters
         ----------
         signals : mapping of str to callable
-            By what is sensed ("x", "z", "v", "a", "friction", "force"): its values [SI] at increasing instants [s], none
-            below 0; what is not given is zero.
+            By what is sensed ("x", "z", "v", "a", "friction", "force"): its values [SI] at increasing instants [s],
+            none below 0; what is not given is zero.
         duration : float
             Of the record [s].
         fs : float

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -150,7 +151,7 @@ def _stepped(
         begin = stands[0] + round(SETTLED * len(stands))
         whole = max(1, math.floor((stands[-1] - begin) / PIECES * tone / fs)) / tone * fs  # whole periods
         edges = (begin + np.round(whole * np.arange(PIECES + 1))).astype(int)
-        parts = [slice(a, min(b, len(u))) for a, b in zip(edges[:-1], edges[1:], strict=True) if a < len(u)]
+        parts = [slice(a, min(b, len(u))) for a, b in itertools.pairwise(edges) if a < len(u)]
         amplitudes = np.array([[np.mean(each[part] * turn[part]) for each in (u, y)] for part in parts]).T
         rows.append((tone, *(np.mean(a * np.conj(b)) for a, b in _pairs(amplitudes))))
     frequency, uu, yy, uy = (np.array(column) for column in zip(*rows, strict=True))
@@ -374,7 +375,7 @@ def _told(lines: _Lines, p: Array, cover: Array, given: dict[str, Estimate], sta
     w, root = math.sqrt(k / m), math.sqrt(k * m)
     return ModalFit(
         of("natural frequency", w / math.tau, [-w / (2 * m) / math.tau, 0, 0, w / (2 * k) / math.tau], "Hz"),
-        of("damping ratio", c / (2 * root), [-c / (4 * root * m), 1 / (2 * root), 0, -c / (4 * root * k)], "1").within(0.0),
+        of("damping ratio", c / root / 2, [-c / (4 * root * m), 0.5 / root, 0, -c / (4 * root * k)], "1").within(0),
         of("mass", m, [1, 0, 0, 0], "kg"),
         of("spring stiffness", k, [0, 0, 0, 1], "N/m"),
         of("viscous damping", c, [0, 1, 0, 0], "N s/m").within(0.0),

@@ -21,6 +21,7 @@ QUESTION = "what sensors read at rest"
 LEAST = 500  # samples of a record at rest
 COARSE = 3.0  # standard deviations of the noise in a count, up to which the counts themselves are fitted
 MOVES = 6.0  # deviations from chance of a slow swing, from which the rig was not at rest
+WIDE = 1e-2  # of the logarithm: wide enough for rounding, narrow against what 500 samples tell
 HELD = 0.02  # of the samples off the one count, below which the noise is only bounded
 
 
@@ -170,8 +171,8 @@ def _rounded(
 
     start = np.array([0.0, math.log(max(0.2, math.sqrt(max(0.0, (sd / count) ** 2 - 1 / 12))))])
     best = minimize(cost, start, method="Nelder-Mead", options={"xatol": 1e-5, "fatol": 1e-6}).x
-    step = 1e-2  # of the logarithm: wide enough for rounding, narrow against what 500 samples tell
-    bend = (cost(best + [0, step]) - 2 * cost(best) + cost(best - [0, step])) / step**2
+    step = np.array([0.0, WIDE])
+    bend = (cost(best + step) - 2 * cost(best) + cost(best - step)) / WIDE**2
     noise = count * math.exp(best[1])
     return level + count * float(best[0]), (noise, noise / math.sqrt(bend) if bend > 0 else math.inf)
 
