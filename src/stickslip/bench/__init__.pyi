@@ -34,8 +34,10 @@ from stickslip.bench.shaker import Shaker as Shaker
 from stickslip.bench.sim import Fault as Fault
 from stickslip.bench.sim import Sim as Sim
 from stickslip.bench.simulated import SimulatedBench as SimulatedBench
+from stickslip.bench.simulated import sweep_of as sweep_of
 from stickslip.bench.steps import STEPS as STEPS
 from stickslip.bench.steps import BenchStep as BenchStep
+from stickslip.bench.steps import step_named as step_named
 from stickslip.bench.walk import Commissioned as Commissioned
 from stickslip.bench.walk import commission as commission
 

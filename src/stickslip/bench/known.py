@@ -78,7 +78,9 @@ class Known:
     def zero(self, channel: str) -> float:
         """What a channel reads at rest; 0 where that was not asked."""
         rest = self.of("rest", AtRest)
-        return rest.sensors[channel].zero.value if rest is not None and channel in rest.sensors else 0.0
+        if rest is None or channel not in rest.sensors or rest.sensors[channel].zero.includes(0.0):
+            return 0.0
+        return rest.sensors[channel].zero.value
 
     def corrected(self, record: Record) -> Record:
         """A record with zeros taken off and gains set right, as far as they are known; their doubt in ``gain_sd``."""
@@ -104,7 +106,7 @@ class Known:
         masses = [Estimate.stated("mass", self.rig.mass, "kg")] if self.rig.mass is not None else []
         spring = self.of("spring", SpringByWeights)
         if free is None:
-            return None
+            return self._stated
         loaded = self.of("added", FreeVibration)
         if loaded is not None:
             masses.append(added_mass(free.frequency, loaded.frequency, self.at_hand.added).mass)
@@ -112,6 +114,14 @@ class Known:
         if self.rig.stiffness is not None and spring is None:
             springs.append(Estimate.stated("spring stiffness", self.rig.stiffness, "N/m"))
         return best_constants(free.frequency, masses=masses, springs=springs) if masses or springs else None
+
+    @property
+    def _stated(self) -> MassAndSpring | None:
+        if self.rig.mass is None or self.rig.stiffness is None:
+            return None
+        pair = (("mass", self.rig.mass, "kg"), ("spring stiffness", self.rig.stiffness, "N/m"))
+        mass, spring = (Estimate.stated(*each) for each in pair)
+        return MassAndSpring(mass, spring, "ok")
 
     def require_constants(self) -> MassAndSpring:
         """Mass and spring, or a refusal that says what to do first.

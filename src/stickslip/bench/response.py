@@ -5,13 +5,13 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from stickslip.errors import EstimateError, ModelError
+from stickslip.errors import EstimateError, ModelError, StickslipError
 from stickslip.estimate import Constant, Doubt, Estimate, Result, Status
 from stickslip.record.record import Record
 from stickslip.signals.derivatives import noise_along
@@ -24,6 +24,7 @@ Complex = NDArray[np.complex128]
 QUESTION, MODAL = "a frequency response", "mass, spring and damper by a frequency response"
 SEGMENTS = 15  # half overlapping, of which the averaged spectra are made
 EXCITED = 1e-4  # of the largest power of the input, down to which a line counts as excited
+SEEN = 1e-2  # the same of averaged spectra, which are to be looked at
 LEAST_LINES = 30
 PERIODS = 10.0  # of a tone, over which its amplitude is read
 HELD = 0.7  # of its largest amplitude, from which a tone stands
@@ -123,7 +124,7 @@ def frequency_response(
     about: dict[str, Any] = {"fs": record.fs, "nperseg": size, "detrend": "constant"}
     frequency, uu = csd(u, u, **about)
     yy, uy = csd(y, y, **about)[1].real, csd(u, y, **about)[1]
-    kept = (uu.real > EXCITED * uu.real.max()) & (frequency > 0)
+    kept = (uu.real > SEEN * uu.real.max()) & (frequency > 0)
     if not kept.any() or uu.real.max() <= 0:
         raise EstimateError(f"{channels[0]} does not change", f"{QUESTION} needs an input", "shake, or tap")
     uu, yy, uy = uu.real[kept], yy[kept], uy[kept]
@@ -182,6 +183,10 @@ class ModalFit(Result):
         Output's over input's gain, where the base is the input; a force's is in mass, spring and damper.
     lines : int
         That were excited.
+    response : FrequencyResponse or None
+        Averaged spectra of the same record, to look at; None where it is too short for them.
+    damper : {"ground", "base"}
+        What the viscous damper ends on.
     status : str
         "ok", or in words what to beware of.
     """
@@ -194,7 +199,24 @@ class ModalFit(Result):
     delay: Estimate
     gain: Estimate | None
     lines: int
+    response: FrequencyResponse | None
+    damper: str
     status: str
+
+    def model(self, frequency: Array) -> Complex:
+        """The fitted oscillator's answer at frequencies [Hz]."""
+        s = 2j * np.pi * frequency
+        w, late = math.tau * self.frequency.value, np.exp(-s * self.delay.value)
+        shape = s**2 + 2 * self.damping_ratio.value * w * s + w**2
+        if self.gain is None:
+            assert self.mass is not None
+            return np.asarray(late / (self.mass.value * shape))
+        return np.asarray(self.gain.value * late * (w**2 + self.through * s) / shape)
+
+    @property
+    def through(self) -> float:
+        """What of the base's velocity a damper hands on [1/s]; nothing where it ends on the ground."""
+        return 0.0 if self.damper == "ground" else 2 * self.damping_ratio.value * math.tau * self.frequency.value
 
 
 def modal_fit(
@@ -266,7 +288,15 @@ def modal_fit(
     doubt = Doubt(
         f"the answer leaves {power:.2g} times the noise: more than one mass on one spring, or friction", "model"
     )
-    return _told(lines, fit.x, cover, given, Status(*[doubt] * (power > UNEXPLAINED)))
+    found = _told(lines, fit.x, cover, given, Status(*[doubt] * (power > UNEXPLAINED)))
+    return replace(found, response=_seen(record, channels))
+
+
+def _seen(record: Record, channels: tuple[str, str]) -> FrequencyResponse | None:
+    try:
+        return frequency_response(record, channels=channels)
+    except StickslipError:
+        return None
 
 
 def _least_squares() -> Any:
@@ -366,11 +396,15 @@ def _told(lines: _Lines, p: Array, cover: Array, given: dict[str, Estimate], sta
                 "mass", spring.value / p[0], sd=part * spring.value / p[0], unit="kg", method=method
             )
         if weight is None:
-            return ModalFit(frequency, ratio, None, None, None, delay, gain, len(lines.turn), status)
+            return ModalFit(
+                frequency, ratio, None, None, None, delay, gain, len(lines.turn), None, lines.damper, status
+            )
         m = weight.value
         spring = of("spring stiffness", m * p[0], [m, 0, 0, 0], "N/m", weight.sd * p[0])
         damper = of("viscous damping", m * p[1], [0, m, 0, 0], "N s/m", weight.sd * abs(p[1])).within(0.0)
-        return ModalFit(frequency, ratio, weight, spring, damper, delay, gain, len(lines.turn), status)
+        return ModalFit(
+            frequency, ratio, weight, spring, damper, delay, gain, len(lines.turn), None, lines.damper, status
+        )
     m, c, k = p[0], p[1], p[3]
     w, root = math.sqrt(k / m), math.sqrt(k * m)
     return ModalFit(
@@ -379,5 +413,5 @@ def _told(lines: _Lines, p: Array, cover: Array, given: dict[str, Estimate], sta
         of("mass", m, [1, 0, 0, 0], "kg"),
         of("spring stiffness", k, [0, 0, 0, 1], "N/m"),
         of("viscous damping", c, [0, 1, 0, 0], "N s/m").within(0.0),
-        delay, None, len(lines.turn), status,
+        delay, None, len(lines.turn), None, lines.damper, status,
     )  # fmt: skip

@@ -13,8 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stickslip.bench.steps import BenchStep
-from stickslip.drives.kinds import Recorded
-from stickslip.errors import ModelError
+from stickslip.drives.kinds import Recorded, Release
+from stickslip.errors import EstimateError, ModelError
+from stickslip.estimate import Estimate
 from stickslip.laws.compliant import CompliantContact
 from stickslip.laws.coulomb import Coulomb
 from stickslip.oscillator import Oscillator
@@ -31,6 +32,7 @@ TREMOR = 20e-6  # m by which the mass still swings after a weight was hung on
 SEATED = 2e-6  # m, standard deviation of how a gauge block sits
 TRUE_TO = 2e-4  # standard deviation of a weight, as a part of it
 HELD = 5.0  # N, of the discharge test
+SWEEP = (60.0, 1.5, 20.0, 0.2e-3)  # s, from and to Hz, m
 PRESSED = 5.0  # times the friction, for the tap: the contact is pressed so that it does not slip
 TAPPED = 1e-3  # s that the hammer touches
 
@@ -160,15 +162,27 @@ class SimulatedBench:
             told["gain of the displacement over that of the base"] = 1.0  # once both are calibrated
         return told
 
+    @property
+    def _contact(self) -> CompliantContact:
+        """The contact, which has to give way for a tap and a stick to ring on it."""
+        if not isinstance(self.system.law, CompliantContact):
+            raise EstimateError(
+                f"a contact by {type(self.system.law).__name__}",
+                "the simulated bench taps, and lets stick, a contact that gives way",
+                "give the system a CompliantContact",
+            )
+        return self.system.law
+
     @functools.cached_property
     def _loose(self) -> Oscillator:
         """The mass without its contact."""
-        return replace(self.system, law=Coulomb(0.0))
+        return replace(self.system, law=Coulomb(0.0), drive=Release())
 
     @functools.cached_property
     def _loaded(self) -> Oscillator:
         """With the added mass."""
-        return replace(self._loose, mass=self.system.mass + float(self.hand.added))
+        added = Estimate.stated("mass", self.hand.added, "kg")
+        return replace(self._loose, mass=self.system.mass + added.value + added.sd * self._chance("added").normal())
 
     def _placed(self, levels: Sequence[float], *, seated: float = 0.0, part: float = 0.0) -> Sequence[float]:
         """Levels as they are really reached: blocks that do not sit, weights that are not what is written on them."""
@@ -208,14 +222,19 @@ class SimulatedBench:
 
     def _onto_stick(self) -> Record:
         """Let go so far out that it turns twice and sticks."""
-        law: Any = self.system.law
+        law = self._contact
         return self._measured(
-            simulate(self.system, duration=2.0, start={"x": 4.6 * law.kinetic / self.system.stiffness}), "stick"
+            simulate(
+                replace(self.system, drive=Release()),
+                duration=2.0,
+                start={"x": 4.6 * law.kinetic / self.system.stiffness},
+            ),
+            "stick",
         )
 
     def _tap(self) -> Record:
         """A hammer's half sine on the mass, the contact pressed so that it holds: half of what would make it slip."""
-        law: Any = self.system.law
+        law = self._contact
         pressed = replace(law, kinetic=PRESSED * law.kinetic)
         stiff = self.system.stiffness + law.stiffness
         speed = 0.5 * PRESSED * law.kinetic / math.sqrt(stiff * self.system.mass)
@@ -227,13 +246,23 @@ class SimulatedBench:
 
     def _sweep(self) -> Record:
         """The base swept from 1.5 to 20 Hz in a minute, 0.2 mm, the contact off."""
-        duration, low, high, fs = 60.0, 1.5, 20.0, 400.0
-        time = np.arange(round(duration * fs) + 1) / fs
-        phase = 2 * np.pi * (low * time + (high - low) * time**2 / (2 * duration))
-        swept = replace(
-            self._loose, drive=Recorded(0.2e-3 * np.sin(phase) * _hand(time) * _hand(duration - time), fs, on="base")
-        )
-        return self._measured(simulate(swept, duration=duration - 0.1), "sweep")
+        fs = 400.0
+        swept = replace(self._loose, drive=Recorded(sweep_of(fs), fs, on="base"))
+        return self._measured(simulate(swept, duration=SWEEP[0] - 0.1), "sweep")
+
+
+def sweep_of(fs: float) -> Array:
+    """The base's motion [m] in the step "sweep", at a rate [Hz]: it begins and ends at rest.
+
+    Examples
+    --------
+    >>> round(1e6 * float(np.abs(sweep_of(200.0)).max()))
+    200
+    """
+    duration, low, high, amplitude = SWEEP
+    time = np.arange(round(duration * fs) + 1) / fs
+    phase = 2 * np.pi * (low * time + (high - low) * time**2 / (2 * duration))
+    return np.asarray(amplitude * np.sin(phase) * _hand(time) * _hand(duration - time))
 
 
 def _hand(time: Array) -> Array:

@@ -15,6 +15,7 @@ from stickslip.bench.rest import at_rest
 from stickslip.errors import ModelError
 from stickslip.estimate import Result
 from stickslip.record.record import Record
+from stickslip.rig.rig import Rig
 from stickslip.settings import nearest
 
 
@@ -50,6 +51,10 @@ class BenchStep:
     ask: Callable[[Record, Known], Result]
     arrangement: str
     drives: bool = False
+
+    def fits(self, rig: Rig) -> bool:
+        """Whether a rig has the sensors that it needs."""
+        return set(self.needs) <= {sensor.channel for sensor in rig.sensors}
 
 
 def _gauge(channel: str) -> Callable[[Record, Known], Result]:

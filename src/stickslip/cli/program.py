@@ -8,6 +8,7 @@ import click
 
 import stickslip as ss
 from stickslip.cli.analyze import analyze, demo
+from stickslip.cli.commission import commission
 from stickslip.cli.decay import decay
 from stickslip.cli.exchange import check, convert, datasets
 from stickslip.cli.fit import fit
@@ -74,6 +75,7 @@ def main() -> None:
 for _command in (
     analyze,
     check,
+    commission,
     convert,
     datasets,
     decay,

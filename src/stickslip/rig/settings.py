@@ -116,6 +116,9 @@ class ShakerSettings(BaseModel):
 GRAVITY = 9.80665  # m/s^2
 
 
+ADDED = Estimate.stated("mass", (0.5, 1e-4), "kg")
+
+
 class CommissionSettings(BaseModel):
     """What is at hand when a rig is commissioned; see :func:`stickslip.bench.commission`.
 
@@ -140,7 +143,7 @@ class CommissionSettings(BaseModel):
     turns: tuple[Annotated[float, quantity("m/s^2")], ...] = (0.0, *(GRAVITY, 0.0, -GRAVITY, 0.0) * 2)
     weights_sd: Annotated[float, quantity("1"), Field(ge=0, lt=1)] = 0.0
     gauges_sd: Annotated[float, quantity("1"), Field(ge=0, lt=1)] = 0.0
-    added: Annotated[float | Estimate, _constant("mass", positive=True), AS_PAIR] = 0.5
+    added: Annotated[float | Estimate, _constant("mass", positive=True), AS_PAIR] = ADDED
 
 
 def _log(value: Any) -> Log:
