@@ -23,6 +23,11 @@ from stickslip.bench.free import best_constants as best_constants
 from stickslip.bench.free import free_vibration as free_vibration
 from stickslip.bench.free import onto_stick as onto_stick
 from stickslip.bench.known import Known as Known
+from stickslip.bench.recording import Acquired as Acquired
+from stickslip.bench.recording import Tape as Tape
+from stickslip.bench.recording import Trigger as Trigger
+from stickslip.bench.recording import Wanted as Wanted
+from stickslip.bench.recording import acquire as acquire
 from stickslip.bench.response import FrequencyResponse as FrequencyResponse
 from stickslip.bench.response import ModalFit as ModalFit
 from stickslip.bench.response import frequency_response as frequency_response

@@ -175,7 +175,7 @@ class March:
     def change(self, plan: Sequence[tuple[float, Drive]]) -> None:
         """Move the system otherwise: drives, each from its instant [s] on; what was known after the first is void."""
         first = plan[0][0]
-        while self.legs and self.legs[-1].begin >= first and first > 0:
+        while len(self.legs) > 1 and self.legs[-1].begin >= first:
             del self.legs[-1]
         self.plan = list(plan)
         self._switch()

@@ -7,9 +7,11 @@ from typing import Any
 import click
 
 import stickslip as ss
+from stickslip.cli.acquire import acquire
 from stickslip.cli.analyze import analyze, demo
 from stickslip.cli.commission import commission
 from stickslip.cli.decay import decay
+from stickslip.cli.devices import devices
 from stickslip.cli.exchange import check, convert, datasets
 from stickslip.cli.fit import fit
 from stickslip.cli.interrupted import INTERRUPTED, SENTENCE
@@ -73,6 +75,7 @@ def main() -> None:
 
 
 for _command in (
+    acquire,
     analyze,
     check,
     commission,
@@ -80,6 +83,7 @@ for _command in (
     datasets,
     decay,
     demo,
+    devices,
     fit,
     lab,
     predict,

@@ -16,7 +16,7 @@ from stickslip.files.table import Budget, Options
 from stickslip.record.record import Record
 
 # Asked in this order whether a file is theirs; each is a module beside this one, imported when it is its turn.
-FORMATS = ("tdms", "matlab", "hdf5", "parquet", "uff", "audio", "lvm", "json_table", "text")
+FORMATS = ("journal", "tdms", "matlab", "hdf5", "parquet", "uff", "audio", "lvm", "json_table", "text")
 
 HEAD = 1 << 16  # bytes shown to `recognise`
 
@@ -34,7 +34,8 @@ def read_record(
 ) -> Record:
     """Read a file, or several on one clock, as a Record in SI.
 
-    Formats: CSV and other text, MATLAB v5 to v7.3, TDMS, UFF 58, WAV/FLAC/OGG, HDF5, Parquet, LVM, JSON. A file
+    Formats: CSV and other text, MATLAB v5 to v7.3, TDMS, UFF 58, WAV/FLAC/OGG, HDF5, Parquet, LVM, JSON, the journal of
+    `stickslip acquire`. A file
     that write_record wrote, read without arguments, is the same record again, history included.
 
     Parameters

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stickslip.errors import FormatError, ModelError
-from stickslip.files.table import optional
-from stickslip.record.metadata import KEY, record_to_metadata, time_column
+from stickslip.files.table import Table, optional
+from stickslip.record.metadata import KEY, Digests, record_to_metadata, time_column, units_told
 from stickslip.record.record import Record
 from stickslip.whole import whole_file
 
@@ -123,6 +123,43 @@ def _write_hdf5(path: Path, columns: Columns, metadata: str) -> None:
         file.attrs[KEY] = metadata
         for name, (unit, values) in columns.items():
             file.create_dataset(name, data=values).attrs["unit"] = unit
+
+
+def write_table(table: Table, path: Path) -> Path:
+    """A described table of any length as HDF5, block by block: what a journal becomes.
+
+    Parameters
+    ----------
+    table : Table
+        With the description of the record, of a journal.
+    path : Path
+        Where to; ends in .h5 or .hdf5.
+
+    Returns
+    -------
+    Path
+
+    Raises
+    ------
+    FormatError
+        The file is there already, or the disk can not be written.
+    """
+    h5py = optional("h5py")
+    require_free(path)
+    units, sums = units_told(table.record), Digests()
+    rows = int(table.record["rows"])
+    with whole(path, replace=False) as part, h5py.File(part, "w", libver="latest") as file:
+        for name, unit in units.items():
+            file.create_dataset(name, shape=(rows,), dtype="<f8").attrs["unit"] = unit
+        first = 0
+        for block in table.blocks(list(units), ROWS_AT_ONCE):
+            count = len(next(iter(block.values())))
+            for name, values in block.items():
+                file[name][first : first + count] = values
+            sums.add(block)
+            first += count
+        file.attrs[KEY] = json.dumps({**table.record, "sha256": sums.told()})
+    return path
 
 
 def _write_parquet(path: Path, columns: Columns, metadata: str) -> None:

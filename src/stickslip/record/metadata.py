@@ -59,8 +59,10 @@ class Digests:
         return {name: total.hexdigest() for name, total in self._sums.items()}
 
     def changed(self, metadata: Mapping[str, Any]) -> list[str]:
-        """The columns whose numbers are not those that the metadata tells."""
+        """The columns whose numbers are not those that the metadata tells; a journal's frames have their own sums."""
         with _trusting():
+            if metadata["sha256"] is None:
+                return []
             return [name for name, digest in self.told().items() if metadata["sha256"].get(name) != digest]
 
 

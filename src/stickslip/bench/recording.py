@@ -1,0 +1,591 @@
+"""Record from devices: streamed to disk, whole whatever happens, with what went wrong seen and named."""
+
+from __future__ import annotations
+
+import math
+import threading
+import time
+from collections import deque
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass, field, replace
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stickslip.bench.device import Block, Device, Input, Signal, Stream
+from stickslip.errors import EstimateError, ModelError, RecordError, StickslipError
+from stickslip.files import journal
+from stickslip.files.read import read_record
+from stickslip.files.table import Options
+from stickslip.files.write import WRITERS, require_free, write_record, write_table
+from stickslip.record.log import Log
+from stickslip.record.metadata import record_to_metadata
+from stickslip.record.record import Record, Step
+from stickslip.signals.clocks import clock_rate, synchronise
+
+SYNC = 1.0  # s between two times that the journal is put on the disk itself
+SILENCE = 10.0  # s without a sample after which a device is given up
+EDGE = 1e-9  # of the range: a reading nearer to its end than this stands at it
+TOLD = 3  # gaps and clipped stretches that a sentence names
+
+Watch = Callable[[Device, Block], object]
+
+
+@dataclass(frozen=True)
+class Trigger:
+    """What begins a recording.
+
+    Attributes
+    ----------
+    channel : str
+        The input that is watched.
+    level : float
+        Reading [SI] that it passes.
+    rising : bool
+        Whether upwards.
+    before : float
+        Time [s] before it that is kept.
+
+    Raises
+    ------
+    ModelError
+        A time before it that is negative.
+    """
+
+    channel: str
+    level: float
+    rising: bool = True
+    before: float = 0.0
+
+    def __post_init__(self) -> None:
+        if not 0 <= self.before < math.inf:
+            raise ModelError(f"before = {self.before} s", "what is kept before a trigger is a time", "correct it")
+
+    def row(self, values: NDArray[np.float64], last: float) -> int | None:
+        """The first row at which the level is passed, `last` being the reading before."""
+        side = 1.0 if self.rising else -1.0
+        above = side * np.append(last, values) >= side * self.level
+        passed = np.flatnonzero(above[1:] & ~above[:-1])
+        return int(passed[0]) if len(passed) and not math.isnan(last) else None
+
+
+@dataclass
+class Seen:
+    """What went wrong while one device was recorded; grows with every block."""
+
+    inputs: Sequence[Input]
+    samples: int = 0
+    gaps: list[tuple[int, int]] = field(default_factory=list)  # first lost sample and how many, the first thousand
+    lost: int = 0
+    clipped: dict[str, tuple[int, int]] = field(default_factory=dict)  # how many, and the first one's counter
+    after: int | None = None  # counter of the sample that should come
+
+    def __post_init__(self) -> None:
+        counts = [min(one.limit / one.scale, 1e300) for one in self.inputs]
+        self.edges = np.array(counts)[:, None] * (1 - EDGE)
+
+    def look(self, block: Block) -> None:
+        """Count what a block lacks, and what of it stands at the end of a range.
+
+        Raises
+        ------
+        RecordError
+            The counter runs back.
+        """
+        if self.after is not None and block.first != self.after:
+            missing = block.first - self.after
+            if missing < 0:
+                raise RecordError(
+                    f"sample {block.first} came after sample {self.after - 1}",
+                    "a device counts its samples upwards",
+                    "check its driver",
+                )
+            self.lost += missing
+            self.gaps += [(self.after, missing)] if len(self.gaps) < 1000 else []
+        self.after = block.after
+        self.samples += block.samples.shape[1]
+        high, low = np.fmax.reduce(block.samples, axis=1), np.fmin.reduce(block.samples, axis=1)
+        for row in np.flatnonzero((high >= self.edges[:, 0]) | (low <= -self.edges[:, 0])).tolist():
+            at = np.flatnonzero(np.abs(block.samples[row].astype(np.float64)) >= self.edges[row, 0])
+            count, first = self.clipped.get(self.inputs[row].name, (0, block.first + int(at[0]) if len(at) else 0))
+            self.clipped[self.inputs[row].name] = (count + len(at), first)
+
+    def told(self, fs: float, begin: int) -> str:
+        """In words."""
+        parts = [f"{self.samples} samples at {fs:g} Hz"]
+        if self.lost:
+            gaps = [f"{count} at {(first - begin) / fs:.3f} s" for first, count in self.gaps[:TOLD]]
+            more = f" and {len(self.gaps) - TOLD} gaps more" if len(self.gaps) > TOLD else ""
+            parts.append(f"{self.lost} samples lost ({', '.join(gaps)}{more})")
+        for name, (count, first) in self.clipped.items():
+            parts.append(f"{name} clipped in {count} samples, first at {(first - begin) / fs:.3f} s")
+        return "; ".join(parts)
+
+
+class Tape:
+    """One device's samples on their way to the disk.
+
+    Parameters
+    ----------
+    device : Device
+        What measures.
+    output : Path
+        The record to be; the journal stands beside it until then, as ``NAME.journal``.
+    begin : int
+        Counter of the sample that is row 0.
+    start : float
+        Time [s] of that row.
+    log : Log, optional
+        What is noted of the experiment.
+    notes : mapping
+        What else the history should hold of how it was asked.
+
+    Raises
+    ------
+    FormatError
+        The record, or its journal, is there already, or is of a format that is not written.
+    """
+
+    def __init__(
+        self,
+        device: Device,
+        output: Path,
+        *,
+        begin: int = 0,
+        start: float = 0.0,
+        log: Log | None = None,
+        notes: Mapping[str, Any] | None = None,
+    ) -> None:
+        require_writable(output)
+        self.device, self.output, self.begin = device, output, begin
+        self.seen, self.due = Seen(device.inputs), time.monotonic() + SYNC
+        self.path = journal_of(output)
+        self.journal: journal.Journal | None = None
+        self.told: dict[str, Any] = {"start": start, "log": log, "notes": notes or {}}
+
+    def write(self, block: Block) -> None:
+        """Keep a block; what goes before row 0 is cut off.
+
+        Raises
+        ------
+        RecordError
+            The device's counter runs back.
+        OSError
+            The disk takes no more.
+        """
+        if block.first < self.begin:
+            block = block._replace(first=self.begin, samples=block.samples[:, self.begin - block.first :])
+        if not block.samples.shape[1]:
+            return
+        if self.journal is None:
+            self.begin = block.first
+            self.journal = journal.Journal(self.path, _about(self.device, block.samples.dtype, **self.told))
+        self.seen.look(block)
+        self.journal.append(block.samples, first=block.first, clock=block.clock)
+        if time.monotonic() > self.due:
+            self.journal.sync()
+            self.due = time.monotonic() + SYNC
+
+    def mark(self, text: str) -> None:
+        """Note something of this instant, in the history of the record."""
+        if self.journal is not None:
+            self.journal.tell(journal.MARK, {"text": text}, first=self.seen.after or self.begin)
+
+    def close(self) -> str:
+        """Close the journal; returns what was seen, in words.
+
+        Raises
+        ------
+        RecordError
+            There was no sample.
+        """
+        if self.journal is None:
+            raise RecordError(f"no sample came from {self.device.name}", "a record has samples", "check the device")
+        outcome = self.seen.told(self.device.fs, self.begin)
+        self.journal.tell(journal.DONE, {"outcome": outcome})
+        self.journal.sync()
+        self.journal.__exit__()
+        return outcome
+
+    def finish(self) -> Path:
+        """The journal, closed, as the record that was asked for; the journal goes when the record stands."""
+        if self.output.suffix in (".h5", ".hdf5"):
+            write_table(journal.read(self.path, Options()), self.output)
+        else:
+            write_record(read_record(self.path), self.output)
+        self.path.unlink()
+        return self.output
+
+
+def journal_of(output: Path) -> Path:
+    """Where the samples of a record stand until it is whole."""
+    return output.with_name(f"{output.name}.journal")
+
+
+def require_writable(output: Path) -> None:
+    """Refuse a record that can not be written, before anything is measured.
+
+    Raises
+    ------
+    ModelError
+        The ending is of no format that is written.
+    FormatError
+        A record, or the journal of one, is there already.
+    """
+    if output.suffix.lower() not in WRITERS:
+        raise ModelError(
+            f"'{output.name}' ends in '{output.suffix}'", f"a record ends in {', '.join(WRITERS)}", "choose one"
+        )
+    require_free(output)
+    require_free(journal_of(output))
+
+
+def _about(
+    device: Device, kind: np.dtype[Any], start: float, log: Log | None, notes: Mapping[str, Any]
+) -> dict[str, Any]:
+    """The description of a record to be."""
+    ranges = {one.name: one.limit for one in device.inputs if math.isfinite(one.limit)}
+    serials = {one.name: one.serial for one in device.inputs if one.serial}
+    told = {
+        "device": device.name,
+        "kind": device.kind,
+        "model": device.model,
+        "fs": device.fs,
+        "ranges": ranges,
+        "serials": serials,
+        "began": datetime.now(UTC).isoformat(timespec="milliseconds"),
+        **notes,
+    }
+    channels = {one.name: one.channel for one in device.inputs}
+    blank = Record(
+        {name: np.zeros(1) for name in channels}, channels, device.fs, start, (Step("acquire", told),), log=log
+    )
+    scales = [one.scale for one in device.inputs]
+    return {**record_to_metadata(blank), "type": kind.newbyteorder("<").str, "scales": scales}
+
+
+@dataclass(frozen=True)
+class Acquired:
+    """What was recorded.
+
+    Attributes
+    ----------
+    paths : tuple of Path
+        The record; of several devices that could not be brought onto one clock, one for each.
+    outcomes : mapping of str to str
+        By device: samples, what was lost, what was clipped.
+    ended : str
+        Why it ended: "complete", "stopped", "the device ended", "interrupted".
+    notes : tuple of str
+        What else to know.
+    """
+
+    paths: tuple[Path, ...]
+    outcomes: Mapping[str, str]
+    ended: str
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """What is to be recorded.
+
+    Attributes
+    ----------
+    seconds : float or None
+        How long, from the trigger where there is one; until it is stopped where None.
+    trigger : Trigger or None
+        What begins it.
+    drive : mapping of str to Signal
+        How the outputs move meanwhile, from the opening on; they rest again at the end.
+    log : Log or None
+        What is noted of the experiment.
+    """
+
+    seconds: float | None = None
+    trigger: Trigger | None = None
+    drive: Mapping[str, Signal] = field(default_factory=dict)
+    log: Log | None = None
+
+
+def acquire(
+    device: Device | Sequence[Device],
+    *,
+    output: str | Path,
+    wanted: Wanted | None = None,
+    watch: Watch | None = None,
+    stop: threading.Event | None = None,
+) -> Acquired:
+    """Record from one device or several into a file.
+
+    Samples go to a journal beside the file as they come, so that whatever ends the program costs the last block at
+    most; at the end the journal becomes the file. A journal that was left is read as any record is, and
+    ``stickslip convert`` makes a file of it.
+
+    Parameters
+    ----------
+    device : Device or sequence of Device
+        What measures. Several are brought onto the first one's clock by :func:`~stickslip.signals.synchronise`: by a
+        displacement or velocity that both measure, otherwise by when their samples came.
+    output : path
+        The record, .h5, .csv or .parquet.
+    wanted : Wanted, optional
+        How long, from which trigger on, and what moves meanwhile; until `stop` where left out.
+    watch : callable, optional
+        Called with the device and each block as it comes.
+    stop : threading.Event, optional
+        Ends it when it is set.
+
+    Returns
+    -------
+    Acquired
+
+    Raises
+    ------
+    ModelError, FormatError
+        What is asked can not be, told before anything is measured.
+    RecordError
+        A device sends nothing.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from stickslip.bench.sim import Sim
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     done = acquire(Sim(fast=True), output=folder + "/run.h5", wanted=Wanted(seconds=0.5))
+    ...     record = read_record(done.paths[0])
+    >>> record, done.ended
+    (Record(x [m], z [m], a [m/s^2], load [N]; 2000 samples, 4000 Hz, from 0 s), 'complete')
+    """
+    wanted, output = wanted or Wanted(), Path(output)
+    every = list(device) if isinstance(device, Sequence) else [device]
+    _require(every, wanted)
+    outputs = [output] if len(every) == 1 else [_beside(output, one.name) for one in every]
+    for path in {output, *outputs}:
+        require_writable(path)
+    run = _Run(wanted, watch, stop or threading.Event())
+    heads = [_Head(one, path, run) for one, path in zip(every, outputs, strict=True)]
+    ended = run.all(heads)
+    outcomes = {head.device.name: head.tape.close() for head in heads if head.tape is not None}
+    if len(outcomes) < len(heads):
+        raise RecordError("nothing was recorded", "the trigger begins a recording", "lower its level, or wait longer")
+    paths = tuple(head.tape.finish() for head in heads if head.tape is not None)
+    if len(paths) == 1:
+        return Acquired(paths, outcomes, ended)
+    return _together(paths, output, Acquired(paths, outcomes, ended))
+
+
+def _beside(output: Path, name: str) -> Path:
+    return output.with_name(f"{output.stem}-{name}{output.suffix}")
+
+
+def _require(devices: Sequence[Device], wanted: Wanted) -> None:
+    """Refuse what can not be, before anything is measured."""
+    if not devices or len({one.name for one in devices}) < len(devices):
+        raise ModelError(f"{len(devices)} devices", "each has a name of its own", "name them in [devices.NAME]")
+    if wanted.seconds is not None and not 0 < wanted.seconds < math.inf:
+        raise ModelError(f"seconds = {wanted.seconds}", "a recording lasts some time", "give more")
+    names = [one.name for device in devices for one in device.inputs]
+    if wanted.trigger is not None and wanted.trigger.channel not in names:
+        raise ModelError(f"a trigger on '{wanted.trigger.channel}'", f"the inputs are {', '.join(names)}", "name one")
+    known = {output.name: output for device in devices for output in device.outputs}
+    for name, signal in wanted.drive.items():
+        if name not in known:
+            raise ModelError(f"a drive of '{name}'", f"the outputs: {', '.join(known) or 'none'}", "name one of them")
+        known[name].require(signal, fs=devices[0].fs)
+
+
+class _Run:
+    """What the devices of one recording share: when it begins and why it ended."""
+
+    def __init__(self, wanted: Wanted, watch: Watch | None, stop: threading.Event) -> None:
+        self.wanted, self.watch, self.stop = wanted, watch, stop
+        self.began: float | None = None  # by this computer's clock [s], of the trigger or the first sample
+        self.ended = "complete"
+        self.failure: StickslipError | OSError | None = None
+
+    def all(self, heads: Sequence[_Head]) -> str:
+        """Record with every head at once; returns why it ended."""
+        with ExitStack() as stack:
+            streams = [stack.enter_context(head.device.open()) for head in heads]
+            for head, stream in zip(heads, streams, strict=True):
+                _move(head.device, stream, self.wanted.drive)
+            if len(heads) == 1:
+                self._one(heads[0], streams[0])
+            else:
+                pairs = zip(heads, streams, strict=True)
+                threads = [threading.Thread(target=self._one, args=pair, daemon=True) for pair in pairs]
+                for thread in threads:
+                    thread.start()
+                self._wait(threads)
+            for head, stream in zip(heads, streams, strict=True):
+                _move(head.device, stream, dict.fromkeys(self.wanted.drive))
+        if self.failure is not None:
+            for head in heads:  # what was recorded stays, as a journal
+                if head.tape is not None and head.tape.journal is not None:
+                    head.tape.journal.__exit__()
+            raise self.failure
+        return self.ended
+
+    def _wait(self, threads: Sequence[threading.Thread]) -> None:
+        try:
+            for thread in threads:
+                while thread.is_alive():
+                    thread.join(0.1)
+        except KeyboardInterrupt:
+            self.ended = "interrupted"
+            self.stop.set()
+            for thread in threads:
+                thread.join()
+
+    def _one(self, head: _Head, stream: Stream) -> None:
+        """Record with one, until it has what is wanted."""
+        heard = time.monotonic()
+        try:
+            while not head.done:
+                if self.stop.is_set():
+                    self.ended = self.ended if self.ended != "complete" else "stopped"
+                    return
+                block = stream.read(0.2)
+                if block is None:
+                    self.ended = "the device ended"
+                    return
+                if block.samples.shape[1]:
+                    heard = time.monotonic()
+                    if self.watch:
+                        self.watch(head.device, block)
+                    self._keep(head, block)
+                elif time.monotonic() - heard > SILENCE:
+                    raise RecordError(
+                        f"{head.device.name} sent nothing for {SILENCE:g} s",
+                        "a device that measures sends samples",
+                        "check cable, power and clock",
+                    )
+        except KeyboardInterrupt:
+            self.ended = "interrupted"
+        except (StickslipError, OSError) as failure:
+            self.failure = failure
+            self.stop.set()
+
+    @staticmethod
+    def _keep(head: _Head, block: Block) -> None:
+        try:
+            head.take(block)
+        except OSError as error:
+            raise RecordError(
+                f"{journal_of(head.path).name} can not be written ({error.strerror or error})",
+                "samples go to the disk as they come",
+                "what came until then can be read from it",
+            ) from error
+
+
+def _move(device: Device, stream: Stream, drive: Mapping[str, Signal]) -> None:
+    for name, signal in drive.items():
+        if name in [output.name for output in device.outputs]:
+            stream.drive(name, signal)
+
+
+class _Head:
+    """One device of a recording: what it holds until it begins, then its tape."""
+
+    def __init__(self, device: Device, path: Path, run: _Run) -> None:
+        self.device, self.path, self.run = device, path, run
+        self.tape: Tape | None = None
+        self.held: deque[Block] = deque()
+        self.last, self.end = math.nan, math.inf
+        trigger = run.wanted.trigger
+        names = [one.name for one in device.inputs]
+        self.row = names.index(trigger.channel) if trigger is not None and trigger.channel in names else None
+
+    @property
+    def done(self) -> bool:
+        """Whether it has all that is wanted."""
+        return self.tape is not None and (self.tape.seen.after or 0) >= self.end
+
+    def take(self, block: Block) -> None:
+        """A block: held, or kept."""
+        if self.tape is None:
+            self.held.append(block)
+            self._begin(block)
+            return
+        self._write(block)
+
+    def _begin(self, block: Block) -> None:
+        """Whether the recording begins with what is held."""
+        run, fs, trigger = self.run, self.device.fs, self.run.wanted.trigger
+        at: float | None = None  # the counter of time 0
+        if trigger is None:
+            if run.began is None:
+                run.began, at = block.clock - (block.after - block.first) / fs, block.first
+        elif self.row is not None:
+            values = block.samples[self.row] * self.device.inputs[self.row].scale
+            found = trigger.row(values, self.last)
+            self.last = float(values[-1])
+            if found is not None:
+                at = block.first + found
+                run.began = block.clock - (block.after - at) / fs
+        if at is None and run.began is not None and self.row is None:
+            at = block.after - (block.clock - run.began) * fs  # as good as the time at which blocks come
+        before = trigger.before if trigger else 0.0
+        if at is None:
+            while len(self.held) > 1 and block.after - self.held[1].first > (before + 1.0) * fs:
+                self.held.popleft()  # a second more: another device may have the trigger
+            return
+        begin = max(self.held[0].first, math.ceil(at - before * fs - 1e-6))
+        self.end = math.ceil(at + run.wanted.seconds * fs - 1e-6) if run.wanted.seconds else math.inf
+        self.tape = Tape(
+            self.device, self.path, begin=begin, start=(begin - at) / fs, log=run.wanted.log, notes=_notes(run.wanted)
+        )
+        while self.held:
+            self._write(self.held.popleft())
+
+    def _write(self, block: Block) -> None:
+        assert self.tape is not None
+        if block.after > self.end:
+            block = block._replace(samples=block.samples[:, : max(0, int(self.end) - block.first)])
+            self.tape.write(block)
+            self.end = min(self.end, self.tape.seen.after or 0)
+            return
+        self.tape.write(block)
+
+
+def _notes(wanted: Wanted) -> dict[str, Any]:
+    notes: dict[str, Any] = {}
+    if (trigger := wanted.trigger) is not None:
+        way = "rising" if trigger.rising else "falling"
+        notes["trigger"] = f"{trigger.channel} {way} through {trigger.level:g}, {trigger.before:g} s before it kept"
+    for name, signal in wanted.drive.items():
+        notes[f"drive {name}"] = (
+            str(signal) if isinstance(signal, tuple) else f"{0 if signal is None else len(signal)} samples"
+        )
+    return notes
+
+
+def _together(paths: Sequence[Path], output: Path, done: Acquired) -> Acquired:
+    """The records of several devices as one, on the first one's clock; as they are where that can not be."""
+    first, *others = [read_record(path) for path in paths]
+    try:
+        for other in others:
+            first = _joined(first, other)
+        write_record(first, output)
+    except StickslipError as error:
+        note = f"the devices' records stay apart: {error}"
+        return replace(done, notes=(*done.notes, note))
+    for path in paths:
+        path.unlink()
+    return replace(done, paths=(output,))
+
+
+def _joined(first: Record, other: Record) -> Record:
+    pairs = [(a, b) for a in ("x", "v") for b in ("x", "v") if a in first and b in other]
+    for on in pairs[:1]:
+        try:
+            rate = clock_rate(first, other, on=on)
+            return synchronise(first, other, on=on, rate=1.0 if rate.includes(1.0) else rate)
+        except EstimateError:
+            break  # they did not move alike: by when their samples came
+    return synchronise(first, other, offset=0.0)

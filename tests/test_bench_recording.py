@@ -1,0 +1,186 @@
+"""Recording: nothing is lost that came, whatever ends the program; what did not come is named."""
+
+from __future__ import annotations
+
+import os
+import random
+import signal
+import subprocess
+import sys
+import threading
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+import stickslip as ss
+from bench_devices import Counter, counts
+from stickslip.bench import Block, Fault, Sim, Tape, Tone, Trigger, Wanted, acquire
+from stickslip.cli.program import main
+from stickslip.files import journal
+
+ROOT = Path(__file__).parent
+
+KILLED = """
+import sys
+from bench_devices import Counter
+from stickslip.bench import Wanted, acquire
+acquire(Counter(size=200, pace=1.0), output=sys.argv[1], watch=lambda device, block: print(block.first, flush=True))
+"""
+
+
+@pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="no such signal here")
+def test_a_kill_costs_the_last_block_alone(tmp_path: Path) -> None:
+    """Killed at instants that nobody chose, three at once: all that was read before the last block is there."""
+    chance = random.Random(4)
+    paths = [tmp_path / f"{number}.h5" for number in range(3)]
+    runs = [
+        subprocess.Popen([sys.executable, "-c", KILLED, str(path)], stdout=subprocess.PIPE, cwd=ROOT) for path in paths
+    ]
+    for run, path in zip(runs, paths, strict=True):
+        assert run.stdout is not None
+        for _ in range(chance.randrange(3, 120)):
+            run.stdout.readline()
+        threading.Event().wait(chance.random() * 0.01)
+        os.kill(run.pid, signal.SIGKILL)
+        run.wait()
+        rest = [int(line) for line in run.stdout.read().split()]
+        run.stdout.close()
+        read = rest[-1] if rest else 0  # the counter of the block that came last
+        assert not path.exists()
+        record = ss.read_record(path.with_name(f"{path.name}.journal"))
+        assert len(record) >= read
+        np.testing.assert_array_equal(record["c1"], counts(0, len(record), 2)[1] * 1e-6)
+        assert "not closed" in record.history[-1].outcome
+
+
+def test_what_is_recorded_is_what_was_sent(tmp_path: Path) -> None:
+    done = acquire(Counter(channels=3), output=tmp_path / "run.h5", wanted=Wanted(seconds=1.00501))
+    record = ss.read_record(done.paths[0])
+    assert len(record) == 50_251
+    for row, name in zip(counts(0, len(record), 3), record, strict=True):
+        np.testing.assert_array_equal(record[name], row * 1e-6)
+    assert [*tmp_path.iterdir()] == [tmp_path / "run.h5"]
+    told = record.history[0].arguments
+    assert (told["device"], told["model"], told["serials"]["c2"]) == ("counter", "counts, serial 0815", "S2")
+    assert told["ranges"] == {"c0": 0.015, "c1": 0.015, "c2": 0.015}
+    assert ss.read_record(done.paths[0]).equals(record)
+    again = ss.write_record(record, tmp_path / "again.h5")
+    assert ss.read_record(again).equals(record)
+
+
+def test_what_is_lost_or_clipped_is_named(tmp_path: Path) -> None:
+    done = acquire(Counter(lost=((3000, 5000), (9000, 9200))), output=tmp_path / "a.h5", wanted=Wanted(seconds=0.4))
+    record = ss.read_record(done.paths[0])
+    missing = np.flatnonzero(np.isnan(record["c0"]))
+    assert missing.tolist() == [*range(3000, 5000), *range(9000, 10_000)]  # a block is lost whole
+    np.testing.assert_array_equal(record["c0"][5000:9000], counts(5000, 9000, 1)[0] * 1e-6)
+    assert "3000 samples lost (2000 at 0.060 s, 1000 at 0.180 s)" in record.history[-1].outcome
+    sim = Sim(fast=True, faults=(Fault("saturation", 0.5, 0.1, "load"),))
+    done = acquire(sim, output=tmp_path / "b.csv", wanted=Wanted(seconds=1.0))
+    record = ss.read_record(done.paths[0])
+    clipped = np.sum(np.abs(record["load"]) >= sim.inputs[3].limit * (1 - 1e-9))
+    assert clipped > 300
+    assert f"load clipped in {clipped} samples, first at 0.5" in done.outcomes["sim"]
+
+
+def test_a_trigger_begins_it_and_what_was_before_is_kept(tmp_path: Path) -> None:
+    wanted = Wanted(0.5, Trigger("x", 3e-4, before=0.25), {"base": Tone(1e-3, 2.0)})
+    still = Sim(system=ss.Oscillator(mass=2.42, stiffness=2310, law=ss.laws.Coulomb(1.1)), fast=True)
+    done = acquire(still, output=tmp_path / "run.h5", wanted=wanted)
+    record = ss.read_record(done.paths[0])
+    assert (len(record), record.start) == (3000, -0.25)
+    row = round(-record.start * record.fs)
+    assert record["x"][row - 1] < 3e-4 <= record["x"][row]
+    assert np.all(record["x"][:row] < 3e-4)
+    with pytest.raises(ss.errors.ModelError, match="the inputs are x, z, a, load"):
+        acquire(still, output=tmp_path / "other.h5", wanted=Wanted(trigger=Trigger("y", 1.0)))
+
+
+def test_two_devices_come_onto_one_clock(tmp_path: Path) -> None:
+    """The second unit begins 40 ms later on its clock, which is 200 ppm fast; both see x."""
+    drive = ss.drives.MultiTone([(6e-4, 2.3, 0.0), (4e-4, 3.1 * 2**0.5, 1.0)])
+    system = ss.Oscillator(mass=2.42, stiffness=2310, law=ss.laws.Coulomb(0.4), drive=drive)
+    first = Sim(system, rig=ss.Rig.perfect("x", "z"), fs=500.0, fast=True, name="one")
+    other = Sim(system, rig=ss.Rig(ss.Rig.perfect("x", "a").sensors, 0.04, 2e-4), fs=400.0, fast=True, name="two")
+    done = acquire([first, other], output=tmp_path / "run.h5", wanted=Wanted(seconds=8.0))
+    record = ss.read_record(done.paths[0])
+    assert set(record) == {"x", "z", "a", "x_b"}
+    inner = slice(200, -200)
+    apart = np.abs(record["x"] - record["x_b"])[inner].max()
+    assert apart < 2e-3 * np.abs(record["x"]).max()
+    assert [*tmp_path.iterdir()] == [tmp_path / "run.h5"]
+
+
+def test_a_mark_stands_in_the_history(tmp_path: Path) -> None:
+    device = Counter()
+    tape = Tape(device, tmp_path / "run.h5")
+    for first in (500, 1500):
+        tape.write(Block(first, 0.0, counts(first, first + 1000, 2)))
+        tape.mark(f"after {first}")
+    assert tape.close() == "2000 samples at 50000 Hz"
+    record = ss.read_record(tape.finish())
+    marks = [(step.arguments["time"], step.outcome) for step in record.history if step.action == "mark"]
+    assert marks == [(0.02, "after 500"), (0.04, "after 1500")]
+
+
+def test_a_damaged_journal_is_read_up_to_the_damage_or_refused(tmp_path: Path) -> None:
+    path = tmp_path / "run.h5.journal"
+    tape = Tape(Counter(), tmp_path / "run.h5")
+    for first in range(0, 10_000, 1000):
+        tape.write(Block(first, 0.0, counts(first, first + 1000, 2)))
+    tape.close()
+    whole = path.read_bytes()
+    chance = np.random.default_rng(8)
+    lengths = set()
+    for _ in range(60):
+        data = bytearray(whole[: chance.integers(len(whole))])
+        for at in chance.integers(0, max(1, len(data)), chance.integers(3)):
+            if at < len(data):
+                data[at] ^= int(chance.integers(1, 256))
+        path.write_bytes(bytes(data))
+        try:
+            record = ss.read_record(path)
+        except ss.StickslipError:
+            lengths.add(0)
+            continue
+        np.testing.assert_array_equal(record["c1"], counts(0, len(record), 2)[1] * 1e-6)
+        lengths.add(len(record))
+    assert len(lengths) > 5
+    assert journal.recognise(path, journal.MAGIC + b"...")
+
+
+def test_nothing_is_measured_where_the_record_can_not_be(tmp_path: Path) -> None:
+    (tmp_path / "there.h5").write_text("mine")
+    for name, said in (("there.h5", "there already"), ("run.xyz", "ends in")):
+        with pytest.raises(ss.StickslipError, match=said):
+            acquire(Counter(), output=tmp_path / name, wanted=Wanted(seconds=1.0))
+    (tmp_path / "left.h5.journal").write_text("of a run that was killed")
+    with pytest.raises(ss.errors.FormatError, match=r"left\.h5\.journal"):
+        acquire(Counter(), output=tmp_path / "left.h5", wanted=Wanted(seconds=1.0))
+
+
+def test_a_counter_that_runs_back_ends_it_and_keeps_what_was(tmp_path: Path) -> None:
+    tape = Tape(Counter(), tmp_path / "run.h5")
+    tape.write(Block(0, 0.0, counts(0, 1000, 2)))
+    with pytest.raises(ss.errors.RecordError, match="counts its samples upwards"):
+        tape.write(Block(500, 0.0, counts(500, 1500, 2)))
+    assert len(ss.read_record(tmp_path / "run.h5.journal")) == 1000
+
+
+def test_the_command_records(tmp_path: Path) -> None:
+    config = tmp_path / "rig.toml"
+    log, device = '[log]\nsurface = "ground steel"\n', '[devices.rig]\nkind = "sim"\nsystem = "FD-4"\nrig = "perfect"\n'
+    config.write_text(f"{log}{device}fs = 500\nfast = true\n")
+    output = tmp_path / "run.h5"
+    run = CliRunner().invoke(
+        main, ["acquire", "--device", "rig", "--config", str(config), "--seconds", "2", "--output", str(output)]
+    )
+    assert run.exit_code == 0, run.output
+    record = ss.read_record(output)
+    assert len(record) == 1000
+    assert record.log is not None
+    assert record.log.entries()["surface"] == "ground steel"
+    listed = CliRunner().invoke(main, ["devices", "--config", str(config)])
+    assert "rig      virtual rig: Oscillator" in listed.output
