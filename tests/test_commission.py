@@ -11,7 +11,7 @@ from click.testing import CliRunner
 
 import stickslip as ss
 from stickslip import bench
-from stickslip.__main__ import main
+from stickslip.cli.program import main
 
 RIG = ss.Rig().having("x", gain=1.02, offset=3e-5).having("load", gain=0.97, offset=0.02)
 BENCH = bench.SimulatedBench(rig=RIG, fs=1000, seed=4)
@@ -49,7 +49,7 @@ def test_rig_toml_is_read_back_and_sets_records_right(done: bench.Commissioned, 
     written = ss.write_record(weighed, tmp_path / "weighed.csv")
     right = ss.read_record(written, channels=rig.channels)
     assert np.mean(right["load"][:900]) == pytest.approx(0.0, abs=2e-3)
-    assert np.max(right["load"]) == pytest.approx(5.0, rel=0.01)
+    assert np.mean(right["load"][1200:1300]) == pytest.approx(5.0, rel=0.01)
     assert 0 < right.channels["load"].gain_sd < 0.01
     assert rig.sensors["x"].noise == pytest.approx(1e-6, rel=0.05)
 
@@ -76,7 +76,7 @@ def test_the_story_says_the_constants_first_and_the_truth_beside(done: bench.Com
     story = ss.summary(done)
     assert story.headline[0].startswith("The rig is a mass of 2.4")
     assert story.lines[0].true is not None
-    assert [table.title for table in story.tables][0] == "What was done"
+    assert next(table.title for table in story.tables) == "What was done"
     assert {plate.name for plate in story.plates} == {"calibration"}
 
 

@@ -80,7 +80,7 @@ class Known:
         rest = self.of("rest", AtRest)
         if rest is None or channel not in rest.sensors or rest.sensors[channel].zero.includes(0.0):
             return 0.0
-        return rest.sensors[channel].zero.value
+        return float(rest.sensors[channel].zero.value)
 
     def corrected(self, record: Record) -> Record:
         """A record with zeros taken off and gains set right, as far as they are known; their doubt in ``gain_sd``."""
