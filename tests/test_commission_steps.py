@@ -199,7 +199,7 @@ def test_stepped_sine_is_the_closed_form_at_its_tones() -> None:
 
 
 def test_the_limits_of_a_shaker() -> None:
-    shaker = bench.Shaker(force=20.0, moving_mass=1.5, velocity=0.2)
+    shaker = ss.rig.Shaker(force=20.0, moving_mass=1.5, velocity=0.2)
     assert shaker.largest(1.0) == 8e-3
     assert shaker.largest(6.0) == pytest.approx(0.2 / (2 * math.pi * 6))
     assert shaker.largest(20.0) == pytest.approx(20 / (1.5 * (2 * math.pi * 20) ** 2))
@@ -216,16 +216,16 @@ def test_the_limits_of_a_shaker() -> None:
 
 
 def test_every_step_finds_the_truth_on_simulated_rigs() -> None:
-    """A short form of benchmarks/commission.py, on seeds of its own: two rigs, some 70 numbers each."""
+    """A short form of benchmarks/commission.py, on a seed of its own: one rig, some fifty numbers."""
     script = loaded("benchmarks/commission.py")
     held, refused = [], []
-    for seed in (9001, 9002):
-        rig = script.random_rig(seed)
+    for seed in (9001,):
+        rig = script.random_rig(seed, fs=2000.0)
         done = bench.commission(rig.step, truth=rig.truth)
         refused += list(done.refused.values())
         for step, each in script.numbers(done):
             true = done.true_value(each.name, step)
             held += [] if true is None else [each.includes(true)]
     assert not refused
-    assert len(held) > 80
+    assert len(held) > 45
     assert sum(held) > 0.85 * len(held)

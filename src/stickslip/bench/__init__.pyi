@@ -7,6 +7,7 @@ from stickslip.bench.device import Device as Device
 from stickslip.bench.device import Found as Found
 from stickslip.bench.device import Input as Input
 from stickslip.bench.device import Output as Output
+from stickslip.bench.device import Signal as Signal
 from stickslip.bench.device import Stream as Stream
 from stickslip.bench.device import Tone as Tone
 from stickslip.bench.device import blocks as blocks
@@ -35,7 +36,12 @@ from stickslip.bench.response import modal_fit as modal_fit
 from stickslip.bench.rest import AtRest as AtRest
 from stickslip.bench.rest import SensorAtRest as SensorAtRest
 from stickslip.bench.rest import at_rest as at_rest
-from stickslip.bench.shaker import Shaker as Shaker
+from stickslip.bench.runs import Proposal as Proposal
+from stickslip.bench.runs import Run as Run
+from stickslip.bench.runs import RunList as RunList
+from stickslip.bench.runs import next_runs as next_runs
+from stickslip.bench.runs import read_runs as read_runs
+from stickslip.bench.runs import run_list as run_list
 from stickslip.bench.sim import Fault as Fault
 from stickslip.bench.sim import Sim as Sim
 from stickslip.bench.simulated import SimulatedBench as SimulatedBench
@@ -43,6 +49,8 @@ from stickslip.bench.simulated import sweep_of as sweep_of
 from stickslip.bench.steps import STEPS as STEPS
 from stickslip.bench.steps import BenchStep as BenchStep
 from stickslip.bench.steps import step_named as step_named
+from stickslip.bench.through import Tour as Tour
+from stickslip.bench.through import tour as tour
 from stickslip.bench.walk import Commissioned as Commissioned
 from stickslip.bench.walk import commission as commission
 

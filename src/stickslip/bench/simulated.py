@@ -147,6 +147,7 @@ class SimulatedBench:
             stiff, damping = system.stiffness + law.stiffness, system.damping + law.damping
             told["coupled frequency"] = math.sqrt(stiff / system.mass) / math.tau
             told["contact stiffness"] = law.stiffness
+            told["kinetic friction"] = law.kinetic
             told["damping ratio of the coupled mode"] = damping / (2 * math.sqrt(stiff * system.mass))
             told["frequency of the coupled contact"] = told["coupled frequency"]
             told["damping ratio of the coupled contact"] = told["damping ratio of the coupled mode"]

@@ -9,6 +9,7 @@ import click
 import stickslip as ss
 from stickslip.cli.acquire import acquire
 from stickslip.cli.analyze import analyze, demo
+from stickslip.cli.bench import bench
 from stickslip.cli.commission import commission
 from stickslip.cli.decay import decay
 from stickslip.cli.devices import devices
@@ -77,6 +78,7 @@ def main() -> None:
 for _command in (
     acquire,
     analyze,
+    bench,
     check,
     commission,
     convert,

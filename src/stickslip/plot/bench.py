@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from stickslip.plot.style import BLUE, GREEN, INK, ORANGE, PURPLE, axis_label, new_figure, styled
+from stickslip.plot.style import BLUE, GREEN, INK, ORANGE, PURPLE, axis_label, new_figure, plain_decades, styled
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -80,6 +80,7 @@ def plot_response(found: ModalFit) -> Figure:
     above.plot(f, np.abs(response.h2), color=ORANGE, linestyle=":", label="H2, averaged")
     above.plot(f, np.abs(found.model(f)), color=INK, linewidth=0.9, label="fitted oscillator")
     above.set_yscale("log")
+    plain_decades(above.yaxis)
     unit = "1" if response.channels[0] == "z" else "m/N"
     above.set_ylabel(axis_label(f"{response.channels[1]} over {response.channels[0]}", unit))
     above.legend(ncols=3, loc="lower left", bbox_to_anchor=(0, 1))

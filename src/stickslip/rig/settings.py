@@ -87,7 +87,7 @@ class SensorSettings(BaseModel):
 
 
 class ShakerSettings(BaseModel):
-    """What moves the base, and how far it can; see :class:`stickslip.bench.Shaker`.
+    """What moves the base, and how far it can; see :class:`stickslip.rig.Shaker`.
 
     Attributes
     ----------

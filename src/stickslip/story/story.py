@@ -30,7 +30,7 @@ TELLERS = {
     "Record": "rig.of_record", "ExperimentPlan": "rig.of_plan",
     "Bifurcation": "regimes.of_bifurcation", "Basins": "regimes.of_basins", "Boundary": "regimes.of_boundary",
     "Dither": "regimes.of_dither", "Dataset": "maps.of_map",
-    "Commissioned": "bench.of_commissioned",
+    "Commissioned": "bench.of_commissioned", "Tour": "tour.of_tour",
     "Estimate": "estimates.of_one", "list": "estimates.of_several", "tuple": "estimates.of_several",
 }  # fmt: skip
 
