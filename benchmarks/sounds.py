@@ -3,9 +3,10 @@
     python benchmarks/sounds.py --draws 200 --seed 1
 
 Squeaks, creaks and what is neither (beeps, beats, fans, clicks, speech, music, hum) are drawn by
-``tests/sound_sources.py``, which has nothing of the package, 0 to 30 dB over noise. A claim is an answer that it
-squeaks, squeals or creaks; it is false where nothing rubs. A squeak is found where a tonal burst shares more than half
-of its time; its pitch is right within 1 %.
+``tests/sound_sources.py``; squeaks of coupled modes, whines, flutes, birds, crickets, kettles and sirens in a room that
+answers by ``tests/sound_strangers.py``. Neither has anything of the package; noise lies 0 to 30 dB below. A claim is an
+answer that it squeaks, squeals or creaks; it is false where nothing rubs. A squeak is found where a tonal burst shares
+more than half of its time; its pitch is right within 1 %.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ from pathlib import Path
 import stickslip as ss
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
+import sound_strangers
 from sound_sources import KINDS, RUBS, Sound, draw
 
 CLAIMS = ("squeaks", "squeals", "creaks")
@@ -49,7 +51,7 @@ def measured(kind: str, draws: int, seed: int) -> Score:
     """Score of a kind's draws from `seed` on."""
     score = Score()
     for number in range(draws):
-        sound = draw(kind, seed + number)
+        sound = (draw if kind in KINDS else sound_strangers.draw)(kind, seed + number)
         answer = heard(sound)
         score.answers[answer.answer] += 1
         for begin, end, frequency in sound.squeaks if sound.snr >= HEARD else ():
@@ -71,14 +73,17 @@ if __name__ == "__main__":
     asked.add_argument("--seed", type=int, default=1)
     options = asked.parse_args()
     scores = {}
-    for kind in KINDS:
+    for kind in (*KINDS, *sound_strangers.KINDS):
         score = scores[kind] = measured(kind, options.draws, options.seed)
         answers = ", ".join(f"{answer} {count}" for answer, count in score.answers.most_common())
-        print(f"{kind:8} {answers}", flush=True)
-    squeaks = scores["squeaks"]
-    shares = [count / squeaks.squeaks for count in (squeaks.found, squeaks.pitched, squeaks.claimed)]
-    told = "found {:.1%}, pitch within 1 % {:.1%}, said to be squeaks {:.1%}".format(*shares)
-    print(f"squeaks at {HEARD:g} dB and more: {squeaks.squeaks}; {told}")
-    claims = sum(score.claims for score in scores.values())
-    false = sum(score.claims for kind, score in scores.items() if kind not in RUBS)
-    print(f"claims that something rubs: {claims}, of which false {false} ({false / max(1, claims):.2%})")
+        print(f"{kind:10} {answers}", flush=True)
+    for kind in ("squeaks", "couplings"):
+        score = scores[kind]
+        shares = [count / score.squeaks for count in (score.found, score.pitched, score.claimed)]
+        told = "found {:.1%}, pitch within 1 % {:.1%}, said to be squeaks {:.1%}".format(*shares)
+        print(f"{kind} at {HEARD:g} dB and more: {score.squeaks}; {told}")
+    for kinds in (KINDS, sound_strangers.KINDS):
+        rubs = (*RUBS, *sound_strangers.RUBS)
+        claims = sum(scores[kind].claims for kind in kinds)
+        false = sum(scores[kind].claims for kind in kinds if kind not in rubs)
+        print(f"claims that something rubs: {claims}, of which false {false} ({false / max(1, claims):.2%})")

@@ -146,7 +146,7 @@ def test_a_sensor_with_the_wrong_sign_is_named_without_a_load_cell_too(short: ss
     assert f"{turned} has the wrong sign" in found.loops.level.status
     assert f"perhaps {turned} has the wrong sign" in ss.summary(found).headline[0]
     assert "slides against" not in " ".join(ss.summary(found).headline)
-    assert "consistency" in [plate.name for plate in ss.figures(found)]
+    assert "consistency" in [plate.name for plate in ss.summary(found).plates]
 
 
 def test_a_delay_longer_than_a_cycle_is_said(readings: ss.Record) -> None:
@@ -159,7 +159,9 @@ def test_a_delay_longer_than_a_cycle_is_said(readings: ss.Record) -> None:
 def test_the_page_shows_what_its_numbers_say(short: ss.Record) -> None:
     record = short.with_details("x", delay=0.0389 / 30.91).with_details("z", delay=0.0389 / 30.91)
     record = record.with_details("a", mount=(125.0, 0.1)).with_details("load", mount=(250.0, 0.05), inertia=0.05)
-    plates = {plate.name: plate for plate in ss.figures(ss.analyze(record, mass=2.42, stiffness=2310, damping=0))}
+    plates = {
+        plate.name: plate for plate in ss.summary(ss.analyze(record, mass=2.42, stiffness=2310, damping=0)).plates
+    }
     assert {"breakaway", "transition", "micro-slips", "force-comparison"} <= set(plates)
     assert "not their sum" in plates["force-balance"].caption
 

@@ -131,7 +131,7 @@ def test_what_can_not_be_compared_is_refused() -> None:
 
 def test_the_figure_and_the_plain_data() -> None:
     found = compared(8.7)
-    figure = ss.plot.plot_force_comparison(found)
+    figure = ss.figures.plot_force_comparison(found)
     words = [text.get_text() for text in figure.axes[2].texts]
     assert any("accelerometer" in each for each in words)
     told_ = found.to_dict()

@@ -9,7 +9,7 @@ import pytest
 
 import stickslip as ss
 from motions import free_decay
-from stickslip.answers.decay_comparison import _apart
+from stickslip.answers.decays import _apart
 
 
 def record(seed, **motion):
@@ -82,7 +82,7 @@ def test_one_record_is_no_comparison():
 
 def test_records_together_have_a_page_and_figures(tmp_path):
     together = ss.answers.compare_decays([findings(1), findings(2, amplitude=0.9)])
-    assert [plate.name for plate in ss.figures(together)] == ["damping-ratio", "dry-displacement"]
+    assert [plate.name for plate in ss.summary(together).plates] == ["damping-ratio", "dry-displacement"]
     folder = ss.publish(together, folder=tmp_path / "out")
     page = (folder / "report.html").read_text("utf-8")
     assert "2 records together" in page

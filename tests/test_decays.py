@@ -146,17 +146,17 @@ def test_the_force_follows_from_mass_or_stiffness(release):
 def test_every_figure_can_be_drawn(release):
     record = ss.read_record(release, channels={"x": "pos [mm]"})
     for method in ("thesis", "all"):
-        plates = ss.figures(ss.analyze_decay(record, method=method))
+        plates = ss.summary(ss.analyze_decay(record, method=method)).plates
         assert [plate.name for plate in plates] == ["decay", "identified", "differences", "bounds"]
         assert all(plate.png().startswith(b"\x89PNG") for plate in plates)
     values, fs, _ = free_decay(order=1)
     velocity = ss.analyze_decay(ss.Record.of({"v": values}, fs=fs), method="thesis")
-    assert [plate.name for plate in ss.figures(velocity)] == ["decay", "differences", "bounds"]
+    assert [plate.name for plate in ss.summary(velocity).plates] == ["decay", "differences", "bounds"]
 
 
 def test_the_identified_motion_is_the_measured_one(release):
     """What the decrements identify leaves noise alone, over the whole motion (thesis, Figures 6.10 and 6.15)."""
-    from stickslip.plot.decay import _identified
+    from stickslip.figures.decay import _identified
 
     record = ss.read_record(release, channels={"x": "pos [mm]"})
     _, measured, fitted, _ = _identified(ss.analyze_decay(record, method="thesis").decay)
@@ -181,7 +181,7 @@ def test_a_pendulum_is_read_with_its_sine_and_by_its_own_waveform(dataset):
     assert low < 3.6e-3 < 4.8e-3 < high
     other = found.decay.as_force(found.decay.older["extremes alone"].dry_displacement, "")
     assert low < other.value < high
-    assert [plate.name for plate in ss.figures(found)] == ["decay", "identified"]
+    assert [plate.name for plate in ss.summary(found).plates] == ["decay", "identified"]
     with pytest.raises(ss.errors.EstimateError, match="hold for a linear spring"):
         ss.analyze_decay(record, restoring="pendulum", method="thesis")
 
@@ -252,7 +252,7 @@ def test_every_release_is_drawn():
     twice += 1e-5 * np.random.default_rng(1).standard_normal(len(twice))
     found = ss.analyze_decay(ss.Record.of({"x": twice}, fs=fs), method="waveform")
     assert len(found.decay.releases.ring_downs) == 2
-    assert [plate.name for plate in ss.figures(found)] == ["decay", "identified", "identified-2"]
+    assert [plate.name for plate in ss.summary(found).plates] == ["decay", "identified", "identified-2"]
 
 
 def analyzed(values, fs, *, method="waveform", noise=1e-3):
@@ -309,7 +309,7 @@ def test_the_headline_names_the_motion_that_the_record_leaves():
     assert estimates["quadratic damping"].includes(quadratic)
     assert estimates["quadratic damping"].unit == "1/m"
     assert "dry friction displacement" not in estimates
-    assert ss.figures(found)
+    assert ss.summary(found).plates
 
 
 def test_a_pendulum_read_with_a_straight_spring_is_told_so():

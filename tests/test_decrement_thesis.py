@@ -1,13 +1,13 @@
-"""Chapter 6 of the thesis: what its tables do not say. The tables themselves are judged with the chapters (thesis/)."""
+"""Chapter 6 of the thesis: what its tables do not say. The tables themselves are judged with the chapters."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
-from thesis import chapter6
-from thesis.printed import given
 
 from stickslip.decay import extremes as ex
+from stickslip_thesis import chapter6
+from stickslip_thesis.printed import given
 
 GIVEN = given()
 TRUE = np.round(chapter6.extremes(GIVEN), 5)

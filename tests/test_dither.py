@@ -173,7 +173,7 @@ def test_bad_questions_are_refused_in_a_sentence(ask, told) -> None:  # type: ig
 
 
 def test_the_figure_shows_law_and_runs(found: ss.maps.Dither) -> None:
-    [plate] = ss.figures(found)
+    [plate] = ss.summary(found).plates
     assert "asin" in plate.svg()
     assert "smallest that does it" in plate.svg()
 

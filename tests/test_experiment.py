@@ -104,7 +104,7 @@ def test_it_says_how_far_it_is() -> None:
 
 
 def test_the_figure_has_a_panel_for_every_question() -> None:
-    figure = ss.plot.plot_plan(plan())
+    figure = ss.figures.plot_plan(plan())
     assert [panel.get_title(loc="left") for panel in figure.axes] == list(plan().questions)
     assert [len(panel.lines) for panel in figure.axes] == [4, 4, 4, 4]
 

@@ -103,7 +103,7 @@ def test_a_single_fitted_law_is_shown_and_written_too(tmp_path: Path) -> None:
     rig = ss.Rig.perfect("x", "z").having("x", white=1e-6)
     record = rig.measure(ss.simulate(slider, duration=1.6), fs=2000, rng=1, start=0.8)
     found = ss.fit_law(record, slider.having(kinetic=1.0))
-    assert [plate.name for plate in ss.figures(found)] == ["fit-1"]
+    assert [plate.name for plate in ss.summary(found).plates] == ["fit-1"]
     folder = ss.publish(found, folder=tmp_path / "fit", record=record)
     told = json.loads((folder / "results.json").read_text(encoding="utf-8"))
     assert (told["law"], told["estimates"][0]["value"]) == ("Coulomb", found.law.kinetic)

@@ -48,7 +48,7 @@ def test_findings_outlive_a_figure_that_can_not_be_drawn(tmp_path, monkeypatch):
     def fails(*_, **__):
         raise ValueError("Axis limits cannot be NaN or Inf")
 
-    monkeypatch.setattr("stickslip.plot.decay.plot_differences", fails)
+    monkeypatch.setattr("stickslip.figures.decay.plot_differences", fails)
     folder = ss.publish(found, folder=tmp_path / "results")
     page = (folder / "report.html").read_text(encoding="utf-8")
     assert "The figure &#39;Amplitude differences&#39; can not be drawn: Axis limits cannot be NaN or Inf." in page

@@ -101,7 +101,7 @@ def test_an_unstable_cycle_separates_the_vibration_from_stable_sliding() -> None
     ]
     assert [end.status for end in ends] == ["steady sliding", "periodic"]
     assert "unstable, between" in [
-        str(line.get_label()) for line in ss.plot.plot_limit_cycles(found).axes[0].get_lines()
+        str(line.get_label()) for line in ss.figures.plot_limit_cycles(found).axes[0].get_lines()
     ]
 
 
@@ -213,7 +213,7 @@ def test_energy_of_each_displacement_adds_up_to_that_of_all() -> None:
 
 
 def test_the_figures_show_both_ways_and_the_threshold() -> None:
-    figure = ss.plot.plot_limit_cycles(smooth(), label="belt speed [m/s]")
+    figure = ss.figures.plot_limit_cycles(smooth(), label="belt speed [m/s]")
     lines = figure.axes[0].get_lines()
     drawn = {line.get_label(): line for line in lines}
     assert np.array_equal(drawn["going up"].get_ydata(), 1e3 * smooth().amplitudes())
@@ -228,11 +228,11 @@ def test_the_map_of_the_rig_over_load_and_slope() -> None:
     )
     assert found.mechanism.sel(load=7.0, slope=0.0) == "mode coupling"
     assert found.mechanism.sel(load=1.0, slope=3.0) == "stable"
-    figure = ss.plot.plot_stability(found, labels=("slope [s/m]", "load [N]"))
+    figure = ss.figures.plot_stability(found, labels=("slope [s/m]", "load [N]"))
     named = {text.get_text() for text in figure.axes[0].get_legend().get_texts()}
     assert named == set(np.unique(found.mechanism.values))
     with pytest.raises(ss.errors.ModelError, match="two parameters"):
-        ss.plot.plot_stability(found.isel(load=0))
+        ss.figures.plot_stability(found.isel(load=0))
 
 
 @pytest.mark.parametrize(

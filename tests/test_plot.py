@@ -15,12 +15,12 @@ import stickslip as ss
 from stickslip.answers.comparison import compare
 from stickslip.answers.findings import Findings
 from stickslip.answers.questions import analyze
-from stickslip.plot.contact import plot_velocity_loop
-from stickslip.plot.friction import plot_load_dependence
-from stickslip.plot.plate import Plate
-from stickslip.plot.style import COLUMNS, STYLE, envelope, prefixed, thinned
-from stickslip.plot.traces import close_up, force_balance, plot_force_balance, plot_traces
-from stickslip.story.story import figures
+from stickslip.figures.contact import plot_velocity_loop
+from stickslip.figures.friction import plot_load_dependence
+from stickslip.figures.plate import Plate
+from stickslip.figures.style import COLUMNS, STYLE, envelope, prefixed, thinned
+from stickslip.figures.traces import close_up, force_balance, plot_force_balance, plot_traces
+from stickslip.story.story import summary
 
 FS = 500.0
 
@@ -33,7 +33,7 @@ def demo() -> Findings:
 
 @pytest.fixture(scope="module")
 def plates(demo: Findings) -> tuple[Plate, ...]:
-    return figures(demo)
+    return summary(demo).plates
 
 
 def slid(friction: float, normal: float) -> Findings:
@@ -45,7 +45,7 @@ def slid(friction: float, normal: float) -> Findings:
 
 def test_every_figure_of_the_demonstration_is_drawn_once_without_pyplot(demo: Findings) -> None:
     before = dict(mpl.rcParams)
-    plates = figures(demo)
+    plates = summary(demo).plates
     assert [plate.name for plate in plates] == [
         "friction-velocity", "friction-displacement", "record", "close-up", "force-balance", "sticks"
     ]  # fmt: skip
@@ -70,7 +70,7 @@ def test_a_stick_or_slip_that_the_record_cuts_is_not_counted(demo: Findings, pla
 
 
 def test_images_are_valid_small_and_the_same_again(demo: Findings, plates: tuple[Plate, ...]) -> None:
-    for plate, again in zip(plates, figures(demo), strict=True):
+    for plate, again in zip(plates, summary(demo).plates, strict=True):
         assert ET.fromstring(plate.svg()).tag.endswith("svg")
         assert len(plate.svg()) < 600_000
         assert plate.svg() == again.svg()
@@ -90,7 +90,9 @@ def test_a_rotary_contact_is_drawn_against_its_angle() -> None:
     time = np.arange(4000) / FS
     torque = 1.5 * np.sign(np.cos(2 * np.pi * time)) + np.random.default_rng(1).normal(0, 0.02, time.size)
     samples = {"theta": 0.3 * np.sin(2 * np.pi * time), "friction": torque}
-    plates = {plate.name: plate for plate in figures(analyze(ss.Record.of(samples, fs=FS, units={"friction": "N m"})))}
+    plates = {
+        plate.name: plate for plate in summary(analyze(ss.Record.of(samples, fs=FS, units={"friction": "N m"}))).plates
+    }
     for name, unit in (("displacement", "rad"), ("velocity", "rad/s")):
         axes = plates[f"friction-{name}"].figure.axes[0]
         assert (axes.get_xlabel(), axes.get_ylabel()) == (f"{name} of the contact [{unit}]", "friction [N m]")
@@ -160,9 +162,9 @@ def test_a_balance_by_all_sensors_with_the_damper_on_the_base_is_drawn() -> None
 def test_a_friction_that_was_measured_has_no_balance_to_draw() -> None:
     record = pushed()
     measured = record.with_channel("friction", 1.5 * np.sign(record["v"]), unit="N")
-    assert "force-balance" not in [plate.name for plate in figures(analyze(measured, mass=2, stiffness=800))]
+    assert "force-balance" not in [plate.name for plate in summary(analyze(measured, mass=2, stiffness=800)).plates]
     again = analyze(ss.friction_force(record, mass=2, stiffness=800, damping=3))
-    assert "force-balance" in [plate.name for plate in figures(again)], "whoever asked for it"
+    assert "force-balance" in [plate.name for plate in summary(again).plates], "whoever asked for it"
 
 
 def test_the_comparison_shows_the_line_of_the_coefficient() -> None:
@@ -172,7 +174,7 @@ def test_the_comparison_shows_the_line_of_the_coefficient() -> None:
     assert comparison.coefficient is not None
     x, y = (np.asarray(part, dtype=float) for part in line.get_data())
     assert y[-1] / x[-1] == pytest.approx(comparison.coefficient.value)
-    assert [plate.name for plate in figures(comparison)] == ["friction-load", "levels"]
+    assert [plate.name for plate in summary(comparison).plates] == ["friction-load", "levels"]
 
 
 def test_a_regression_is_drawn_with_what_it_leaves_over() -> None:
@@ -180,7 +182,7 @@ def test_a_regression_is_drawn_with_what_it_leaves_over() -> None:
     x = 0.1 * np.sin(np.pi * time) + 0.02 * np.sin(3.4 * np.pi * time)
     v, a = np.gradient(x, 1e-3), np.gradient(np.gradient(x, 1e-3), 1e-3)
     force = 3.0 * a + 5.0 * v + 2.0 * np.sign(v) + np.random.default_rng(0).normal(0, 0.3, time.size)
-    plates = {plate.name: plate for plate in figures(analyze(ss.Record.of({"x": x, "force": force}, fs=1000)))}
+    plates = {plate.name: plate for plate in summary(analyze(ss.Record.of({"x": x, "force": force}, fs=1000))).plates}
     lines = {line.get_label(): line for line in plates["regression"].figure.axes[0].get_lines()}
     assert {"measured", "explained"} <= set(lines)
 
@@ -189,13 +191,13 @@ def test_a_dollar_sign_in_a_name_is_no_mathematics() -> None:
     from dataclasses import replace
 
     comparison = compare([replace(slid(1.0, 2.0), name="run $\\frac$ <1>.csv"), slid(2.0, 4.0)])
-    svg = figures(comparison)[1].svg()
+    svg = summary(comparison).plates[1].svg()
     assert "run $\\frac$ &lt;1&gt;.csv" in svg
     ET.fromstring(svg)
 
 
 def test_the_style_can_be_told_apart_by_the_colour_blind() -> None:
-    from stickslip.plot import style
+    from stickslip.figures import style
 
     okabe_ito = {"#0072b2", "#d55e00", "#009e73", "#56b4e9"}
     assert okabe_ito <= {style.BLUE, style.ORANGE, style.GREEN, style.SKY}
@@ -243,7 +245,7 @@ def test_a_result_without_figures_is_refused_in_a_sentence() -> None:
     wave = np.sin(2 * np.pi * 500 * np.arange(4000) / 8000)
     heard = ss.find_squeaks(ss.Record.of({"sound": wave}, fs=8000))
     with pytest.raises(ss.errors.ModelError, match=r"a Squeaks; .* analyze_squeaks, "):
-        ss.figures(heard)
+        ss.summary(heard)
 
 
 def test_a_name_that_is_unknown_is_answered_with_the_nearest() -> None:

@@ -10,9 +10,9 @@ import pytest
 from matplotlib.figure import Figure
 
 import stickslip as ss
-from stickslip.plot.animation import frames
-from stickslip.plot.style import BLUE, SKY
-from stickslip.plot.trajectory import (
+from stickslip.figures.animation import frames
+from stickslip.figures.style import BLUE, SKY
+from stickslip.figures.trajectory import (
     curve,
     cycle_of,
     last_cycles,
@@ -23,7 +23,7 @@ from stickslip.plot.trajectory import (
 )
 from stickslip.solve.energies import energy
 from stickslip.solve.trajectory import Trajectory
-from stickslip.story.story import figures
+from stickslip.story.story import summary
 
 
 def motion(name: str, **run: float) -> Trajectory:
@@ -38,12 +38,12 @@ def sticking() -> Trajectory:
 
 def test_every_figure_is_drawn_without_pyplot(sticking: Trajectory) -> None:
     before = dict(mpl.rcParams)
-    plates = figures(sticking)
+    plates = summary(sticking).plates
     assert [plate.name for plate in plates] == [
         "whole-run", "motion", "friction-displacement", "friction-velocity", "phase-portrait"
     ]  # fmt: skip
     assert dict(mpl.rcParams) == before
-    for plate, again in zip(plates, figures(sticking), strict=True):
+    for plate, again in zip(plates, summary(sticking).plates, strict=True):
         assert plate.figure.canvas.manager is None
         assert plate.caption.endswith(".")
         assert ET.fromstring(plate.svg()).tag.endswith("svg")
@@ -110,7 +110,7 @@ def test_on_a_belt_it_sticks_at_the_belt_s_speed() -> None:
 
 def test_a_motion_that_ends_is_shown_as_long_as_it_moves() -> None:
     run = motion("FD-4")
-    plates = figures(run)
+    plates = summary(run).plates
     assert "whole-run" not in [plate.name for plate in plates]
     left, right = plates[0].figure.axes[0].get_xlim()
     assert (left, run.starts[-1] < right < 2 * run.starts[-1]) == (0.0, True)
@@ -176,7 +176,7 @@ def test_each_contact_has_its_own_loop_and_shades() -> None:
     drive = ss.drives.HarmonicForce(1.2, frequency=0.13)
     system = ss.Structure(np.eye(2), 0.05 * np.eye(2), [[3.0, -1.3], [-1.3, 2.9]], contacts=pads, drive=drive)
     run = ss.simulate(system, cycles=10)
-    names = [plate.name for plate in figures(run)]
+    names = [plate.name for plate in summary(run).plates]
     assert names[2:] == [
         "friction-displacement-1", "friction-velocity-1", "friction-displacement-2", "friction-velocity-2",
         "phase-portrait-x1", "phase-portrait-x2",

@@ -170,6 +170,18 @@ def test_a_unit_nobody_states_is_taken_as_si_and_said(csv: Callable[..., Path]) 
 # ---- clocks
 
 
+@pytest.mark.parametrize("digits", [6, 7])
+@pytest.mark.parametrize("fs", [22_050.0, 4000.0, 150.0])
+def test_stamps_of_so_many_significant_digits_follow_one_rate(tmp_path: Path, fs: float, digits: int) -> None:
+    rows = np.arange(int(2.1 * fs))
+    lines = [f"{row / fs:.{digits}g},{np.sin(row / 50):.6g}" for row in rows]  # as "%g" writes them
+    path = tmp_path / "sound.csv"
+    path.write_text("time [s],sound [1]\n" + "\n".join(lines), "utf-8")
+    record = ss.read_record(path)
+    assert record.stamps is None
+    assert record.fs == pytest.approx(fs, rel=1e-6)
+
+
 @pytest.mark.parametrize("fs", [1 / 3, 20, 150, 250, 900, 1000, 1024, 1500, 2000, 44100, 51200])
 @pytest.mark.parametrize("digits", [5, 6, 9])
 @pytest.mark.parametrize("start", [0.0, 17.0, 2332.308])

@@ -19,7 +19,8 @@ import pytest
 import stickslip as ss
 from stickslip.files import write
 from stickslip.record.channels import Channel
-from stickslip.record.metadata import metadata_to_record, record_to_metadata
+from stickslip.record.exchange import metadata_to_record
+from stickslip.record.metadata import record_to_metadata
 from stickslip.record.record import Record, Step
 
 

@@ -236,9 +236,9 @@ def test_the_figures_show_what_was_found() -> None:
     curve = ss.maps.boundary(forced(0.8, 0.5), "kinetic", between=(0.05, 0.99), along=places, precision=1e-6)
     found = ss.basins(BISTABLE.having(amplitude=1.25), grid={"x": np.linspace(-2, 2, 5), "v": np.linspace(-2, 2, 5)})
     for result, words in ((diagram, "held"), (curve, "Den Hartog"), (found, "2 + 0 stops")):
-        [plate] = ss.figures(result)
+        [plate] = ss.summary(result).plates
         assert words in plate.svg()
-    line = next(line for line in ss.plot.plot_boundary(curve).get_lines() if "Hartog" in str(line.get_label()))
+    line = next(line for line in ss.figures.plot_boundary(curve).get_lines() if "Hartog" in str(line.get_label()))
     assert np.interp(curve.places, *line.get_data()) == pytest.approx(curve.values, rel=2e-4)
 
 
@@ -247,7 +247,7 @@ def test_the_figures_tell_an_angle_in_radians() -> None:
         [[1.0]], [[0.1]], [[1.0]], contacts=[ss.Contact(ss.laws.Coulomb(0.8), [1.0])], acts_on=[1.0], rotations=[1],
         drive=ss.drives.HarmonicForce(1.0, frequency=0.08),
     )  # fmt: skip
-    map_ = ss.plot.plot_basins(ss.basins(lever, grid={"x": [-1.0, 1.0], "v": [-1.0, 1.0]}))
+    map_ = ss.figures.plot_basins(ss.basins(lever, grid={"x": [-1.0, 1.0], "v": [-1.0, 1.0]}))
     assert (map_.get_xlabel(), map_.get_ylabel()) == ("x [rad]", "v [rad/s]")
-    diagram = ss.plot.plot_bifurcation(ss.bifurcation(lever, "drive.amplitude", values=[1.0, 1.2]))
+    diagram = ss.figures.plot_bifurcation(ss.bifurcation(lever, "drive.amplitude", values=[1.0, 1.2]))
     assert diagram.axes[0].get_ylabel() == "displacement at phase zero [rad]"

@@ -10,6 +10,7 @@ import pytest
 
 from corpus import FS, Damaged, clean_records, damaged_records
 from stickslip import Record, friction_force
+from stickslip.answers import mend
 from stickslip.errors import RecordError
 from stickslip.record.flaws import runs_of
 from stickslip.signals import (
@@ -25,6 +26,7 @@ from stickslip.signals.interpolate import band_limited, bridge
 from test_check import read_pendulum, read_seal
 
 DAMAGED = list(damaged_records())
+UNMENDED = ("coarse", "constant", "frozen")  # the check-up names no repair: what was not measured is not known
 SMOOTH = ("sine", "sine, noise", "sine, LVDT steps", "sum of sines", "chirp", "noise of a band")
 
 
@@ -44,6 +46,19 @@ def held(record: Record, channel: str) -> np.ndarray:
     """The plain remedy: the last number before a missing one."""
     rows = np.where(np.isfinite(record[channel]), np.arange(len(record)), 0)
     return record[channel][np.maximum.accumulate(rows)]
+
+
+# ---- by the name that the check-up gives
+
+
+@pytest.mark.parametrize("damaged", {damaged.kind: damaged for damaged in reversed(DAMAGED)}.values(), ids=named)
+def test_the_repair_that_a_fault_names_mends_it(damaged: Damaged):
+    faults = [fault for fault in damaged.record.check() if fault.kind == damaged.kind]
+    assert [bool(fault.repair) for fault in faults] == [damaged.kind not in UNMENDED] * len(faults)
+    for repair in {fault.repair for fault in faults} - {""}:
+        mended = mend(damaged.record, repairs=[repair])
+        assert damaged.kind not in {fault.kind for fault in mended.check()}
+        assert [step.repair for step in mended.history if step.repair] == [repair]
 
 
 # ---- closer to the truth

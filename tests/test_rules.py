@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import ast
 import dataclasses
-import doctest
 import importlib
 import inspect
-import os
 import pkgutil
 import re
 import subprocess
@@ -27,7 +25,6 @@ FILES = sorted(PACKAGE.rglob("*.py"))
 ROOMS = sorted(stub.parent for stub in PACKAGE.glob("*/__init__.pyi"))
 MODULES = sorted(module.name for module in pkgutil.walk_packages([str(PACKAGE)], "stickslip."))
 TREES = {str(file.relative_to(PACKAGE)): ast.parse(file.read_text("utf-8")) for file in FILES}
-WITH_EXAMPLES = [name for name in TREES if ">>>" in (PACKAGE / name).read_text("utf-8")]
 HEAVY = {"scipy", "pandas", "matplotlib", "pint", "h5py", "pyarrow", "xarray", "jinja2", "pooch", "nptdms", "soundfile"}
 EMPTY_NAMES = {"utils", "util", "core", "common", "helpers", "misc", "tools"}
 
@@ -248,19 +245,6 @@ def test_the_start_is_light(start: str) -> None:
     run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     loaded = set(run.stdout.rpartition("LOADED")[2].split())
     assert not loaded & HEAVY
-
-
-@pytest.mark.parametrize("name", WITH_EXAMPLES)
-def test_the_examples_run(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setitem(os.environ, "MPLBACKEND", "agg")
-    if name != "squeak/quality.py":  # loudness works for seconds at a second of sound: its own example is enough
-        monkeypatch.setitem(sys.modules, "mosqito", None)
-    flags = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
-    parts = Path(name).with_suffix("").parts
-    module = importlib.import_module(".".join(["stickslip", *parts]).removesuffix(".__init__"))
-    results = doctest.testmod(module, optionflags=flags)
-    assert results.failed == 0, f"{results.failed} of {results.attempted} examples of {name} failed; see above"
 
 
 def test_the_files_that_contributing_names_are_there() -> None:

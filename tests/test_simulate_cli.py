@@ -90,7 +90,7 @@ def test_a_file_gives_a_folder_that_holds_the_motion() -> None:
     result = run("slider.toml")
     assert result.exit_code == 0, result.output
     folder = Path("slider-stickslip")
-    held = {"report.html", "results.json", "events.csv", "record.csv", "figures"}
+    held = {"report.html", "results.json", "events.csv", "record.csv", "record.csv.json", "figures"}
     assert {path.name for path in folder.iterdir()} == held
     assert {path.stem for path in (folder / "figures").iterdir()} == FIGURES
     record = ss.read_record(folder / "record.csv")

@@ -11,7 +11,7 @@ from scipy.signal import welch
 
 import stickslip as ss
 from squeak_peer import Rig, dop853, taylor
-from stickslip.plot.trajectory import plot_motion, plot_phase
+from stickslip.figures.trajectory import plot_motion, plot_phase
 
 CASES = [("dry", 6.13), ("wet", 6.13), ("dry", 1.23), ("wet", 1.23)]
 SQUEAKS = ("wet", 6.13)

@@ -194,7 +194,7 @@ def test_a_law_that_changes_for_ever_is_refused(measure: str, tmp_path: Path) ->
 
 
 def test_a_map_draws_by_default_its_first_answer() -> None:
-    from stickslip.plot.maps import plot_map
+    from stickslip.figures.maps import plot_map
 
     names = ["energy", "stick_share", "amplitude", "micro_slips"]
     for first in names:

@@ -12,7 +12,7 @@ from click.testing import CliRunner
 import stickslip as ss
 from stickslip.cli.program import main
 from stickslip.errors import ModelError
-from stickslip.plot.maps import den_hartog
+from stickslip.figures.maps import den_hartog
 from stickslip.scenarios import forced, grid
 
 pytest.importorskip("xarray")
@@ -121,19 +121,19 @@ def test_the_map_is_drawn_over_its_parameters() -> None:
     slider = forced(0.8, 0.5)
     values = {"frequency": np.linspace(0.08, 0.3, 12), "kinetic": np.linspace(0.1, 1.2, 10)}
     atlas = ss.sweep(slider, values, measures=["stops", "amplitude", "multipliers"], settle=60, cycles=20)
-    ax = ss.plot.plot_map(atlas, system=slider)
+    ax = ss.figures.plot_map(atlas, system=slider)
     drawn = ax.collections[0].get_array()
     assert np.array_equal(np.ravel(drawn), np.ravel((atlas.normal_stops + atlas.abnormal_stops).values.T))
     assert [line.get_label() for line in ax.lines] == ["Den Hartog (1931): no stops below"]
-    assert len(ss.plot.plot_map(atlas, variable="multiplier").collections) == 1
-    curve = ss.plot.plot_map(atlas.isel(kinetic=3), variable="amplitude")
+    assert len(ss.figures.plot_map(atlas, variable="multiplier").collections) == 1
+    curve = ss.figures.plot_map(atlas.isel(kinetic=3), variable="amplitude")
     assert np.allclose(curve.lines[0].get_xdata(), values["frequency"])
-    stops = ss.plot.plot_map(atlas.isel(frequency=3))
+    stops = ss.figures.plot_map(atlas.isel(frequency=3))
     assert all(tick == int(tick) for tick in stops.get_yticks())
-    status = ss.plot.plot_map(atlas, variable="status").figure.axes[1]
+    status = ss.figures.plot_map(atlas, variable="status").figure.axes[1]
     assert [tick.get_text() for tick in status.get_yticklabels()] == ["moving", "at rest"]
     with pytest.raises(ModelError, match="has no 'stick'"):
-        ss.plot.plot_map(atlas, variable="stick")
+        ss.figures.plot_map(atlas, variable="stick")
 
 
 def test_a_map_that_can_not_be_drawn_says_why(tmp_path: Path) -> None:
@@ -151,7 +151,7 @@ def test_a_map_that_can_not_be_drawn_says_why(tmp_path: Path) -> None:
 
 
 def test_what_is_white_on_a_map_is_explained() -> None:
-    from stickslip.plot.maps import plates_of
+    from stickslip.figures.maps import plates_of
 
     slider = forced(0.8, 0.5)
     atlas = ss.sweep(
@@ -161,6 +161,6 @@ def test_what_is_white_on_a_map_is_explained() -> None:
     (figure,) = plates_of(atlas)
     assert figure.caption.endswith("White: no number at 4 of 4 points (no orbit repeats yet after the settling).")
     whole = ss.sweep(slider, {"kinetic": [-1.0, 0.5], "frequency": [0.1, 0.13]}, measures=["stops"], settle=2, cycles=2)
-    legend = ss.plot.plot_map(whole).get_legend()
+    legend = ss.figures.plot_map(whole).get_legend()
     assert legend is not None
     assert legend.get_texts()[0].get_text() == "white: no number at 2 of 4 points (no such system)"

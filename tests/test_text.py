@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 import stickslip as ss
-from stickslip.files.layout import find_layout
 from stickslip.files.select import split_name
 from stickslip.files.table import Options
+from stickslip.files.text import find_layout
 
 T = np.arange(40) / 250
 X = np.round(np.sin(9 * T), 4)

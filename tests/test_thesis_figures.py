@@ -6,7 +6,8 @@ from collections.abc import Callable
 
 import pytest
 from matplotlib.figure import Figure
-from thesis import page, printed, sketches
+
+from stickslip_thesis import page, printed, sketches
 
 Sketch = Callable[[printed.Given], Figure]
 

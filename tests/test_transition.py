@@ -276,7 +276,7 @@ def test_everything_at_once() -> None:
     assert found.transition is not None
     assert found.microslips is not None
     assert found.transition.stiffness is not None
-    assert [plate.name for plate in ss.figures(found)] == ["map", "stick", "contours"]
+    assert [plate.name for plate in ss.summary(found).plates] == ["map", "stick", "contours"]
     told = found.to_dict()
     assert json.loads(json.dumps(told, allow_nan=False))["channel"] == "a"
     sentences = " ".join(ss.summary(found).headline)
@@ -294,8 +294,8 @@ def test_a_record_in_parts_is_mapped_whole_and_its_begin_asked(monkeypatch: pyte
     assert found.mechanism.name == whole.mechanism.name == "double stick-slip"
     assert "first 1.5 s" in found.notes[0]
     assert "first 2 s" in whole.notes[0]
-    assert len(ss.figures(found)[0].figure.axes) == 2  # the map and its bar; the signal is there no more
-    assert len(ss.figures(whole)[0].figure.axes) == 3
+    assert len(ss.summary(found).plates[0].figure.axes) == 2  # the map and its bar; the signal is there no more
+    assert len(ss.summary(whole).plates[0].figure.axes) == 3
     with pytest.raises(RecordError, match="no part"):
         ss.answers.time_frequency(iter(()))
 
@@ -334,7 +334,7 @@ def test_the_page_tells_no_micro_slips_against_its_verdict() -> None:
     assert "double stick-slip" not in " ".join(ss.summary(found).headline)
     assert found.microslips is None or found.microslips.per_stick.interval[0] >= 0
     rigid = ss.answers.time_frequency(noisy("rigid", 40, cycles=6))
-    stick = next(plate for plate in ss.figures(rigid) if plate.name == "stick").figure
+    stick = next(plate for plate in ss.summary(rigid).plates if plate.name == "stick").figure
     assert "rings" not in stick.axes[0].get_legend_handles_labels()[1]
 
 

@@ -118,7 +118,7 @@ def test_where_nothing_rings_the_contact_alone_speaks() -> None:
 def test_it_is_drawn_with_each_method() -> None:
     import matplotlib.pyplot as plt
 
-    ax = ss.plot.plot_transition_speed(found(8.7))
+    ax = ss.figures.plot_transition_speed(found(8.7))
     carried = next(line for line in ax.lines if line.get_label() == "carried on")
     by_curve = next(line for line in ax.lines if line.get_label() == "by the curve")
     assert carried.get_xdata()[-1] == by_curve.get_xdata()[0]  # the curve is seen to lead there

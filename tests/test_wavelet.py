@@ -357,10 +357,10 @@ def test_it_can_be_drawn() -> None:
             ss.signals.wavelet_overview(record, "a", columns=100), ss.wavelet_map(of(np.zeros(2000)), "a"))  # fmt: skip
     for found in maps:
         for style in ("filled", "lines"):
-            figure = ss.plot.plot_wavelet(found, record=record, style=style)
+            figure = ss.figures.plot_wavelet(found, record=record, style=style)
             assert [ax.get_ylabel() for ax in figure.axes][1] == "frequency [Hz]"
     with pytest.raises(RecordError, match="spans some decibel"):
-        ss.plot.plot_wavelet(maps[0], span=-3)
+        ss.figures.plot_wavelet(maps[0], span=-3)
 
 
 def test_no_frequency_is_refused_and_a_single_one_is_drawn() -> None:
@@ -368,6 +368,6 @@ def test_no_frequency_is_refused_and_a_single_one_is_drawn() -> None:
     with pytest.raises(RecordError, match="positive and rise"):
         ss.wavelet_map(record, "a", frequencies=[])
     single = ss.wavelet_map(record, "a", frequencies=[45.0])
-    assert len(ss.plot.plot_wavelet(single, record=record).axes) == 3
+    assert len(ss.figures.plot_wavelet(single, record=record).axes) == 3
     with pytest.raises(RecordError, match="two frequencies"):
-        ss.plot.plot_wavelet(single, style="lines")
+        ss.figures.plot_wavelet(single, style="lines")

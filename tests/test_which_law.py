@@ -13,13 +13,13 @@ from click.testing import CliRunner
 
 import stickslip as ss
 from stickslip.cli.program import main
-from stickslip.law.guess import Seen
+from stickslip.figures.law import law_plates
 from stickslip.law.search import Knob, Problem
 from stickslip.law.start import Shown
 from stickslip.law.stretch import channels_of
 from stickslip.law.surety import CERTAIN, Evidence, Misfit, _end, standings
+from stickslip.law.trials import Seen
 from stickslip.laws.guessing import hypotheses
-from stickslip.plot.law import law_plates
 from stickslip.record.record import Step
 
 RIG: dict[str, Any] = {"mass": 2.42, "stiffness": 2310.0, "damping": 0.12}

@@ -128,3 +128,19 @@ def test_dry_friction_beyond_doubt_stays_so_whichever_motion_it_was() -> None:
     low, high = found.dry_displacement_any.interval
     assert 0.4e-3 < low < 1e-3 < high < 1.1e-3
     assert found.damping_ratio_any.interval[1] < 0.005
+
+
+def test_whichever_motion_it_was_leaves_out_what_the_record_speaks_against() -> None:
+    from scipy.integrate import solve_ivp
+
+    zeta, drag, turn = 0.004, 7.2, 4 * np.pi  # viscous damping and air drag, without any dry friction
+    moved = solve_ivp(
+        lambda _, y: [y[1], -(turn**2) * y[0] - 2 * zeta * turn * y[1] - drag * abs(y[1]) * y[1]],
+        (0, 14), [0.02, 0.0], t_eval=np.arange(0, 14, 1 / 200), rtol=1e-9, atol=1e-12,
+    ).y[0]  # fmt: skip
+    noisy = moved + 2e-5 * np.random.default_rng(1).standard_normal(len(moved))
+    found = ss.analyze_decay(ss.Record.of({"x": noisy}, fs=200), stiffness=1000.0).decay
+    ratio, dry = found.whichever
+    assert ratio.interval[0] <= zeta <= ratio.interval[1] < 0.006  # as viscous and dry friction 0.038 came out
+    assert ratio.interval[0] <= ratio.value <= ratio.interval[1]
+    assert -1e-5 < dry.interval[0] <= 0 <= dry.interval[1] < 1e-5  # and -98 um of the swing's 20 mm

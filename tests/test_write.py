@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import stickslip as ss
-from stickslip.record.metadata import KEY
+from stickslip.record.metadata import BEGINS, described_beside, time_column
 
 SUFFIXES = [".csv", ".h5", ".hdf5", ".parquet"]
 
@@ -41,7 +41,7 @@ def test_a_record_comes_back_exactly(tmp_path: Path, suffix: str) -> None:
     assert again.equals(record)
     assert again.history[-1].arguments["rows"] == (1, None)
     assert again.channels["x"].delay == 1e-3
-    assert list(tmp_path.iterdir()) == [path]
+    assert sorted(tmp_path.iterdir()) == sorted({path, described_beside(path)} if suffix == ".csv" else {path})
 
 
 @pytest.mark.parametrize("suffix", SUFFIXES)
@@ -140,7 +140,7 @@ def test_a_failure_half_way_leaves_the_old_file(tmp_path: Path, suffix: str, mon
     with pytest.raises(ss.errors.FormatError, match="No space left"):
         ss.write_record(broken, path, overwrite=True)
     assert path.read_bytes() == before
-    assert list(tmp_path.iterdir()) == [path]
+    assert sorted(tmp_path.iterdir()) == sorted({path, described_beside(path)} if suffix == ".csv" else {path})
 
 
 @pytest.mark.parametrize(
@@ -157,8 +157,9 @@ def test_a_failure_half_way_leaves_the_old_file(tmp_path: Path, suffix: str, mon
 )
 def test_a_damaged_description_is_one_sentence(tmp_path: Path, old: str, new: str, words: str) -> None:
     path = ss.write_record(ss.Record.of({"x": [1.0, 2.0, 3.0]}, fs=10.0), tmp_path / "kept.csv")
-    assert path.read_text().startswith(f"# {KEY} ")
-    path.write_text(path.read_text().replace(old, new, 1))
+    beside = described_beside(path)
+    assert beside.read_text().startswith(BEGINS)
+    beside.write_text(beside.read_text().replace(old, new, 1))
     with pytest.raises(ss.StickslipError, match=words):
         ss.read_record(path)
 
@@ -167,9 +168,8 @@ def test_a_damaged_description_is_one_sentence(tmp_path: Path, old: str, new: st
 
 
 def edited(path: Path, old: str, new: str) -> Path:
-    comment, rest = path.read_text().split("\n", 1)
-    assert old in rest
-    path.write_text(comment + "\n" + rest.replace(old, new, 1))
+    assert old in path.read_text()
+    path.write_text(path.read_text().replace(old, new, 1))
     return path
 
 
@@ -201,11 +201,7 @@ def test_an_edited_file_is_read_as_it_is_now(
 def test_a_column_added_outside_is_read_too(tmp_path: Path) -> None:
     path = kept(tmp_path)
     lines = path.read_text().splitlines()
-    path.write_text(
-        "\n".join(
-            [lines[0], *(line + more for line, more in zip(lines[1:], [",v [m/s]", *[",1", ",2", ",3"]], strict=True))]
-        )
-    )
+    path.write_text("\n".join([line + more for line, more in zip(lines, [",v [m/s]", ",1", ",2", ",3"], strict=True)]))
     assert list(ss.read_record(path)["v"]) == [1.0, 2.0, 3.0]
 
 
@@ -229,3 +225,28 @@ def test_a_channel_map_keeps_what_was_stated_of_a_sensor(tmp_path: Path) -> None
     assert found.channels["x"].delay == 1e-3
     assert found.channels["a"].mount is None  # another quantity than the one that was described
     assert found.channels["z"].delay == 0
+
+
+def test_a_csv_is_plain_for_excel_and_pandas_and_stands_alone(tmp_path: Path) -> None:
+    import pandas as pd
+
+    record = replace(example(20), truth={"level": 2.0})
+    path = ss.write_record(record, tmp_path / "run.csv")
+    frame = pd.read_csv(path)
+    assert list(frame) == [f"{time_column(record)} [s]", *(f"{name} [{record.channels[name].unit}]" for name in record)]
+    np.testing.assert_array_equal(frame.iloc[:, 1], record[next(iter(record))])
+    assert ss.read_record(path).truth == {"level": 2.0}
+    described_beside(path).unlink()
+    alone = ss.read_record(path)
+    assert not alone.truth
+    np.testing.assert_array_equal(alone["load"], record["load"])
+
+
+def test_a_file_of_somebody_elses_beside_a_csv_is_left_alone(tmp_path: Path) -> None:
+    other = tmp_path / "run.csv.json"
+    other.write_text('{"mine": 1}')
+    with pytest.raises(ss.errors.FormatError, match=r"run\.csv\.json' is there already"):
+        ss.write_record(example(10), tmp_path / "run.csv")
+    (tmp_path / "run.csv").write_text("t [s],x [mm]\n0,1\n0.1,2\n0.2,3\n")
+    assert len(ss.read_record(tmp_path / "run.csv")) == 3
+    assert other.read_text() == '{"mine": 1}'

@@ -16,8 +16,8 @@ import numpy as np
 from matplotlib.figure import Figure
 
 import stickslip as ss
-from stickslip.plot.contact import plot_displacement_loop, plot_velocity_loop
-from stickslip.plot.decay import plot_decay, plot_differences
+from stickslip.figures.contact import plot_displacement_loop, plot_velocity_loop
+from stickslip.figures.decay import plot_decay, plot_differences
 
 IMAGES = Path(__file__).resolve().parents[1] / "docs" / "images"
 
@@ -46,9 +46,9 @@ def squeak() -> None:
 
     grid = {"slope": np.linspace(-4, 4, 121), "load": np.linspace(0.5, 8, 151)}
     stable = ss.squeak.stability_map(rig, grid=grid, speed=-0.1)
-    saved(ss.plot.plot_stability(stable, labels=("slope of friction over speed [s/m]", "load [N]")), "stability.png")
+    saved(ss.figures.plot_stability(stable, labels=("slope of friction over speed [s/m]", "load [N]")), "stability.png")
     branches = ss.squeak.limit_cycles(rig(2.0), rig, values=np.linspace(1.3, 6.5, 27), speed=-0.1)
-    saved(ss.plot.plot_limit_cycles(branches, label="load [N]"), "limit_cycles.png")
+    saved(ss.figures.plot_limit_cycles(branches, label="load [N]"), "limit_cycles.png")
 
 
 def decay() -> None:

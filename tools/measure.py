@@ -11,7 +11,7 @@ import re
 import sys
 import tomllib
 from collections import Counter, defaultdict
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from functools import cached_property
 from pathlib import Path
 
@@ -49,21 +49,24 @@ class Source:
 
     def imports(self, known: set[str]) -> Iterator[tuple[str, bool]]:
         """Modules of the package that it imports, and whether within a function."""
-        inner = {node for function in self.functions() for node in ast.walk(function)}
-        for node in self._not_for_types():
+        for node, inside in imports_among(self.tree.body):
             for name in targets(node, self.module, self.is_package):
                 if (module := longest_known(name, known)) and module != self.module:
-                    yield module, node in inner
+                    yield module, inside
 
-    def _not_for_types(self) -> Iterator[ast.AST]:
-        """Every node but those that type-checkers alone read."""
-        skipped = {
-            inner
-            for node in ast.walk(self.tree)
-            if isinstance(node, ast.If) and ast.unparse(node.test).endswith("TYPE_CHECKING")
-            for inner in ast.walk(node)
-        }
-        return (node for node in ast.walk(self.tree) if node not in skipped)
+
+def imports_among(
+    statements: Iterable[ast.AST], inside: bool = False
+) -> Iterator[tuple[ast.Import | ast.ImportFrom, bool]]:
+    """Import statements, and whether within a function, but those that type-checkers alone read."""
+    for node in statements:
+        if isinstance(node, ast.Import | ast.ImportFrom):
+            yield node, inside
+        for_types = isinstance(node, ast.If) and ast.unparse(node.test).endswith("TYPE_CHECKING")
+        deeper = inside or isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef)
+        for field in ("orelse",) if for_types else ("body", "orelse", "handlers", "finalbody", "cases"):
+            inner = getattr(node, field, ())
+            yield from imports_among(inner if isinstance(inner, list) else (), deeper)
 
 
 def docstring(node: ast.AST) -> ast.Expr | None:
@@ -79,12 +82,10 @@ def lines_of(node: ast.stmt) -> range:
     return range(node.lineno, (node.end_lineno or node.lineno) + 1)
 
 
-def targets(node: ast.AST, module: str, is_package: bool) -> list[str]:
+def targets(node: ast.Import | ast.ImportFrom, module: str, is_package: bool) -> list[str]:
     """The dotted names that an import statement reaches for."""
     if isinstance(node, ast.Import):
         return [alias.name for alias in node.names]
-    if not isinstance(node, ast.ImportFrom):
-        return []
     base = node.module or ""
     if node.level:
         home = module.split(".")[: len(module.split(".")) - node.level + is_package]

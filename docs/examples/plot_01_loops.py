@@ -14,5 +14,5 @@ found = ss.analyze(record, mass=truth["mass"], stiffness=truth["stiffness"], dam
 print(found.level)
 print("true:", truth["sliding friction"], "N")
 
-drawn = {plate.name: plate.figure for plate in ss.figures(found)}
+drawn = {plate.name: plate.figure for plate in ss.summary(found).plates}
 displacement, velocity = drawn["friction-displacement"], drawn["friction-velocity"]

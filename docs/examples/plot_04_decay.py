@@ -16,5 +16,5 @@ found = ss.analyze_decay(record, stiffness=10.0, method="thesis")
 print(found.decay.thesis.damping_ratio, "- true: 0.0316")
 print(found.decay.thesis.dry_displacement, "- true: 0.02 m")
 
-drawn = {plate.name: plate.figure for plate in ss.figures(found)}
+drawn = {plate.name: plate.figure for plate in ss.summary(found).plates}
 decay, differences = drawn["decay"], drawn["differences"]

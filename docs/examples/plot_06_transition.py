@@ -16,4 +16,4 @@ fused = ss.friction_force(record, mass=2.42, stiffness=2310, method="fusion")
 
 found = ss.contact.transition_speed(fused)
 print(found)
-axes = ss.plot.plot_transition_speed(found)
+ax = ss.plot(found)

@@ -16,4 +16,4 @@ slider = ss.Oscillator(
 grid = {"frequency": np.linspace(0.02, 0.25, 48), "kinetic": np.linspace(0.02, 0.98, 40)}
 atlas = ss.sweep(slider, grid, measures=["stops"], cycles=10, settle=60)
 print(atlas)
-axes = ss.plot.plot_map(atlas, system=slider)
+ax = ss.plot(atlas, system=slider)

@@ -13,4 +13,4 @@ import stickslip as ss
 slider = ss.scenarios.forced(0.8, 1.0, static_ratio=1.5)
 found = ss.bifurcation(slider, "amplitude", values=np.linspace(1.05, 1.8, 16))
 print(found)
-figure = ss.plot.plot_bifurcation(found)
+ax = ss.plot(found)

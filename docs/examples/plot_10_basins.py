@@ -12,4 +12,4 @@ import stickslip as ss
 slider = ss.scenarios.forced(0.8, 1.0, static_ratio=1.5).having(amplitude=1.25)
 found = ss.basins(slider, grid={"x": np.linspace(-4, 4, 41), "v": np.linspace(-4, 4, 41)})
 print(found)
-axes = ss.plot.plot_basins(found)
+ax = ss.plot(found)

@@ -13,4 +13,4 @@ creeping = ss.Oscillator(
 )
 found = ss.dither(creeping, frequency=5.0)
 print(found)
-figure = ss.plot.plot_dither(found)
+ax = ss.plot(found)

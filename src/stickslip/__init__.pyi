@@ -9,10 +9,10 @@ from stickslip import datasets as datasets
 from stickslip import decay as decay
 from stickslip import drives as drives
 from stickslip import errors as errors
+from stickslip import figures as figures
 from stickslip import law as law
 from stickslip import laws as laws
 from stickslip import maps as maps
-from stickslip import plot as plot
 from stickslip import record as record
 from stickslip import rig as rig
 from stickslip import scenarios as scenarios
@@ -37,6 +37,7 @@ from stickslip.decay.decrement import decrement as decrement
 from stickslip.decay.fit_decay import fit_decay as fit_decay
 from stickslip.errors import StickslipError as StickslipError
 from stickslip.estimate import Estimate as Estimate
+from stickslip.figures.drawing import plot as plot
 from stickslip.files.read import read_blocks as read_blocks
 from stickslip.files.read import read_record as read_record
 from stickslip.files.write import write_record as write_record
@@ -61,7 +62,6 @@ from stickslip.squeak.bursts import find_squeaks as find_squeaks
 from stickslip.squeak.stability import stability as stability
 from stickslip.story.folder import publish as publish
 from stickslip.story.page import report as report
-from stickslip.story.story import figures as figures
 from stickslip.story.story import summary as summary
 from stickslip.structure import Contact as Contact
 from stickslip.structure import Structure as Structure

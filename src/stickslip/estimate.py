@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, fields, is_dataclass, replace
-from typing import Any, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
 from stickslip.errors import EstimateError, ModelError, RecordError
+from stickslip.printing import html_table
 from stickslip.units import parse_uncertain, prefixed
+
+if TYPE_CHECKING:
+    import pandas as pd
+    import xarray as xr
 
 NORMAL_95 = 1.959963984540054  # two-sided 95 % quantile of the normal distribution
 MOST_DECIMALS = 6  # printed in the plain unit
@@ -266,6 +271,17 @@ class Estimate:
             return f"below {number(high)}" if low == 0 else f"above {number(low)}"
         return f"{number(low)} to {number(high)}"
 
+    @property
+    def cells(self) -> tuple[str, str, str]:
+        """Name, value and 95 % interval as text, with the digits that the interval leaves."""
+        write, unit = self._written()
+        known, between = math.isfinite(self.value), self.between(write)
+        value = f"{write(self.value)}{unit}" if known else UNKNOWN
+        return self.name, value, between if between == UNKNOWN else f"{between}{unit}"
+
+    def _repr_html_(self) -> str:
+        return table_of("", [self])
+
     def __float__(self) -> float:
         return self.value
 
@@ -295,6 +311,7 @@ class Estimate:
         return (lambda number: f"{factor * number:{form}}"), "" if unit == "1" else f" {unit}"
 
 
+COLUMNS = ("value", "low", "high", "sd", "unit", "method", "status")  # of a table of estimates
 Constant = float | str | tuple[float, float] | Estimate  # of a rig, as a person states it
 
 
@@ -306,10 +323,52 @@ class Result:
         """Every number found."""
         return tuple(value for value in vars(self).values() if isinstance(value, Estimate))
 
-    def __repr__(self) -> str:
+    def to_pandas(self) -> pd.DataFrame:
+        """Every number found as a DataFrame: a row each, in SI, by its name.
+
+        Returns
+        -------
+        pandas.DataFrame
+            Columns ``value``, ``low``, ``high`` (95 %), ``sd``, ``unit``, ``method`` and ``status``.
+        """
+        import pandas as pd
+
+        names = [each.name for each in self.estimates]
+        rows = [
+            (each.value, *each.interval, each.sd, each.unit, each.method, str(each.status)) for each in self.estimates
+        ]
+        return pd.DataFrame(rows, index=pd.Index(names, name="quantity"), columns=COLUMNS)
+
+    def to_xarray(self) -> xr.Dataset:
+        """The same as an xarray Dataset over ``quantity``."""
+        dataset: xr.Dataset = self.to_pandas().to_xarray()
+        return dataset
+
+    def _repr_html_(self) -> str:
+        return table_of(self._titled, self.estimates)
+
+    @property
+    def _titled(self) -> str:
         status = getattr(self, "status", "ok")
-        flag = "" if status == "ok" else f" [{status}]"
-        return "\n  ".join([f"{getattr(self, 'name', type(self).__name__)}{flag}:", *map(str, self.estimates)])
+        return f"{getattr(self, 'name', type(self).__name__)}{'' if status == 'ok' else f' [{status}]'}"
+
+    def __repr__(self) -> str:
+        return "\n  ".join([f"{self._titled}:", *map(str, self.estimates)])
+
+
+def table_of(title: str, estimates: Iterable[Estimate]) -> str:
+    """Estimates as a table in HTML; what speaks against some of them stands once, below."""
+    reasons: dict[str, int] = {}
+    rows = []
+    for each in estimates:
+        marks = [str(reasons.setdefault(doubt.words, len(reasons) + 1)) for doubt in doubts_of(each.status)]
+        rows.append((*each.cells, " ".join(marks), each.method))
+    return html_table(
+        title,
+        ("quantity", "value", "95 % interval", "", "method"),
+        rows,
+        [f"{n} {words}" for words, n in reasons.items()],
+    )
 
 
 def plain(value: Any) -> Any:

@@ -6,15 +6,18 @@ import ast
 import difflib
 import importlib
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
 
-def attached(package: str, *own: str) -> tuple[Callable[[str], Any], Callable[[], list[str]], list[str]]:
+def attached(
+    package: str, *own: str, rooms: Sequence[str] | None = None
+) -> tuple[Callable[[str], Any], Callable[[], list[str]], list[str]]:
     """``__getattr__``, ``__dir__`` and ``__all__`` of a package, by the imports that its ``__init__.pyi`` lists.
 
-    `own` are names that the package defines itself.
+    `own` are names that the package defines itself. Of its `rooms`, where these are given, ``__dir__`` names no
+    others: what a person completes with the tabulator is then a list that can be read.
     """
     sources = named(Path(str(sys.modules[package].__file__)).with_suffix(".pyi"))
 
@@ -27,7 +30,8 @@ def attached(package: str, *own: str) -> tuple[Callable[[str], Any], Callable[[]
         return importlib.import_module(f"{module}.{name}") if module == "stickslip" else _member(module, name)
 
     listed = [*sources, *own]
-    return find, lambda: listed, listed
+    first = [n for n in listed if rooms is None or n in rooms or sources.get(n, "").partition(".")[2]]
+    return find, lambda: first, listed
 
 
 def _member(module: str, name: str) -> Any:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import re
 import unicodedata
+from collections.abc import Iterable, Sequence
+from html import escape
 
 
 def printable(text: str, *, encoding: str = "utf-8") -> str:
@@ -41,3 +43,21 @@ def _is_seen(sign: str, encoding: str) -> bool:
 def _numbered(sign: str) -> str:
     halves = sign.encode("utf-16-be", "surrogatepass")
     return "".join(f"\\u{halves[first : first + 2].hex()}" for first in range(0, len(halves), 2))
+
+
+def html_table(title: str, headings: Sequence[str], rows: Iterable[Sequence[str]], notes: Sequence[str] = ()) -> str:
+    """A table as a notebook shows it: a title, rows, and notes below.
+
+    Examples
+    --------
+    >>> html_table("a < b", ("name", "value"), [("mass", "2 kg")]).splitlines()[0]
+    '<p><b>a &lt; b</b></p>'
+    """
+
+    def cells(row: Sequence[str], tag: str) -> str:
+        return "".join(f'<{tag} style="text-align: left">{escape(printable(cell))}</{tag}>' for cell in row)
+
+    told = "".join(f"<p>{escape(printable(note))}</p>" for note in notes)
+    body = "".join(f"<tr>{cells(row, 'td')}</tr>\n" for row in rows)
+    heading = f"<p><b>{escape(printable(title))}</b></p>\n" if title else ""
+    return f"{heading}<table><thead><tr>{cells(headings, 'th')}</tr></thead>\n<tbody>{body}</tbody></table>{told}"

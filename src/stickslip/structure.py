@@ -13,10 +13,12 @@ from numpy.typing import ArrayLike, NDArray
 from stickslip.drives.kinds import Drive, Release, require_drive
 from stickslip.errors import ModelError
 from stickslip.laws.base import Exit, Law, Mode, Row
-from stickslip.laws.curved import CurvedLaw
+from stickslip.laws.curved import CurvedLaw, CurvedMode, lifted
+from stickslip.laws.filippov import with_sliding_modes
 from stickslip.laws.guessing import registered
 from stickslip.laws.linear_slope import LinearSlope
 from stickslip.laws.stribeck import Tabulated
+from stickslip.laws.time_delay import TimeDelay
 from stickslip.parameters import changed, finite, parameter, parametric
 
 Array = NDArray[np.float64]
@@ -30,7 +32,8 @@ class Contact:
     The load is :math:`N = N_0 + k_n\,w_n\cdot q`, and the contact pushes back with it; the preload comes from outside
     and balances it at q = 0. Every force level of the law is multiplied by N: a friction coefficient in place of a
     force. Where friction depends on the speed, as a straight line :math:`\mu_0 + s v` or a table of them, it is
-    :math:`\mu_0 N + s N_0 v`: its slope keeps to the preload, for the product of load and speed is not linear. At N = 0
+    :math:`\mu_0 N + s N_0 v`: its slope keeps to the preload, for the product of load and speed is not linear. Curved
+    laws are coefficients as a whole, :math:`f = N \mu(v, \theta)`, and so are a slider's spring and damper. At N = 0
     the contact separates, and it closes again where N would rise above zero. Without `normal` the
     load is the preload; as that is 1 where left out, the levels of the law are then forces [N], as in an Oscillator.
 
@@ -50,8 +53,8 @@ class Contact:
     law: Law = parameter(
         "",
         "friction law",
-        note="under a load that follows the motion: Coulomb, LinearSlope, Tabulated or CompliantContact; under a "
-        "preload also ElastoSlip and InertialContact; any other with linear modes where its levels are forces",
+        note="under a load that follows the motion: Coulomb, LinearSlope, Tabulated, CompliantContact or a curved law; "
+        "under a preload also ElastoSlip and InertialContact; any other where its levels are forces",
     )
     tangent: ArrayLike = parameter(
         "1",
@@ -83,11 +86,11 @@ class Contact:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "tangent", _direction("tangent", self.tangent))
-        if isinstance(self.law, CurvedLaw):
+        if isinstance(self.law, TimeDelay):
             raise ModelError(
-                f"{type(self.law).__name__} in a structure",
-                "the contacts of a structure have linear modes",
-                "use Tabulated, or an Oscillator",
+                "TimeDelay in a structure",
+                "a lag is followed in a single mass",
+                "use an Oscillator, or SmoothStateVariable for a friction that lags",
             )
         if self.normal is None:
             if self.stiffness != 0:
@@ -113,26 +116,31 @@ class Contact:
                 f"use {' or '.join(fitting)}, or leave out normal= and preload=",
             )
 
-    def modes(self) -> tuple[Mode, ...]:
+    def modes(self) -> tuple[Any, ...]:
         """The law's table with "1" meaning the load, and what a contact adds to it.
 
         A load that follows the motion adds flight. Where the law starts in different modes by the sign of velocity,
         "landing" decides between them; no time passes in it.
         """
-        law, entry = tuple(map(self._pressed, self.law.modes())), self.law.entry
-        lands = len(set(entry)) > 1
-        landing = Mode(
-            "landing", "landing", 0, {},
-            (Exit({"v": 1.0}, entry[2]), Exit({"v": -1.0}, entry[0]), Exit({"always": 1.0}, entry[1])),
-        )  # fmt: skip
+        own: Any = self.law
+        if isinstance(own, CurvedLaw):
+            return self.closing(with_sliding_modes(own.rates()), own.entry)
+        return self.closing(tuple(map(self._pressed, with_sliding_modes(own.modes()))), own.entry)
+
+    def closing(self, law: tuple[Any, ...], entry: tuple[str, str, str]) -> tuple[Any, ...]:
+        """A law's modes, which start in `entry` by the sign of velocity, and those that a contact adds to them."""
+        none: Any = lifted(0.0) if isinstance(law[0], CurvedMode) else {}
+        lands, made = len(set(entry)) > 1, type(law[0])
+        start = (Exit({"v": 1.0}, entry[2]), Exit({"v": -1.0}, entry[0]), Exit({"always": 1.0}, entry[1]))
+        landing = made("landing", "landing", 0, none, start)
         if self.normal is None:
             return (*law, landing) if lands else law
         lift = Exit({"1": -1.0}, "lifted")
         close = Exit({"1": 1.0}, "landing" if lands else entry[1], self.law.memory)
-        lifted = Mode("lifted", "flight", 0, {}, (close,))
+        flight = made("lifted", "flight", 0, none, (close,))
         every = (*law, landing) if lands else law
         closed = tuple(replace(mode, exits=(lift, *map(self._followed, mode.exits))) for mode in every)
-        return (*closed[: len(law)], lifted, *closed[len(law) :])
+        return (*closed[: len(law)], flight, *closed[len(law) :])
 
     def _pressed(self, mode: Mode) -> Mode:
         """A mode of friction over speed: the slope of a coefficient becomes a force's, bounds on the speed stay."""

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Self
 
 from stickslip.errors import EstimateError
 from stickslip.estimate import Estimate, Result
+from stickslip.printing import html_table
 from stickslip.record.record import Record
 
 if TYPE_CHECKING:
@@ -163,6 +164,14 @@ class Comparison(Answers):
     def estimates(self) -> tuple[Estimate, ...]:
         """Every number that they tell together."""
         return tuple(result for result in self.results.values() if isinstance(result, Estimate))
+
+    def _repr_html_(self) -> str:
+        first = [
+            (each.name, next(iter(each.quoted), None) if each.level is None else each.level) for each in self.findings
+        ]
+        rows = [(name, *(each.cells if each is not None else ("", "", ""))) for name, each in first]
+        rows += [("together", *each.cells) for each in self.estimates]
+        return html_table("Comparison", ("record", "quantity", "value", "95 % interval"), rows)
 
 
 def require_several(findings: Sequence[Findings]) -> None:

@@ -1,24 +1,35 @@
-"""Which law, or which curve, the records of a rig follow: what its settings make of them, fitted."""
+"""Which law, or which curve, the records of a rig follow; and what it makes of records that it has not seen."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
 
+from stickslip.answers.findings import record_name
 from stickslip.answers.preparation import normal_load, with_sensors
 from stickslip.balance.force import friction_force
+from stickslip.cycle.sticks import Sticks, find_sticks
 from stickslip.drives.kinds import HarmonicBase, Release
-from stickslip.errors import ModelError, RecordError
+from stickslip.errors import EstimateError, ModelError, RecordError, StickslipError
+from stickslip.estimate import Estimate, Result
 from stickslip.law.fit_curve import CurveFit, fit_curve
+from stickslip.law.law import LawFit, fit_law
 from stickslip.law.start import CALIBRATION
 from stickslip.law.which_law import LawComparison, compare_laws
 from stickslip.laws.coulomb import Coulomb
 from stickslip.oscillator import Oscillator
 from stickslip.record.record import RIG_UNITS, Record
 from stickslip.rig.settings import RigSettings
+from stickslip.settings import read_toml
+from stickslip.statistics import follows
+from stickslip.systems.file import read_system
 
 FRICTION = {"friction", "coefficient"}
 BASE = HarmonicBase(0.0, frequency=1.0, contact="base")  # its motion is in the record
 UNASKED = "stribeck"  # the curve of friction over the velocity, where nothing else can be fitted
+LAW = Path("law") / "law.toml"  # in the folder of a fit
 
 
 def fit_records(
@@ -150,3 +161,277 @@ def with_stated(system: Oscillator, rig: RigSettings) -> Oscillator:
             )  # fmt: skip
         stated |= {"drive": BASE} if rig.contact == "base" else {}
     return system.having(**stated)
+
+
+# ---- records that the law has not seen
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Prediction(Result):
+    """One record as a law predicts it.
+
+    Attributes
+    ----------
+    record : Record
+        What was measured, its sensors as stated.
+    fit : LawFit
+        The law as it was given, with what it predicts as ``traces``; the start of the motion alone was fitted.
+    follows : mapping of str to float
+        Of each channel how much the prediction follows [%], see :func:`predict`.
+    plain : mapping of str to float
+        The same of Coulomb's friction and a viscous damper, fitted to this very record; empty where the law is that, or
+        where these could not be fitted.
+    sticks : tuple of Sticks
+        Stops as measured and as predicted, by the same question over the same time; empty where it can not be asked.
+    """
+
+    record: Record
+    fit: LawFit
+    follows: Mapping[str, float]
+    plain: Mapping[str, float]
+    sticks: tuple[Sticks, ...]
+
+    @property
+    def name(self) -> str:
+        """Of the record."""
+        return record_name(self.record)
+
+    @property
+    def estimates(self) -> tuple[Estimate, ...]:
+        """Stops per cycle and share of the time that sticks, as measured and as predicted."""
+        return tuple(estimate for each in self.sticks for estimate in (each.per_cycle, each.share))
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data for JSON."""
+        units = {name: self.record.channels[name].unit for name in self.follows}
+        traces = self.fit.traces[0]
+        return {
+            "name": self.name,
+            "channels": {
+                name: {
+                    "follows": value, "plain": self.plain.get(name), "residual": self.fit.residual[name],
+                    "noise": self.fit.noise[name], "unit": units[name], "from": float(traces.time[name][0]),
+                    "to": float(traces.time[name][-1]),
+                } for name, value in self.follows.items()
+            },
+            "stops": {
+                which: {"per cycle": each.per_cycle.to_dict(), "share": each.share.to_dict()}
+                for which, each in zip(("measured", "predicted"), self.sticks, strict=False)
+            },
+        }  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Predictions(Result):
+    """Records as a law predicts them.
+
+    Attributes
+    ----------
+    oscillator : Oscillator
+        The law on its oscillator, as given.
+    parts : tuple of Prediction
+        One for each record.
+    notes : tuple of str
+        What was left out, and why.
+    """
+
+    oscillator: Oscillator
+    parts: tuple[Prediction, ...]
+    notes: tuple[str, ...] = ()
+
+    @property
+    def estimates(self) -> tuple[Estimate, ...]:
+        """Of all records."""
+        return tuple(estimate for part in self.parts for estimate in part.estimates)
+
+    @property
+    def least(self) -> Mapping[str, float]:
+        """Of each channel the least that is followed in any record [%]."""
+        names = dict.fromkeys(name for part in self.parts for name in part.follows)
+        return {name: min(part.follows[name] for part in self.parts if name in part.follows) for name in names}
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data for JSON."""
+        law = self.oscillator.law
+        return {
+            "law": type(law).__name__,
+            "values": {key: value for key, value in vars(law).items() if isinstance(value, float)},
+            "follows": dict(self.least),
+            "records": [part.to_dict() for part in self.parts],
+            "notes": list(self.notes),
+        }
+
+
+def read_fitted(path: str | Path, *, rig: RigSettings | None = None) -> Oscillator:
+    """The oscillator with its law as a fit wrote it.
+
+    Parameters
+    ----------
+    path : path
+        The folder of a fit's results, its ``law/law.toml``, or any file of a system.
+    rig : RigSettings, optional
+        Mass, spring, damper and contact, for a file that holds a law alone.
+
+    Returns
+    -------
+    Oscillator
+
+    Raises
+    ------
+    ModelError
+        The file can not be read, holds a system of several masses, or a law alone and the settings lack the mass.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> path = Path(tempfile.mkdtemp()) / "law.toml"
+    >>> _ = path.write_text("[law]\\nname = 'Coulomb'\\nkinetic = 1.1")
+    >>> read_fitted(path, rig=RigSettings(mass=2.42, stiffness=2310)).law
+    Coulomb(kinetic=1.1, static=None)
+    """
+    path = Path(path)
+    path = path / LAW if path.is_dir() else path
+    if rig is not None and rig.mass is not None and rig.stiffness is not None:
+        values, _ = read_toml(path, what="a fitted law is")
+        if "system" not in values:
+            stated = {name: float(value) for name in RIG_UNITS if (value := getattr(rig, name)) is not None}
+            drive = {"name": "HarmonicBase", "amplitude": 0.0, "frequency": 1.0, "contact": rig.contact}
+            whole = {"system": {**stated, "damper": rig.damper}, "drive": drive, **values}
+            return require_oscillator(read_system(whole).system)
+    return require_oscillator(read_system(path).system)
+
+
+def require_oscillator(system: object) -> Oscillator:
+    """The system, if it is one mass on one contact."""
+    if not isinstance(system, Oscillator):
+        raise ModelError(
+            "a system of several masses", "a record is predicted for an oscillator of one", "give such a one"
+        )
+    return system
+
+
+def predict(
+    records: Record | Sequence[Record],
+    oscillator: Oscillator,
+    *,
+    rig: RigSettings | None = None,
+    plain: bool = True,
+    progress: Callable[[float], object] | None = None,
+) -> Predictions:
+    r"""How much of a record does a law explain that was fitted to others?
+
+    The oscillator is simulated along the record, driven as the record was (its base's motion z or its applied force;
+    else by the oscillator's own drive), and its motion read by the sensors as their channels state them. Fitted to the
+    record are the displacement, velocity and memory at its first slide, an offset of each channel and, within its
+    noise, the drive; no parameter of the law. Told is of each channel y, with the prediction :math:`\hat y`, the fit
+    of system identification (one less the normalised root of the mean square; Ljung, System Identification, 1999,
+    section 16.4):
+
+    .. math:: 100 \left(1 - \frac{|y - \hat y|}{|y - \bar y|}\right) \%
+
+    100 % is the record itself, 0 % no better than its mean, and below zero worse than that. What noise hides no law
+    follows: the residual over the noise, ``fit.misfit``, is 1 where nothing but noise is left.
+
+    Parameters
+    ----------
+    records : Record or sequence of Record
+        As :func:`fit_law` takes them.
+    oscillator : Oscillator
+        With its law, as fitted.
+    rig : RigSettings, optional
+        What is stated of this rig goes before the oscillator's own constants; its sensors are the channels'.
+    plain : bool
+        Whether Coulomb's friction with a viscous damper is fitted to each record, to stand beside a richer law.
+    progress : callable, optional
+        Called with the share of the work that is done, 0 to 1.
+
+    Returns
+    -------
+    Predictions
+
+    Raises
+    ------
+    RecordError
+        A channel is missing or broken.
+    EstimateError
+        No record, no motion above the noise, or no sliding.
+    ModelError
+        A system of several masses.
+
+    Examples
+    --------
+    >>> import stickslip as ss
+    >>> slider = ss.Oscillator(
+    ...     mass=2.42, stiffness=2310, law=ss.laws.Coulomb(1.1), drive=ss.drives.HarmonicBase(1.1e-3, frequency=8.7)
+    ... )
+    >>> bench = ss.Rig.perfect("x", "z").having("x", white=1e-6)
+    >>> record = bench.measure(ss.simulate(slider, cycles=20), fs=2000, rng=1).rows(2000, 4000)
+    >>> predict(record, slider).least["x"] > 99
+    True
+    >>> predict(record, slider.having(kinetic=0.8)).least["x"] < 95
+    True
+    """
+    records = [records] if isinstance(records, Record) else list(records)
+    if not records:
+        raise EstimateError("no record", "a prediction is held against one record at least", "give one")
+    require_oscillator(oscillator)
+    if rig is not None:
+        oscillator = with_stated(oscillator, rig)
+        records = [with_sensors(record, rig) for record in records]
+    parts = []
+    for number, record in enumerate(records):
+        parts.append(_predicted(record, oscillator, plain=plain))
+        if progress:
+            progress((number + 1) / len(records))
+    return Predictions(oscillator, tuple(parts))
+
+
+def _predicted(record: Record, oscillator: Oscillator, *, plain: bool) -> Prediction:
+    """One record."""
+    fit = fit_law(record, oscillator, free=[], intervals=False)
+    baseline = _plain_follows(record, oscillator) if plain and oscillator.law != _coulomb(oscillator) else {}
+    return Prediction(record, fit, _follows(fit), baseline, _stops(record, fit, oscillator))
+
+
+def _coulomb(oscillator: Oscillator) -> Coulomb:
+    """One level of friction, the law's own where it has one to begin at."""
+    level = getattr(oscillator.law, "kinetic", None)
+    return Coulomb(level if isinstance(level, float) and level > 0 else 1.0)
+
+
+def _plain_follows(record: Record, oscillator: Oscillator) -> Mapping[str, float]:
+    """How much Coulomb's friction and a damper follow, both fitted to the record; nothing where they can not be."""
+    try:
+        simple = oscillator.having(law=_coulomb(oscillator))
+        return _follows(fit_law(record, simple, free=["kinetic"], nuisance=["damping"], intervals=False))
+    except StickslipError:  # a baseline is no answer: without it the prediction stands by itself
+        return {}
+
+
+def _follows(fit: LawFit) -> dict[str, float]:
+    """Of each channel how much of the first record is followed [%]."""
+    traces = fit.traces[0]
+    return {name: follows(measured, traces.fitted[name]) for name, measured in traces.measured.items()}
+
+
+def _stops(record: Record, fit: LawFit, oscillator: Oscillator) -> tuple[Sticks, ...]:
+    """Stops as measured and as predicted, told by the same channels of the motion over the same rows."""
+    traces = fit.traces[0]
+    name = next((name for name in ("x", "v") if name in traces.measured), None)
+    if name is None:
+        return ()
+    # by the speed, as the motion alone tells it: a prediction has no noise of other sensors to weigh
+    first = round((float(traces.time[name][0]) - record.start) * record.fs)
+    rows = slice(first, first + len(traces.time[name]))
+    base = {"z": record["z"][rows]} if "z" in record else {}
+    contact = getattr(oscillator.drive, "contact", None) if base else None
+    found = []
+    try:
+        for values in (traces.measured, traces.fitted):
+            motion = Record.of({name: values[name], **base}, fs=record.fs)
+            for channel in motion:
+                motion = motion.with_details(channel, delay=record.channels[channel].delay)
+            found.append(find_sticks(motion, contact=contact, method="speed"))
+    except StickslipError:  # too short, or without cycles: the channels are told without
+        return ()
+    return tuple(found)

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, fields, replace
 from functools import cache, partial
 from typing import Any
 
+import numpy as np
+
 from stickslip.answers.asked import Asked
-from stickslip.answers.doubts import doubted
 from stickslip.answers.findings import Findings, record_name
 from stickslip.answers.preparation import (
     AT_ONCE,
@@ -20,10 +21,11 @@ from stickslip.answers.preparation import (
     ready,
     unmoved,
 )
-from stickslip.balance.balance import Balance, pulled_slider
+from stickslip.balance.balance import ALONE, Balance, pulled_slider
 from stickslip.balance.force import FUSIONS, friction_force
+from stickslip.balance.likely_contact import STRAYING
 from stickslip.balance.motion import is_measured, slid_on
-from stickslip.consistent.contradictions import consistency
+from stickslip.consistent.contradictions import Consistency, consistency
 from stickslip.contact.cause import lag_or_compliance
 from stickslip.contact.contact import contact_damping, contact_stiffness
 from stickslip.contact.sliding_onset import coupled_frequency, transition_speed
@@ -33,12 +35,19 @@ from stickslip.cycle.onset import breakaway
 from stickslip.cycle.regression import regress_friction
 from stickslip.cycle.sticks import find_sticks
 from stickslip.errors import EstimateError, StickslipError
-from stickslip.estimate import Constant, Status
+from stickslip.estimate import Constant, Doubt, Estimate, Status, stands
 from stickslip.record.flaws import constant
-from stickslip.record.record import Record
+from stickslip.record.record import Record, require_record
 from stickslip.rig.settings import RigSettings
 
 STRETCH = 1 << 14  # samples in which the contact is fitted
+BY_FORCE = (
+    "loops", "breakaway", "stiffness", "contact_damping", "transition", "coupled", "cause", "presliding",
+)  # fmt: skip
+ONSETS = ("sticks", "breakaway", "presliding")  # when it sticks, and what it does until it slips
+BALANCED = ("balance", "energy")  # checks that a wrong mass, spring or sensor fails
+GOES_ON = 0.8  # of the motion at first that is left at last, where something drives it
+NO_BASE = "there is no channel z: the base is taken to be at rest, but something keeps the motion up"
 
 
 def analyze(
@@ -100,6 +109,7 @@ def analyze(
     >>> round(analyze(record).level.value, 2)
     1.5
     """
+    require_record(record)
     given = {"mass": mass, "stiffness": stiffness, "damping": damping, "damper": damper, "contact": contact}
     rig = _settings(rig, {key: value for key, value in given.items() if value is not None})
     asked, name, faults = Asked(), record_name(record), tuple(record.check())
@@ -281,3 +291,71 @@ def _nothing(name: str, record: Record, refusals: list[StickslipError]) -> Estim
         "a displacement x or velocity v is needed, and a force, or mass and stiffness to find it",
         'name the columns, as in channels={"x": "COLUMN [mm]"}',
     )
+
+
+# ---- doubts
+
+
+def doubted(
+    answers: dict[str, Any], record: Record, *, unknown: Doubt | None, refusals: Sequence[StickslipError]
+) -> dict[str, Any]:
+    """The answers, flagged by the gravest doubt that concerns each; `unknown` is what is not stated of the rig."""
+    told, gravest = dict(answers), dict[str, Doubt | str]()
+    for reason, keys in _reasons(told.get("consistency"), record, unknown, refusals):
+        for key in keys:
+            if gravest.setdefault(key, reason) == reason:
+                told[key] = flagged(told.get(key), reason)
+    return told
+
+
+def _reasons(
+    consistent: Consistency | None, record: Record, unknown: Doubt | None, refusals: Sequence[StickslipError]
+) -> Iterator[tuple[Doubt | str, Iterable[str]]]:
+    """Each doubt with the questions that it concerns, the gravest first."""
+    if words := _contradiction(consistent):
+        yield words, (*BY_FORCE, "sticks")
+    if _base_unseen(record):
+        yield NO_BASE, (*BY_FORCE, "sticks")
+    if unknown:
+        yield unknown, BY_FORCE
+    if unstated := [f"{name} is read as {each.unit}" for name, each in record.channels.items() if each.assumed]:
+        yield f"nobody stated a unit: {' and '.join(unstated)}", (*BY_FORCE, "regression", "asymmetric", "pull")
+    if strays := [error.value for error in refusals if error.kind == STRAYING]:
+        yield f"{strays[0]}: a mass, a spring or a sensor is not as stated, or the contact no spring", ONSETS
+
+
+def flagged(found: Any, reason: Doubt | str) -> Any:
+    """An answer with each of its numbers flagged that was thought to be sure; that of the drive stays sure."""
+    if isinstance(found, Estimate):
+        lesser = stands(found.status)
+        if found.name == "forcing frequency" or not (lesser or not found.known):
+            return found
+        return replace(found, status=Status(reason) if lesser else Status(reason, found.status))
+    if found is None:
+        return None
+    numbers = {each.name: getattr(found, each.name) for each in fields(found)}
+    return replace(
+        found, **{name: flagged(value, reason) for name, value in numbers.items() if isinstance(value, Estimate)}
+    )  # fmt: skip
+
+
+def _contradiction(told: Consistency | None) -> str:
+    """What one slip in the channels, or in the rig's constants, would explain; a clipped sensor says so itself."""
+    if told is None:
+        return ""
+    if told.slip:
+        return f"the channels contradict each other: perhaps {told.slip}"
+    failed = told.failed
+    if any("range" in check.name for check in failed):
+        return ""
+    apart = [check.sentence for check in failed if any(word in check.name for word in BALANCED)]
+    return f"the record and the rig's constants contradict each other: {apart[0]}" if apart else ""
+
+
+def _base_unseen(record: Record) -> bool:
+    """Whether the friction is that of a spring whose other end was not measured, while the motion goes on."""
+    rig = record.rig
+    if rig is None or rig.method == ALONE or "x" not in record or not {"z", "force", "load"}.isdisjoint(record):
+        return False
+    first, last = (float(np.std(part)) for part in np.array_split(record["x"], 2))
+    return last > GOES_ON * first

@@ -25,7 +25,7 @@ from stickslip.balance.mass import mass_and_stiffness, stiffness_per_mass
 from stickslip.balance.motion import require_change, require_fit
 from stickslip.errors import EstimateError, ModelError
 from stickslip.estimate import NORMAL_95, Constant, Estimate
-from stickslip.record.record import Record, StatedRig, Step
+from stickslip.record.record import Record, StatedRig, Step, require_record
 from stickslip.signals.derivatives import (
     LEAST,
     METHODS,
@@ -142,6 +142,7 @@ def friction_force(
     >>> bool(np.allclose(record["friction"][100:-100], 100 * x[100:-100], atol=1e-4))
     True
     """
+    require_record(record)
     if method not in (*METHODS, *FUSIONS, *THESIS):
         methods = ", ".join((*METHODS, *FUSIONS, *THESIS))
         raise EstimateError(f"method = '{method}'", f"the friction is found by one of {methods}", "choose one of them")

@@ -115,15 +115,16 @@ def _sure(
     told: Callable[[list[Findings]], Findings | Comparison],
     folder: Path | None,
     tell: Callable[..., None],
+    **context: Any,
 ) -> tuple[Findings | Comparison, Path | None]:
     """The results, tried on twins and written; the quick ones are written first, and stay where that is interrupted."""
-    written = folder and ss.publish(told(found), folder=folder)
+    written = folder and ss.publish(told(found), folder=folder, **context)
     if not twins:
         return told(found), written
     try:
         results = told([_tried(findings, twins, tell) for findings in found])
         tell("drawing and writing")
-        return results, folder and ss.publish(results, folder=folder)
+        return results, folder and ss.publish(results, folder=folder, **context)
     except KeyboardInterrupt:
         if written is None:
             raise
@@ -166,5 +167,5 @@ def demo(output: Path, as_json: bool, everything: bool, twins: int) -> None:
         constants = {name: record.truth[name] for name in ("mass", "stiffness", "damping")}
         findings = ss.analyze(record, **constants)
         tell("drawing and writing", 2)
-        results, written = _sure([findings], twins, lambda found: found[0], output, tell)
+        results, written = _sure([findings], twins, lambda found: found[0], output, tell, form="csv")
     show(results, written, as_json=as_json, everything=everything)

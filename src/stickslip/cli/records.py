@@ -172,7 +172,10 @@ def _with_source(record: Record, files: Sequence[Path], names: Sequence[str]) ->
     known = {file["name"] for step in record.history for file in step.arguments.get("files", ())}
     if called.keys() <= known:
         return dataclasses.replace(record, history=tuple(_called(step, called) for step in record.history))
-    sources = [{"name": name, "sha256": _checksum(path)} for name, path in zip(called.values(), files, strict=True)]
+    sources = [
+        {"name": name, **({} if path.parent == Path() else {"folder": str(path.parent)}), "sha256": _checksum(path)}
+        for name, path in zip(called.values(), files, strict=True)
+    ]
     step = ss.record.Step("read_record", {"files": sources}, "a record as it was written")
     return dataclasses.replace(record, history=(*record.history, step))
 

@@ -4,8 +4,14 @@ from __future__ import annotations
 
 import re
 
-import stickslip as ss
-
+REPAIRS = {
+    "repair_clock": "clock",
+    "fill_gaps": "gaps",
+    "fill_missing": "missing",
+    "remove_spikes": "spikes",
+    "restore_clipped": "clipping",
+    "remove_drift": "drift",
+}  # a function's name, and what --repair calls it
 _SPOKEN = (
     (r"\b(the command line|the run) sets (\w+)", r"\1 sets --\2"),
     (r"\brecord\.check\(\)", "stickslip check"),
@@ -34,7 +40,7 @@ def spoken(words: object) -> str:
     """A sentence with the options of the command line for what it says of Python."""
 
     def repair(call: re.Match[str]) -> str:
-        word = ss.story.REPAIRS.get(call[1])
+        word = REPAIRS.get(call[1])
         return call[0] if word is None else f"--repair {word}" + (f":{call[2]}" if call[2] else "")
 
     text = re.sub(r"\bfill_gaps\(record\) and fill_missing\(record\)", "--repair gaps,missing", str(words))

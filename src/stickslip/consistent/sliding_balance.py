@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from stickslip.consistent.checks import HOLDS, UNTOLD, Check, compared, untold
 from stickslip.errors import EstimateError, ModelError
@@ -41,6 +41,30 @@ NEEDED = ("mass", "stiffness", "forcing frequency", "base amplitude", "amplitude
 EXACT = ("forcing frequency",)  # not measured by a calibrated sensor
 Values = Mapping[str, float]
 Stated = Mapping[str, Constant]
+
+
+def sliding_boundary(ratio: ArrayLike, *, damping_ratio: float = 0.0) -> Array:
+    r"""Friction over the drive's force up to which a rigid contact slides without a stop.
+
+    Den Hartog's boundary of 1931, with Shaw's damper (1986): :math:`r_b = V / \sqrt{H^2 + (S + G)^2}`.
+
+    Parameters
+    ----------
+    ratio : array_like, shape (n,)
+        Forcing frequency over the natural one.
+    damping_ratio : float
+        Of the damper, over the critical one.
+
+    Returns
+    -------
+    ndarray, shape (n,)
+
+    Examples
+    --------
+    >>> sliding_boundary([1.0]).round(4)  # pi/4 at resonance
+    array([0.7854])
+    """
+    return np.array([Slider(1.0, 1.0, float(b), 2 * damping_ratio).boundary() for b in np.atleast_1d(ratio)])
 
 
 @dataclass(frozen=True)

@@ -48,6 +48,8 @@ class TransitionSpeed(Result):
         [m/s]; None where what it needs is not there. What biases each is in its checks.
     friction, velocity : ndarray, shape (k,)
         The mean curve [N, m/s], from the turn up to 0.9 of the sliding friction, both directions taken together.
+    turns : ndarray, shape (n,)
+        The speed by the curve of each turn [m/s]: their scatter is the thesis's sigma.
     level : Estimate
         Sliding friction [N].
     status : str
@@ -60,6 +62,7 @@ class TransitionSpeed(Result):
     equation: Estimate | None
     friction: Array
     velocity: Array
+    turns: Array
     level: Estimate
     status: str
 
@@ -272,12 +275,13 @@ def _answer(
         "equation", _equation, known, doubt, "equation 3.4 of the thesis",
         ("without damping of the contact, and for harmonic sliding: 3 to 5 % high on a rig like the thesis's",),
     )  # fmt: skip
-    curve = _read(branches, level.value, lagging, off)
+    turns = np.array([_reached(branch, level.value) for branch in branches])
+    curve = _of_curve(turns, lagging, off)
     equation = replace(equation, status=stops) if stops != "ok" else equation
     if math.isinf(stiffness.interval[1]):
         exact, equation = exact and _at_most(exact), _at_most(equation)
     status = Status(lost, stiffness.status, stops, curve.status)
-    return TransitionSpeed(method, exact, curve, equation, friction, velocity, level, status)
+    return TransitionSpeed(method, exact, curve, equation, friction, velocity, turns, level, status)
 
 
 def _equation(known: Array) -> float:
@@ -387,13 +391,15 @@ def _stops(loops: Loops, branches: Sequence[Branch], peak: float) -> str:
     return "it stops between its turns: the equation is for harmonic sliding, the rest for the turns out of sliding"
 
 
-def _read(branches: Sequence[Branch], level: float, lagging: str, off: float) -> Estimate:
-    """Where the curve of each turn reaches the sliding friction, the square of its velocity being carried on."""
-    speeds = []
-    for branch in branches:
-        degree = min(2, len(np.unique(branch.force)) - 1)
-        square = np.polyval(np.polyfit(branch.force, branch.speed**2, degree), level)
-        speeds.append(math.sqrt(max(0.0, float(square))))
+def _reached(branch: Branch, level: float) -> float:
+    """The speed at which the curve of a turn reaches the sliding friction, the square of its velocity carried on."""
+    degree = min(2, len(np.unique(branch.force)) - 1)
+    square = np.polyval(np.polyfit(branch.force, branch.speed**2, degree), level)
+    return math.sqrt(max(0.0, float(square)))
+
+
+def _of_curve(speeds: Array, lagging: str, off: float) -> Estimate:
+    """The mean over the turns."""
     sd, freedom = mean_uncertainty(speeds)
     scatter = float(np.std(speeds, ddof=1)) if len(speeds) > 1 else math.nan
     speed = Estimate.normal(

@@ -22,7 +22,7 @@ from stickslip.balance.motion import (
 )
 from stickslip.errors import EstimateError
 from stickslip.estimate import NORMAL_95, Doubt, Estimate, Result, Status
-from stickslip.record.record import Record
+from stickslip.record.record import Record, require_record
 from stickslip.signals.interpolate import without_delays
 from stickslip.statistics import least_squares, mean_of_cycles, mean_uncertainty, student
 
@@ -157,6 +157,7 @@ def friction_loops(
     >>> round(loops.level.value, 2), round(loops.energy_per_cycle.value, 2)  # 4 * 1.5 N over 1 / (2 pi) m
     (1.5, 0.95)
     """
+    require_record(record)
     question = "friction loops"
     record.require_clean("friction", question=question)
     if not isinstance(bins, (int, np.integer)) or bins < 2:

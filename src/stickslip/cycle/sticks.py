@@ -25,7 +25,7 @@ from stickslip.balance.motion import (
 from stickslip.cycle.holds import Hold, Trace, find_holds
 from stickslip.errors import EstimateError
 from stickslip.estimate import NORMAL_95, Estimate, Result
-from stickslip.record.record import Record
+from stickslip.record.record import Record, require_record
 from stickslip.signals.interpolate import without_delays
 from stickslip.statistics import mean_of_cycles
 from stickslip.units import parse_value
@@ -179,6 +179,7 @@ def find_sticks(
     >>> round(sticks.share.value, 1), round(sticks.per_cycle.value)
     (0.3, 2)
     """
+    require_record(record)
     if method not in (None, *METHODS):
         raise EstimateError(f"method = '{method}'", f"it is one of {', '.join(METHODS)}", "choose one of them")
     record = without_delays(record, *motion_channels(record, contact), question=QUESTION)

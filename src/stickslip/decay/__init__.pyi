@@ -6,6 +6,7 @@ from stickslip.decay.envelope import extreme_decay as extreme_decay
 from stickslip.decay.envelope import hilbert_decay as hilbert_decay
 from stickslip.decay.envelope import linear_decrement as linear_decrement
 from stickslip.decay.envelope import log_decrement as log_decrement
+from stickslip.decay.extremes import effective_rate_bound as effective_rate_bound
 from stickslip.decay.release import Releases as Releases
 from stickslip.decay.release import RingDown as RingDown
 from stickslip.decay.release import find_releases as find_releases

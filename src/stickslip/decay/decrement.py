@@ -13,7 +13,7 @@ from stickslip.decay import extremes as ex
 from stickslip.decay.release import RingDown, find_releases
 from stickslip.errors import EstimateError
 from stickslip.estimate import Estimate, Result, Status
-from stickslip.record.record import Record
+from stickslip.record.record import Record, require_record
 from stickslip.statistics import student, weighted_mean
 
 Array = NDArray[np.float64]
@@ -186,6 +186,7 @@ def decrement(record: Record, *, channel: str | None = None, form: str = "immune
     >>> round(decay.damping_ratio.value, 3), round(decay.dry_displacement.value, 3), decay.model
     (0.03, 0.02, 'viscous and dry')
     """
+    require_record(record)
     for name, word, choices in (("form", form, ex.FORMS), ("location", location, LOCATIONS)):
         if word not in choices:
             raise EstimateError(f"{name} = '{word}'", f"it is {' or '.join(choices)}", "choose one of them")

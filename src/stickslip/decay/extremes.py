@@ -120,11 +120,35 @@ def rate_worst(extremes: ArrayLike, *, i: int, m: int, error: float | Array) -> 
 
 
 def effective_rate_bound(extremes: ArrayLike, errors: ArrayLike, *, i: int, m: int) -> float:
-    """The same for errors that are known: the bound by the larger error of the two differences (equation 6.25).
+    """By how much can the viscous rate be off, if the errors of the extremes are known?
 
-    ``alpha_e = 2 (1 + s e^m) d / (m pi e^m |X_{i+1} - X_{i-1}|)`` with ``2 d`` the larger of
-    ``|delta_{i+m+1} - delta_{i+m-1}|`` and ``|delta_{i+1} - delta_{i-1}|``. The thesis prints it without ``e^m`` in the
-    denominator, which its tables hold, and with ``s = (-1)^(m+1)``; s = 1 bounds the error for even m too.
+    To first order, by the larger error of the two differences (thesis, equation 6.25): ``alpha_e = 2 (1 + e^m) d /
+    (m pi e^m |X_{i+1} - X_{i-1}|)`` with ``2 d`` the larger of ``|delta_{i+m+1} - delta_{i+m-1}|`` and
+    ``|delta_{i+1} - delta_{i-1}|``, and ``e = exp(-beta pi)``. The thesis prints it without ``e^m`` in the denominator,
+    which its tables hold, and with ``(-1)^(m+1)`` before ``e^m``, which is too small for even m.
+
+    Parameters
+    ----------
+    extremes, errors : array_like, shape (n,)
+        X_0, X_1, ... as measured, and how far each is off, in the same unit.
+    i, m : int
+        The middle of the first difference, and the half cycles from it to the second.
+
+    Returns
+    -------
+    float
+        Largest error of beta.
+
+    Raises
+    ------
+    EstimateError
+        The two differences have signs that no decay gives.
+
+    Examples
+    --------
+    >>> x = [1.0, -0.86, 0.74, -0.63, 0.54]
+    >>> round(effective_rate_bound(x, [0.001, 0.001, -0.001, -0.001, 0.001], i=1, m=1), 4)
+    0.0051
     """
     x = np.asarray(extremes, dtype=float)
     off = np.abs(differences(np.asarray(errors, dtype=float)))

@@ -29,7 +29,7 @@ from stickslip.decay.waveform import Array
 from stickslip.decay.which_motion import DecayMotion, motion_of, named, whichever
 from stickslip.errors import EstimateError
 from stickslip.estimate import Constant, Doubt, Estimate, Status
-from stickslip.record.record import Record, Step
+from stickslip.record.record import Record, Step, require_record
 from stickslip.signals.interpolate import without_delays
 from stickslip.statistics import student
 
@@ -122,6 +122,7 @@ def fit_decay(
     >>> found.damping_ratio_any.includes(found.damping_ratio.value)
     True
     """
+    require_record(record)
     if noise is not None and noise not in KINDS:
         raise EstimateError(f"noise = '{noise}'", f"it is one of {', '.join(KINDS)}", "choose one, or leave it out")
     records = [record] if isinstance(record, Record) else list(record)

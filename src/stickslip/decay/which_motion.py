@@ -19,6 +19,7 @@ from stickslip.record.record import Record
 
 Array = NDArray[np.float64]
 
+PLAIN = {"viscous", "dry", "both", "static"}  # motions that viscous and dry friction together hold
 SWING = 2.5  # rad, above which a pendulum lingers near its top and its phase can not be held
 COARSE = 0.5  # of a digitiser's step: less noise than this, the counts' own included, does not blur it
 TAIL = 2.0  # periods at rest that are kept
@@ -244,16 +245,24 @@ def told(ring_down: RingDown, worry: str) -> str:
 
 
 def whichever(choices: Sequence[Choice], estimate: Estimate, parameter: str) -> Estimate:
-    """An estimate with the interval that holds whichever of the candidates not rejected is the motion."""
-    (low, high), (lowest, highest) = estimate.interval, interval_of(choices, parameter)
-    ends = min(low, lowest), max(high, highest)
+    """An estimate with the interval that holds whichever of the candidates not rejected is the motion.
+
+    What viscous and dry friction would make of it does not count where the record speaks against both.
+    """
+    kept, (low, high) = kept_by_all(choices), estimate.interval
+    ends, value = interval_of(choices, parameter), estimate.value
+    if PLAIN & set(kept):
+        ends = min(low, ends[0]), max(high, ends[1])
+    else:
+        value = min(max(value, ends[0]), ends[1])
     return replace(
         estimate,
+        value=value,
         name=f"{estimate.name}, whichever motion",
         interval=ends,
         sd=(ends[1] - ends[0]) / (2 * NORMAL_95),
         method="all candidates not rejected",
-        checks=(f"candidates: {', '.join(kept_by_all(choices))}",),
+        checks=(f"candidates: {', '.join(kept)}",),
     )
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -12,8 +12,16 @@ from numpy.typing import NDArray
 
 from stickslip.errors import FormatError, ModelError
 from stickslip.files.table import Table, optional
-from stickslip.record.metadata import KEY, Digests, record_to_metadata, time_column, units_told
-from stickslip.record.record import Record
+from stickslip.record.metadata import (
+    BEGINS,
+    KEY,
+    Digests,
+    described_beside,
+    record_to_metadata,
+    time_column,
+    units_told,
+)
+from stickslip.record.record import Record, require_record
 from stickslip.whole import whole_file
 
 Array = NDArray[np.float64]
@@ -24,9 +32,9 @@ ROWS_AT_ONCE = 200_000
 def write_record(record: Record, path: str | Path, *, overwrite: bool = False) -> Path:
     """Write a record, with its channels, clock, history and truth, so that read_record gives it back exactly.
 
-    The format follows the suffix: ``.csv`` (a comment line of JSON, then ``name [unit]`` headers),
-    ``.h5``/``.hdf5`` (one dataset a channel) or ``.parquet``. Time [s] is written as a column of its own, for
-    other programs. The file appears whole or not at all.
+    The format follows the suffix: ``.csv`` (plain, with ``name [unit]`` headers, as Excel and pandas read it; history
+    and truth in ``NAME.csv.json`` beside it), ``.h5``/``.hdf5`` (one dataset a channel) or ``.parquet``. Time [s] is
+    written as a column of its own, for other programs. The file appears whole or not at all.
 
     Parameters
     ----------
@@ -56,6 +64,7 @@ def write_record(record: Record, path: str | Path, *, overwrite: bool = False) -
     ...     ss.read_record(ss.write_record(record, folder + "/slide.csv")).equals(record)
     True
     """
+    require_record(record)
     path = Path(path)
     writer = WRITERS.get(path.suffix.lower())
     if writer is None:
@@ -64,12 +73,17 @@ def write_record(record: Record, path: str | Path, *, overwrite: bool = False) -
             f"a record is written as {', '.join(WRITERS)}",
             "choose one of these endings",
         )
-    if not overwrite:
-        require_free(path)
+    beside = [described_beside(path)] if writer is _write_csv else []
+    for file in () if overwrite else (path, *beside):
+        require_free(file)
     columns = {time_column(record): ("s", record.time)}
     columns |= {name: (record.channels[name].unit, values) for name, values in record.samples.items()}
-    with whole(path, replace=overwrite) as part:
-        writer(part, columns, json.dumps(record_to_metadata(record)))
+    metadata = json.dumps(record_to_metadata(record))
+    with ExitStack() as files:
+        part = files.enter_context(whole(path, replace=overwrite))
+        for file in beside:  # there first: numbers without history are read as they are, not the other way round
+            files.enter_context(whole(file, replace=overwrite)).write_text(f"{BEGINS}{metadata}}}\n", "utf-8")
+        writer(part, columns, metadata)
     return path
 
 
@@ -104,11 +118,10 @@ def _taken(path: Path) -> FormatError:
 Columns = dict[str, tuple[str, Array]]
 
 
-def _write_csv(path: Path, columns: Columns, metadata: str) -> None:
+def _write_csv(path: Path, columns: Columns, _: str) -> None:
     import pandas as pd
 
     with path.open("w", encoding="utf-8", newline="") as file:
-        file.write(f"# {KEY} {metadata}\n")
         file.write(",".join(f"{name} [{unit}]" for name, (unit, _) in columns.items()) + "\n")
         rows = len(next(iter(columns.values()))[1])
         for first in range(0, rows, ROWS_AT_ONCE):

@@ -90,7 +90,10 @@ class Asked:
 
 
 def _renamed(step: ss.record.Step, names: Mapping[str, str]) -> ss.record.Step:
-    files = [{**file, "name": names.get(file["name"], file["name"])} for file in step.arguments.get("files", ())]
+    files = [
+        {key: names.get(value, value) if key == "name" else value for key, value in file.items() if key != "folder"}
+        for file in step.arguments.get("files", ())
+    ]
     return dataclasses.replace(step, arguments={**step.arguments, "files": files}) if files else step
 
 

@@ -80,6 +80,7 @@ class AnalyzeOptions(Constants):
     contact: Literal["ground", "base"] | None = None
     normal: Annotated[list[Value], Field(max_length=16)] = []
     method: Text | None = None
+    twins: bool = False
 
 
 class DecayOptions(Constants):

@@ -19,7 +19,10 @@ TEX = (
     (r"\\le\b", "≤"), (r"\\,", " "), (r"\\varphi", "φ"), (r"\\pi", "π"), (r"\\tau", "τ"), (r"\\?theta", "θ"),
     (r"\\gamma", "γ"), (r"\\sigma", "σ"), (r"\\delta", "δ"), (r"\\alpha", "α"), (r"\\(\w+)", r"\1"),
 )  # fmt: skip
-FIRST = "THESIS compliant 2.5Hz fk=1.1 Ky=192000 z.0174(k+Ky)"
+FIRST = "THESIS rigid 2.5Hz fk=1.1"
+BOUNDARY = [
+    0.103 + 0.01 * j for j in range(190)
+]  # frequency ratios, none an odd part of one, at which Den Hartog's line is drawn
 MORE = ("law", "drive", "contacts")
 
 
@@ -30,10 +33,15 @@ def catalog(request: Mapping[str, Any], go_on: Any) -> Answer:
         "drives": {name: _part(make) for name, make in ss.scenarios.DRIVES.items()},
         "system": _part(ss.Oscillator),
         "contact": _part(ss.Contact),
-        "boundary": [[b, r] for b, damping, r in ss.scenarios.grid("DH-2")["boundary"] if damping == 0],
         "presets": _presets(),
         "first": {"name": FIRST, "state": first_state()},
     }, {}
+
+
+def boundary(request: Mapping[str, Any], go_on: Any) -> Answer:
+    """Den Hartog's line: the friction ratio at which sliding first stops, over the frequency ratio."""
+    ratios = ss.consistent.sliding_boundary(BOUNDARY)
+    return {"boundary": list(zip(BOUNDARY, map(float, ratios), strict=True))}, {}
 
 
 def first_state() -> dict[str, Any]:

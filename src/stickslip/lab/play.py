@@ -188,6 +188,11 @@ async def _catalog(request: Request) -> Response:
     return await _answer(request, {"want": "catalog"})
 
 
+@described("Den Hartog's line over the frequency ratio", answer={"type": "object", "required": ["boundary"]})
+async def _boundary(request: Request) -> Response:
+    return await _answer(request, {"want": "boundary"})
+
+
 @described("The state of a scenario", answer={"type": "object", "required": ["state"]})
 async def _preset(request: Request) -> Response:
     return await _answer(request, {"want": "preset", "name": request.path_params["name"]})
@@ -208,6 +213,7 @@ async def _open(request: Request) -> Response:
 routes: list[BaseRoute] = [
     WebSocketRoute("/play", _play),
     Route("/catalog", _catalog),
+    Route("/boundary", _boundary),
     Route("/scenarios/{name}", _preset),
     Route("/export", _export, methods=["POST"]),
     Route("/open", _open, methods=["POST"]),

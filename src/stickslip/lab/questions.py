@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+import base64
 import dataclasses
 import json
 import math
-import re
 import shutil
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
@@ -24,6 +24,8 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
+TWINS = 40  # simulated rigs on which answers are tried
+MOST_FIGURES, MOST_SOUNDS, LONGEST_SOUND = 6, 8, 1 << 20  # shown in the lab; bytes of a sound
 POINTS = 2000  # pairs of least and greatest value of a channel that are drawn
 MOTION, FORCES = {"x", "v"}, {"friction", "load", "force"}
 CONSTANTS = ("mass", "stiffness", "damping")
@@ -131,9 +133,7 @@ def _untold(channel: ss.record.Channel) -> bool:
 
 
 def _fault(fault: Fault) -> dict[str, Any]:
-    match = re.search(rf"\b({'|'.join(ss.story.REPAIRS)})\(record", fault.message)
-    repair = ss.story.REPAIRS[match[1]] if match else ""
-    return {"message": on_the_page(fault.message), "severity": fault.severity, "repair": repair}
+    return {"message": on_the_page(fault.message), "severity": fault.severity, "repair": fault.repair}
 
 
 class Thinned:
@@ -244,8 +244,16 @@ def _shown(story: Story) -> dict[str, Any]:
         "cautions": [on_the_page(sentence) for sentence in story.notices],
         "lines": [[line.name, line.value, line.interval, story.marks(line)] for line in story.lines],
         "notes": [on_the_page(sentence) for sentence in story.notes],
+        "figures": [[plate.title, plate.svg(), plate.caption] for plate in story.plates[:MOST_FIGURES]],
+        "sounds": [[clip.caption, base64.b64encode(clip.wav).decode("ascii")] for clip in loudest(story)],
         "overlay": [],
     }
+
+
+def loudest(story: Story) -> list[Any]:
+    """As many of the loudest clips as keep the page light; the folder has all."""
+    clips = sorted(story.clips, key=lambda clip: -clip.level)[:MOST_SOUNDS]
+    return [clip for clip in clips if len(clip.wav) < LONGEST_SOUND]
 
 
 def analyze(asked: Asked) -> dict[str, Any]:
@@ -255,7 +263,7 @@ def analyze(asked: Asked) -> dict[str, Any]:
     def one(number: int) -> Any:
         rig = asked.rig(number)
         if not asked.is_long(number):
-            return ss.analyze(asked.record(number), rig=rig, method=method)
+            return _on_twins(asked, ss.analyze(asked.record(number), rig=rig, method=method))
 
         def tell(sentence: str) -> None:
             asked.say(f"analysing {asked.name(number)}, {sentence}", number / (len(asked.records) + 1))
@@ -263,6 +271,21 @@ def analyze(asked: Asked) -> dict[str, Any]:
         return ss.answers.analyze_blocks(asked.parts(number), rig=rig, method=method, progress=tell)
 
     return published(asked, *results_of(asked, one), ss.compare)
+
+
+def _on_twins(asked: Asked, findings: Any) -> Any:
+    """The answers tried on twins where that is asked for; with a note of why, where the record has none."""
+    if not asked.options.get("twins"):
+        return findings
+
+    def tell(share: float) -> None:
+        asked.say(f"trying the answers of {findings.name} on {TWINS} simulated rigs, {share:.0%}", 0.1 + 0.8 * share)
+
+    tell(0.0)
+    try:
+        return ss.tried(findings, twins=TWINS, progress=tell)
+    except ss.errors.EstimateError as error:
+        return dataclasses.replace(findings, notes=(*findings.notes, f"Twins: {error}"))
 
 
 def decay(asked: Asked) -> dict[str, Any]:

@@ -23,7 +23,7 @@ ENTRANCE = "/enter.js"  # what leads a copied link to the page; it holds no secr
 VIOLATION = 1008  # RFC 6455: against the policy
 HEADERS = {
     "content-security-policy": "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data: blob:; "
-    "media-src blob:; connect-src 'self' {sockets}; frame-src 'self'; base-uri 'none'; form-action 'none'; "
+    "media-src blob: data:; connect-src 'self' {sockets}; frame-src 'self'; base-uri 'none'; form-action 'none'; "
     "frame-ancestors 'none'",
     "x-content-type-options": "nosniff",
     "x-frame-options": "DENY",

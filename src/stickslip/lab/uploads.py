@@ -76,7 +76,7 @@ class Uploads:
             size = path.stat().st_size
             self._require_room(size, size)
         except BaseException:
-            path.unlink(missing_ok=True)
+            _remove(path)
             raise
         self._size += size
         return self._keep(Upload(key, label, path, size))
@@ -93,7 +93,7 @@ class Uploads:
         upload = self.get(key)
         del self._kept[key], self._used[key]
         self._size -= upload.size
-        upload.path.unlink(missing_ok=True)
+        _remove(upload.path)
 
     def remove_unused(self, *, before: float) -> None:
         """Remove what nobody asked about since that time."""
@@ -119,6 +119,12 @@ class Uploads:
         if self._size + more > self.altogether:
             sentence = f"The files here would be larger than {_in_bytes(self.altogether)} together; remove some first."
             raise HTTPException(413, sentence)
+
+
+def _remove(path: Path) -> None:
+    """Remove a file, and what was written beside it."""
+    for each in path.parent.glob(f"{path.name}*"):
+        each.unlink(missing_ok=True)
 
 
 async def _in_pieces(chunks: AsyncIterator[bytes]) -> AsyncIterator[bytes]:

@@ -36,7 +36,7 @@ from stickslip.laws.curved import CurvedLaw
 from stickslip.oscillator import Oscillator
 from stickslip.parameters import named
 from stickslip.parameters import unit as unit_of
-from stickslip.record.record import Record
+from stickslip.record.record import Record, require_record
 from stickslip.statistics import mean_uncertainty, student
 
 Array = NDArray[np.float64]
@@ -213,6 +213,7 @@ def fit_law(
     >>> bool(abs(found.law.kinetic / 1.1 - 1) < 0.01)
     True
     """
+    require_record(record)
     records = [record] if isinstance(record, Record) else list(record)
     if not records:
         raise EstimateError("no record", "a law is fitted to one record at least", "give one")

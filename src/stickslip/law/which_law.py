@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from stickslip.errors import EstimateError, ModelError
 from stickslip.estimate import NORMAL_95, Doubt, Estimate, Result, Status
-from stickslip.law.guess import Seen
 from stickslip.law.law import LawFit, answered
 from stickslip.law.search import descend
 from stickslip.law.start import CALIBRATION, Shown, require_apart, seen_damping, too_few, usual_nuisance
@@ -20,6 +19,7 @@ from stickslip.law.stretch import Stretch, channels_of
 from stickslip.law.surety import CALIBRATIONS, Evidence, Misfit, Standing, standings, surety, times, undescribed
 from stickslip.law.trials import (
     PASSES,
+    Seen,
     Trial,
     evidence_of,
     resumed,
@@ -32,7 +32,7 @@ from stickslip.law.trials import (
 )
 from stickslip.laws.guessing import family_of, hypotheses
 from stickslip.oscillator import Oscillator
-from stickslip.record.record import Record, Step
+from stickslip.record.record import Record, Step, require_record
 
 Array = NDArray[np.float64]
 
@@ -215,6 +215,7 @@ def compare_laws(
     >>> compare_laws(record, slider, laws=["Coulomb", "compliant"]).family
     'rigid'
     """
+    require_record(record)
     records = [record] if isinstance(record, Record) else list(record)
     if not records:
         raise EstimateError("no record", "laws are compared by one record at least", "give one")

@@ -54,6 +54,8 @@ class Mode:
         In order of precedence, should two be due at the same instant.
     rates : mapping of str to mapping
         Time derivative of the memory that moves in this mode.
+    speed : float
+        Of a mode that holds the mass: the sliding speed [m/s] at which it does; at rest on the counter-face: 0.
     """
 
     name: str
@@ -62,6 +64,7 @@ class Mode:
     friction: Row | None
     exits: tuple[Exit, ...]
     rates: Mapping[str, Row] = field(default_factory=dict)
+    speed: float = 0.0
 
     def changes(self, before: Mode, leaving: int) -> Iterator[tuple[int, Mode, Mode]]:
         """Contact, its mode before and its mode now: what an event by exit `leaving` into this mode has changed."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Protocol, runtime_checkable
 
 from stickslip.errors import ModelError
@@ -118,6 +118,28 @@ class Expression:
             return float(parts[0] ** self.value)
         return float(getattr(math, self.kind)(*parts))
 
+    @property
+    def symbols(self) -> frozenset[str]:
+        """Names of the symbols that it is made of."""
+        own = {self.name} if self.kind == "symbol" else set()
+        return frozenset(own.union(*(part.symbols for part in self.parts)))
+
+    def put(self, values: Mapping[str, Expression]) -> Expression:
+        """The same formula with other expressions in the place of symbols.
+
+        Parameters
+        ----------
+        values : mapping of str to Expression
+            By symbol; symbols that are not among them stay.
+
+        Returns
+        -------
+        Expression
+        """
+        if self.kind == "symbol":
+            return values.get(self.name, self)
+        return replace(self, parts=tuple(part.put(values) for part in self.parts))
+
     def slope(self, name: str) -> Expression:
         """The partial derivative by a symbol.
 
@@ -204,6 +226,8 @@ class CurvedMode:
         slow that the mass's inertia is nothing beside friction; None: not at all.
     levels : mapping of str to Expression
         What exits may speak of beside the state.
+    speed : float
+        Of a mode that holds the mass: the sliding speed [m/s] at which it does; at rest on the counter-face: 0.
     """
 
     name: str
@@ -214,6 +238,7 @@ class CurvedMode:
     rates: Mapping[str, Expression] = field(default_factory=dict)
     creep: Expression | None = None
     levels: Mapping[str, Expression] = field(default_factory=dict)
+    speed: float = 0.0
 
     def changes(self, before: CurvedMode, leaving: int) -> Iterator[tuple[int, CurvedMode, CurvedMode]]:
         """Contact, its mode before and its mode now, as of a linear mode."""

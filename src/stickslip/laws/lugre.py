@@ -54,6 +54,7 @@ class LuGre(Sliding):
         "f = stiffness z + damping z' + viscous v, z' = v - stiffness |v| z / g, g = kinetic + (static - kinetic) "
         "exp(-(|v|/speed)^exponent)"
     )
+    loads = ("preload", "normal")  # of a contact: it may be told as a coefficient of friction
     memory_units: ClassVar[Mapping[str, str]] = {"bristle": "m"}
     chosen = ("exponent",)  # not fitted where nothing else is said
 
@@ -168,6 +169,7 @@ class Dahl(Sliding):
 
     label = "Dahl"
     formula = "f' = stiffness v (1 - (f/kinetic) sign(v))^exponent"
+    loads = ("preload", "normal")  # of a contact: it may be told as a coefficient of friction
     memory_units: ClassVar[Mapping[str, str]] = {"force_state": "N"}
     chosen = ("exponent",)  # not fitted where nothing else is said
 

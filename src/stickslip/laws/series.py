@@ -9,8 +9,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from stickslip.errors import ModelError
+from stickslip.laws import slider
 from stickslip.laws.base import Exit, Law, Mode, Row
-from stickslip.laws.curved import CurvedLaw
+from stickslip.laws.curved import CurvedLaw, CurvedMode
+from stickslip.laws.time_delay import TimeDelay
 from stickslip.parameters import finite, parameter, parametric
 
 
@@ -39,7 +41,7 @@ class InSeries:
     label = "Slider in series with a spring"
     formula = "a slider without mass under the law, tied to the mass by f = stiffness (x - y) + damping (x' - y')"
 
-    law: Law = parameter("", "law at the slider", note="of linear modes")
+    law: Law = parameter("", "law at the slider", note="any but one with a time lag")
     stiffness: float = parameter("N/m", "contact stiffness", positive=True, note="K_y")
     damping: float = parameter(
         "N s/m",
@@ -49,13 +51,22 @@ class InSeries:
     )
 
     def __post_init__(self) -> None:
-        if isinstance(self.law, CurvedLaw):
+        if isinstance(self.law, TimeDelay):
             raise ModelError(
-                f"{type(self.law).__name__} in series",
-                "the law in series has linear modes",
-                "use Tabulated, or another law with linear modes",
+                "TimeDelay in series",
+                "a slider without mass jumps where friction of a while ago jumps",
+                "use SmoothStateVariable for a friction that lags",
             )
-        self.modes()
+        if isinstance(self.law, CurvedLaw):
+            object.__setattr__(self, "rates", self._rates)  # with it, it is a curved law itself
+            self._rates()
+        else:
+            self.modes()
+
+    @property
+    def loads(self) -> tuple[str, ...]:
+        """A contact may press it where its law is curved; stiffness and damping are then those per unit of load."""
+        return getattr(self.law, "loads", ()) if isinstance(self.law, CurvedLaw) else ()
 
     @property
     def slider(self) -> str:
@@ -66,12 +77,14 @@ class InSeries:
     @property
     def memory(self) -> Mapping[str, Row]:
         """The slider's displacement [m], under the mass at the start, and the law's own memory."""
+        if isinstance(self.law, CurvedLaw):
+            return slider.memory_of(self.law, self.slider, self.damping)
         return {self.slider: {"x": 1.0}, **self.law.memory}
 
     @property
     def memory_units(self) -> Mapping[str, str]:
-        """Of the law's own memory."""
-        return getattr(self.law, "memory_units", {})
+        """Of the slider's speed and force, and of the law's own memory."""
+        return {slider.SPEED: "m/s", slider.FORCE: "N", **getattr(self.law, "memory_units", {})}
 
     @property
     def places(self) -> tuple[str, ...]:
@@ -82,6 +95,10 @@ class InSeries:
     def entry(self) -> tuple[str, str, str]:
         """Motion starts with the slider at rest, whatever the velocity: the contact is relaxed."""
         return (self.law.entry[1],) * 3
+
+    def _rates(self) -> tuple[CurvedMode, ...]:
+        """The modes of a curved law, with the slider in the place of the mass."""
+        return slider.modes_of(self.law, self.slider, self.stiffness, self.damping)
 
     def modes(self) -> tuple[Mode, ...]:
         """The law's modes, with the slider in the place of the mass."""

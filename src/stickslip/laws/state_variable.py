@@ -49,6 +49,7 @@ class SmoothStateVariable(Sliding):
     formula = (
         "f = theta, theta' = -kinetic rate (theta - level tanh(steepness v)), level = kinetic, 1 where printed is true"
     )
+    loads = ("preload", "normal")  # of a contact: it may be told as a coefficient of friction
     memory_units: ClassVar[Mapping[str, str]] = {"theta": "N"}
 
     kinetic: float = parameter("N", "sliding friction", positive=True, note="f_k")
@@ -207,6 +208,7 @@ class RateState(Sliding):
         "f = direct normal asinh(v/(2 reference) exp((friction + evolution ln(reference age/distance))/direct)), "
         "age' = 1 - |v| age/distance (aging) or -(|v| age/distance) ln(|v| age/distance) (slip)"
     )
+    loads = ("preload", "normal")  # of a contact: it may be told as a coefficient of friction
     memory_units: ClassVar[Mapping[str, str]] = {"age": "s"}
 
     normal: float = parameter("N", "normal load", positive=True, note="N")

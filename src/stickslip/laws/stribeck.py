@@ -75,6 +75,7 @@ class Stribeck(Rigid):
         "f = (kinetic + (static - kinetic) exp(-(|v|/speed)^exponent)) sign(v) + viscous v while sliding, |f| <= "
         "static at rest"
     )
+    loads = ("preload", "normal")  # of a contact: it may be told as a coefficient of friction
     chosen = ("exponent",)  # not fitted where nothing else is said
 
     kinetic: float = parameter("N", "sliding friction", note="f_k, at high speed")
@@ -167,6 +168,7 @@ class FrictionCurve(Rigid):
     """
 
     label = "Any curve over speed"
+    loads = ("preload", "normal")  # of a contact: it may be told as a coefficient of friction
     formula = "f = F(|v|) sign(v) while sliding, |f| <= static at rest"
 
     curve: Curve = parameter(

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from stickslip.errors import ModelError, SolveError
 from stickslip.estimate import Doubt, Estimate, Status
 from stickslip.parameters import PARTS
-from stickslip.record.exchange import labelled_arrays
+from stickslip.record.metadata import labelled_arrays
 from stickslip.solve.orbit import SteadyState, alike
 from stickslip.solve.periodic import steady_state
 from stickslip.solve.poincare import Table, extent, lap, tables

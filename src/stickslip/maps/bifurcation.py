@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from stickslip.errors import ModelError
 from stickslip.maps.basins import Attractor, Start, numbers, onward, require_number, require_period, same, settled
 from stickslip.parameters import find
-from stickslip.record.exchange import labelled_arrays
+from stickslip.record.metadata import labelled_arrays
 from stickslip.solve.continuation import Branch, continue_orbit
 from stickslip.solve.tables import Array, System
 

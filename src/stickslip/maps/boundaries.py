@@ -20,7 +20,7 @@ from stickslip.maps.measures import COUNTS, FAILED, NO_SYSTEM, STATUS, variables
 from stickslip.maps.plan import required
 from stickslip.maps.sweep import NoSystem, require_memory, sweep
 from stickslip.parameters import find
-from stickslip.record.exchange import labelled_arrays
+from stickslip.record.metadata import labelled_arrays
 from stickslip.solve.tables import Array, System
 
 if TYPE_CHECKING:

@@ -42,6 +42,8 @@ class Fault:
         One sentence: what, where, how much, and what mends it.
     severity : str
         "error" where questions are refused until it is mended, "warning" where they are answered with less trust.
+    repair : str
+        The name by which :func:`~stickslip.answers.mend` and ``--repair`` know what mends it; empty where nothing does.
 
     Examples
     --------
@@ -57,6 +59,7 @@ class Fault:
     rows: Runs
     message: str
     severity: str = "warning"
+    repair: str = ""
 
     def __str__(self) -> str:
         return self.message
@@ -145,7 +148,8 @@ def _cut(record: Record) -> list[Fault]:
 
 
 def _clock_faults(stamps: Array) -> list[Fault]:
-    clock, mended = inspect(stamps), "repair_clock(record)"
+    clock, mended = inspect(stamps), ("clock", "repair_clock(record)")
+    filled = ("gaps", "fill_gaps(record)")
     usual = f"{1e3 * clock.step:.4g} ms"
     known = np.flatnonzero(np.isfinite(stamps))
     intervals, rows = np.full(len(stamps), np.nan), np.ones(len(stamps))  # from each stamp to the next that is a number
@@ -167,8 +171,8 @@ def _clock_faults(stamps: Array) -> list[Fault]:
     if len(clock.slower):
         slow = float(np.median(intervals[clock.slower]))
         what = f"{len(clock.slower)} intervals of {1e3 * slow:.4g} ms where the others are {usual} long"
-        filled = f"fill_gaps(record, longest={2 * slow:.2g}), or cut them off with record.rows()"
-        faults.append(_clock_fault("rate", _pairs(clock.slower), what, filled))
+        longer = f"fill_gaps(record, longest={2 * slow:.2g}), or cut them off with record.rows()"
+        faults.append(_clock_fault("rate", _pairs(clock.slower), what, ("gaps", longer)))
     if len(clock.gaps):
         lengths = intervals[clock.gaps]
         lost = float(np.sum(np.maximum(1, np.round(lengths / clock.step) - rows[clock.gaps])))
@@ -177,13 +181,12 @@ def _clock_faults(stamps: Array) -> list[Fault]:
             f"{_several(len(clock.gaps), 'gap', 'gaps')} of up to {1e3 * np.max(lengths):.4g} ms "
             f"where samples come every {usual}, about {many} lost"
         )
-        faults.append(_clock_fault("gap", _pairs(clock.gaps), what, "fill_gaps(record)"))
+        faults.append(_clock_fault("gap", _pairs(clock.gaps), what, filled))
     if len(clock.uneven):
         off = 100 * np.max(np.abs(intervals[clock.uneven] / clock.step - 1))
         many = _several(len(clock.uneven), "interval is uneven", "intervals are uneven")
         what = f"{many}, off by up to {off:.2g} % of {usual}"
-        filled = "fill_gaps(record)" if len(clock.gaps) else mended
-        faults.append(_clock_fault("jitter", _pairs(clock.uneven), what, filled))
+        faults.append(_clock_fault("jitter", _pairs(clock.uneven), what, filled if len(clock.gaps) else mended))
     return faults
 
 
@@ -198,8 +201,10 @@ def _standing_still(stamps: Array) -> str:
     )
 
 
-def _clock_fault(kind: str, runs: Runs, what: str, cure: str, *, verb: str = "mend the clock") -> Fault:
-    return Fault(kind, None, runs, f"{what} ({in_words(runs)}); {verb} with {cure}.", "error")
+def _clock_fault(kind: str, runs: Runs, what: str, cure: tuple[str, str], *, verb: str = "mend the clock") -> Fault:
+    """A fault of the clock; `cure` is the repair's name and how it is called."""
+    repair, call = cure
+    return Fault(kind, None, runs, f"{what} ({in_words(runs)}); {verb} with {call}.", "error", repair)
 
 
 def _pairs(first: NDArray[np.intp], width: int = 1) -> Runs:
@@ -248,7 +253,8 @@ def _channel_faults(name: str, unit: str, values: Array) -> list[Fault]:
     faults = []
     if lost.any():
         what = _several(int(lost.sum()), "value that is not a number", "values that are not numbers")
-        faults.append(_fault("missing", name, flaws.runs_of(lost), what, cure(values), "error"))
+        repair = "missing" if flaws.missing(values)[0] else ""
+        faults.append(_fault("missing", name, flaws.runs_of(lost), what, cure(values), repair, "error"))
     if lost.all() or len(values) < 3:
         return faults
     if lost.any():
@@ -305,7 +311,9 @@ def _shape_faults(name: str, unit: str, values: Array) -> list[Fault]:
     spikes = flaws.spikes(values)
     if spikes:
         what = _several(_count(spikes), "sample that stands off as a spike", "samples that stand off as spikes")
-        faults.append(_fault("spike", name, spikes, what, f'replace them with remove_spikes(record, "{name}")'))
+        faults.append(
+            _fault("spike", name, spikes, what, f'replace them with remove_spikes(record, "{name}")', "spikes")
+        )
         values = flaws.held_over(values, flaws.rows_of(spikes, len(values)))
     measured = name != COMPUTED
     cut = _clipped(name, unit, values) if measured else None
@@ -320,7 +328,9 @@ def _shape_faults(name: str, unit: str, values: Array) -> list[Fault]:
     rise = flaws.drift(values)
     if rise > DRIFT:
         what = f"a drift of {rise:.2g} times the oscillation's amplitude over the record"
-        faults.append(_fault("drift", name, everywhere, what, f'take it off with remove_drift(record, "{name}")'))
+        faults.append(
+            _fault("drift", name, everywhere, what, f'take it off with remove_drift(record, "{name}")', "drift")
+        )
     return faults
 
 
@@ -344,7 +354,9 @@ def _clipped(name: str, unit: str, values: Array) -> Fault | None:
     if not cut:
         return None
     what = _several(_count(cut), "sample", "samples") + f" clipped near {_number(values[cut[0][0]], '.4g', unit)}"
-    return _fault("clipped", name, cut, what, f'mark or rebuild them with restore_clipped(record, "{name}")')
+    return _fault(
+        "clipped", name, cut, what, f'mark or rebuild them with restore_clipped(record, "{name}")', "clipping"
+    )
 
 
 def _number(value: float, digits: str, unit: str) -> str:
@@ -360,8 +372,10 @@ def _count(runs: Runs) -> int:
     return sum(last - first + 1 for first, last in runs)
 
 
-def _fault(kind: str, name: str, runs: Runs, what: str, cure: str, severity: str = "warning") -> Fault:
-    return Fault(kind, name, runs, f"channel {name} has {what} ({in_words(runs)}); {cure}.", severity)
+def _fault(
+    kind: str, name: str, runs: Runs, what: str, cure: str, repair: str = "", severity: str = "warning"
+) -> Fault:
+    return Fault(kind, name, runs, f"channel {name} has {what} ({in_words(runs)}); {cure}.", severity, repair)
 
 
 def _inside(runs: Runs, lost: NDArray[np.bool_]) -> bool:

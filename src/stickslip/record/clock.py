@@ -19,6 +19,7 @@ COARSEST_SNAP = 2e-3  # a rate is taken as round only where the stamps fix it th
 GAP = 1.9  # an interval this many times the usual one lost a sample; slower loops of a host stay below
 TOLERANCE = 0.02  # relative deviation of an interval that no analysis of friction would notice
 BRIDGED = 6  # sampling intervals over which samples are interpolated by their stamps
+SIGNIFICANT = range(4, 10)  # digits of a stamp that programs write
 STEADY = 10  # gaps this close together are no accident
 
 
@@ -45,13 +46,23 @@ class Clock:
 
 
 def resolution(stamps: Array) -> float:
-    """The step to which stamps are rounded: a power of ten where they are decimals, else that of their floats."""
+    """The step to which stamps are rounded: a power of ten where they are decimals, else that of their floats.
+
+    Stamps of as many significant digits each, as "%g" writes them, are rounded the more the larger they are: told is
+    the step of the largest.
+    """
     largest = float(np.max(np.abs(stamps), initial=0.0))
     floor = 4 * np.finfo(float).eps * max(largest, np.finfo(float).tiny)
     for digits in range(10):
         scaled = stamps * 10.0**digits
         if np.max(np.abs(scaled - np.rint(scaled)), initial=0.0) <= floor * 10.0**digits:
             return float(10.0**-digits)
+    some = stamps[stamps != 0]
+    places = np.floor(np.log10(np.abs(some)))
+    for digits in SIGNIFICANT if len(some) and math.isfinite(largest) else ():
+        scaled = some * 10.0 ** (digits - 1 - places)
+        if np.max(np.abs(scaled - np.rint(scaled))) <= 4 * np.finfo(float).eps * 10.0**digits:
+            return float(10.0 ** (places.max() - digits + 1))
     single = stamps.astype(np.float32)
     return float(np.spacing(np.float32(largest))) if np.array_equal(single.astype(float), stamps) else floor
 

@@ -1,4 +1,4 @@
-"""A Record as a pandas DataFrame, an xarray Dataset or SDyPy's SEP 005 channel list, and back.
+"""A Record from a pandas DataFrame, an xarray Dataset or SDyPy's SEP 005 channel list.
 
 What stickslip wrote comes back exactly: units, clock, history and truth travel beside the samples as JSON. What
 others wrote comes in through the same door as a file: units are parsed, the clock is found in the time axis, and
@@ -7,7 +7,6 @@ the first Step of the history says where it came from.
 
 from __future__ import annotations
 
-import json
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -17,19 +16,21 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from stickslip.errors import FormatError, RecordError
+from stickslip.errors import RecordError
+from stickslip.record.channels import Channel
 from stickslip.record.clock import Clock, fit_clock
+from stickslip.record.log import Log
 from stickslip.record.metadata import (
     KEY,
     Digests,
-    history_of,
-    metadata_to_record,
+    labelled_arrays,
     parse_metadata,
-    record_to_metadata,
-    time_column,
+    require_version,
+    restored,
+    trusting,
     units_told,
 )
-from stickslip.record.record import Record, Step
+from stickslip.record.record import Record, StatedRig, Step
 from stickslip.units import parse_unit
 
 if TYPE_CHECKING:
@@ -37,33 +38,6 @@ if TYPE_CHECKING:
     import xarray as xr
 
 Array = NDArray[np.float64]
-
-
-def to_pandas(record: Record) -> pd.DataFrame:
-    """The record as a DataFrame: one column a channel [SI], indexed by time [s].
-
-    Parameters
-    ----------
-    record : Record
-        The record; its history, units and clock go into ``.attrs``.
-
-    Returns
-    -------
-    pandas.DataFrame
-        n rows; ``attrs["units"]`` maps columns to units, and :func:`from_pandas` gives the record back exactly.
-
-    Examples
-    --------
-    >>> record = Record.of({"x": [0.0, 1.0, 3.0]}, fs=10.0, units={"x": "mm"})
-    >>> frame = to_pandas(record)
-    >>> frame.attrs["units"], from_pandas(frame).equals(record)
-    ({'x': 'm'}, True)
-    """
-    import pandas as pd
-
-    frame = pd.DataFrame(dict(record.samples), index=pd.Index(record.time, name="time"), copy=True)
-    frame.attrs = {"units": {name: channel.unit for name, channel in record.channels.items()}, KEY: _described(record)}
-    return frame
 
 
 def from_pandas(
@@ -123,38 +97,6 @@ def from_pandas(
         described=frame.attrs.get(KEY),
         step=Step("from_pandas", _given(fs=fs, units=units, time=time)),
     )
-
-
-def to_xarray(record: Record) -> xr.Dataset:
-    """The record as an xarray Dataset over the coordinate ``time`` [s].
-
-    Parameters
-    ----------
-    record : Record
-        The record.
-
-    Returns
-    -------
-    xarray.Dataset
-        One variable a channel with attributes ``units`` and ``long_name``; :func:`from_xarray` gives the record
-        back exactly. (Arithmetic in xarray does not carry units: "m" squared stays "m".)
-
-    Examples
-    --------
-    >>> record = Record.of({"x": [0.0, 1.0, 3.0]}, fs=10.0, units={"x": "mm"})
-    >>> dataset = to_xarray(record)
-    >>> dataset["x"].attrs["units"], from_xarray(dataset).equals(record)
-    ('m', True)
-    """
-    xarray = labelled_arrays()
-    axis = time_column(record)
-    variables = {
-        name: (axis, values.copy(), {"units": record.channels[name].unit, "long_name": record.channels[name].quantity})
-        for name, values in record.samples.items()
-    }
-    dataset: xr.Dataset = xarray.Dataset(variables, coords={axis: (axis, np.array(record.time), {"units": "s"})})
-    dataset.attrs = {"fs": record.fs, KEY: _described(record)}
-    return dataset
 
 
 def from_xarray(
@@ -218,41 +160,6 @@ def from_xarray(
         described=dataset.attrs.get(KEY),
         step=Step("from_xarray", _given(fs=fs, units=units)),
     )
-
-
-def to_sep005(record: Record) -> list[dict[str, Any]]:
-    """The record as SDyPy's unified time series (SEP 005): one dictionary a channel.
-
-    Parameters
-    ----------
-    record : Record
-        The record.
-
-    Returns
-    -------
-    list of dict
-        ``name``, ``data`` [SI], ``unit_str``, ``fs`` [Hz] (or ``time`` [s] where the clock is broken), and what
-        :func:`from_sep005` needs to give the record back exactly.
-
-    Examples
-    --------
-    >>> record = Record.of({"x": [0.0, 1.0, 3.0]}, fs=10.0, units={"x": "mm"})
-    >>> [channel["unit_str"] for channel in to_sep005(record)], from_sep005(to_sep005(record)).equals(record)
-    (['m'], True)
-    """
-    described = _described(record)
-    clock: dict[str, Any] = {"fs": record.fs} if record.stamps is None else {"time": record.stamps.copy()}
-    return [
-        {
-            "name": name,
-            "data": values.copy(),
-            "unit_str": record.channels[name].unit,
-            **clock,
-            "quantity": record.channels[name].quantity,
-            KEY: described,
-        }
-        for name, values in record.samples.items()
-    ]
 
 
 def from_sep005(channels: Sequence[Mapping[str, Any]] | Mapping[str, Any]) -> Record:
@@ -337,10 +244,6 @@ def _begin(channel: Mapping[str, Any]) -> str:
 
 
 # ---- what all three share
-
-
-def _described(record: Record) -> str:
-    return json.dumps(record_to_metadata(record))
 
 
 def _received(
@@ -487,18 +390,48 @@ def _given(**arguments: Any) -> dict[str, Any]:
     }
 
 
-def labelled_arrays(asker: str = "to_xarray and from_xarray") -> Any:
-    """The package xarray, or a refusal that says how to get it."""
-    try:
-        import xarray
-    except ImportError as error:
-        raise FormatError(
-            "the package xarray is not installed",
-            f"{asker} need it",
-            'install it with: pip install ".[io]" in the checkout',
-        ) from error
-    return xarray
-
-
 def _not_a(wanted: str, value: object) -> RecordError:
     return RecordError(f"what was given is of type {type(value).__name__}", f"this reads {wanted}", "convert it first")
+
+
+def metadata_to_record(metadata: Mapping[str, Any], samples: Mapping[str, Array], first: int = 0) -> Record:
+    """The record that `metadata` and the samples tell.
+
+    The samples begin at row `first`, and include the time column where stamps were kept.
+
+    Raises
+    ------
+    FormatError
+        The metadata is of a later version, damaged, or does not fit the samples.
+    """
+    with trusting():
+        require_version(metadata)
+        channels = {entry["name"]: Channel(**restored(entry)) for entry in metadata["channels"]}
+        if not isinstance(metadata["stamps"], bool):
+            raise TypeError("stamps are kept or not")
+        stamps = samples[metadata["time"]] if metadata["stamps"] else None
+        start = float(metadata["start"])
+        if first:
+            start = start + first / float(metadata["fs"]) if stamps is None else float(stamps[0])
+        return Record(
+            {name: samples[name] for name in channels},
+            channels,
+            float(metadata["fs"]),
+            start,
+            history_of(metadata),
+            stamps,
+            restored(metadata["truth"]),
+            StatedRig(**restored(rig)) if (rig := metadata.get("rig")) else None,
+            Log.of(log) if (log := metadata.get("log")) is not None else None,
+        )
+
+
+def history_of(metadata: Mapping[str, Any]) -> tuple[Step, ...]:
+    """The history that the metadata tells; empty where there is none."""
+    with trusting():
+        steps = tuple(Step(**restored(step)) for step in metadata.get("history", ()))
+        for step in steps:
+            for file in step.arguments.get("files", ()):
+                if not isinstance(file["name"], str):
+                    raise TypeError("a file without name")
+        return steps

@@ -1,4 +1,8 @@
-"""What a Record says of itself beside its samples: one JSON text, the same in every file and exchange format."""
+"""What a Record says of itself beside its samples, one JSON text in every file; and a Record as the tables of others.
+
+Of pandas a DataFrame, of xarray a Dataset, of SDyPy the SEP 005 channel list; :mod:`stickslip.record.exchange` is the
+way back.
+"""
 
 from __future__ import annotations
 
@@ -6,20 +10,45 @@ import hashlib
 import json
 from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager
-from typing import Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from stickslip.errors import FormatError
 from stickslip.record.channels import Channel
-from stickslip.record.log import Log
-from stickslip.record.record import Record, StatedRig, Step
+
+if TYPE_CHECKING:
+    import pandas as pd
+    import xarray as xr
+
+    from stickslip.record.record import Record
 
 Array = NDArray[np.float64]
 
 VERSION = 1
-KEY = "stickslip record"  # of the HDF5 attribute and the Parquet entry; begins the CSV comment
+KEY = "stickslip record"  # of the HDF5 attribute, the Parquet entry, and the file beside a CSV
+BEGINS = f'{{"{KEY}": '
+LONGEST = 1 << 26  # bytes of a description in a file of its own
+
+
+def described_beside(path: Path) -> Path:
+    """The file that holds what a text file can not: ``slide.csv.json`` beside ``slide.csv``."""
+    return path.with_name(f"{path.name}.json")
+
+
+def read_beside(path: Path) -> dict[str, Any]:
+    """What stands in the file beside a text file; nothing where there is none, or one of somebody else's."""
+    beside = described_beside(path)
+    if not beside.is_file():
+        return {}
+    with beside.open("rb") as file:
+        if file.read(len(BEGINS)) != BEGINS.encode():
+            return {}
+        file.seek(0)
+        told = parse_metadata(file.read(LONGEST)).get(KEY)
+    return told if isinstance(told, dict) else {}
 
 
 def record_to_metadata(record: Record) -> dict[str, Any]:
@@ -60,7 +89,7 @@ class Digests:
 
     def changed(self, metadata: Mapping[str, Any]) -> list[str]:
         """The columns whose numbers are not those that the metadata tells; a journal's frames have their own sums."""
-        with _trusting():
+        with trusting():
             if metadata["sha256"] is None:
                 return []
             return [name for name, digest in self.told().items() if metadata["sha256"].get(name) != digest]
@@ -75,42 +104,10 @@ def time_column(record: Record) -> str:
     return name
 
 
-def metadata_to_record(metadata: Mapping[str, Any], samples: Mapping[str, Array], first: int = 0) -> Record:
-    """The record that `metadata` and the samples tell.
-
-    The samples begin at row `first`, and include the time column where stamps were kept.
-
-    Raises
-    ------
-    FormatError
-        The metadata is of a later version, damaged, or does not fit the samples.
-    """
-    with _trusting():
-        _require_version(metadata)
-        channels = {entry["name"]: Channel(**_restored(entry)) for entry in metadata["channels"]}
-        if not isinstance(metadata["stamps"], bool):
-            raise TypeError("stamps are kept or not")
-        stamps = samples[metadata["time"]] if metadata["stamps"] else None
-        start = float(metadata["start"])
-        if first:
-            start = start + first / float(metadata["fs"]) if stamps is None else float(stamps[0])
-        return Record(
-            {name: samples[name] for name in channels},
-            channels,
-            float(metadata["fs"]),
-            start,
-            history_of(metadata),
-            stamps,
-            _restored(metadata["truth"]),
-            StatedRig(**_restored(rig)) if (rig := metadata.get("rig")) else None,
-            Log.of(log) if (log := metadata.get("log")) is not None else None,
-        )
-
-
 def channels_told(metadata: Mapping[str, Any]) -> dict[str, Channel]:
     """The channels that were written, by name; none without metadata."""
-    with _trusting():
-        return {entry["name"]: Channel(**_restored(entry)) for entry in metadata.get("channels", ())}
+    with trusting():
+        return {entry["name"]: Channel(**restored(entry)) for entry in metadata.get("channels", ())}
 
 
 def units_told(metadata: Mapping[str, Any]) -> dict[str, str]:
@@ -121,8 +118,8 @@ def units_told(metadata: Mapping[str, Any]) -> dict[str, str]:
     FormatError
         The metadata is of a later version or damaged.
     """
-    with _trusting():
-        _require_version(metadata)
+    with trusting():
+        require_version(metadata)
         units = {str(entry["name"]): str(entry["unit"]) for entry in metadata["channels"]}
         return {**units, str(metadata["time"]): "s"}
 
@@ -148,18 +145,7 @@ def require_rows(metadata: Mapping[str, Any], found: int) -> None:
         )
 
 
-def history_of(metadata: Mapping[str, Any]) -> tuple[Step, ...]:
-    """The history that the metadata tells; empty where there is none."""
-    with _trusting():
-        steps = tuple(Step(**_restored(step)) for step in metadata.get("history", ()))
-        for step in steps:
-            for file in step.arguments.get("files", ()):
-                if not isinstance(file["name"], str):
-                    raise TypeError("a file without name")
-        return steps
-
-
-def _require_version(metadata: Mapping[str, Any]) -> None:
+def require_version(metadata: Mapping[str, Any]) -> None:
     if metadata["version"] != VERSION:
         raise FormatError(
             f"the file is of version {str(metadata['version'])[:20]}",
@@ -169,7 +155,7 @@ def _require_version(metadata: Mapping[str, Any]) -> None:
 
 
 @contextmanager
-def _trusting() -> Iterator[None]:
+def trusting() -> Iterator[None]:
     """Around the use of a description: what does not fit becomes one sentence."""
     try:
         yield
@@ -210,9 +196,129 @@ def _plain(value: Any) -> Any:
     return str(value)
 
 
-def _restored(value: Any) -> Any:
+def restored(value: Any) -> Any:
     if isinstance(value, dict):
         if list(value) == ["__tuple__"]:
-            return tuple(_restored(item) for item in value["__tuple__"])
-        return {key: _restored(item) for key, item in value.items()}
-    return [_restored(item) for item in value] if isinstance(value, list) else value
+            return tuple(restored(item) for item in value["__tuple__"])
+        return {key: restored(item) for key, item in value.items()}
+    return [restored(item) for item in value] if isinstance(value, list) else value
+
+
+# ---- to the tables of others
+
+
+def to_pandas(record: Record) -> pd.DataFrame:
+    """The record as a DataFrame: one column a channel [SI], indexed by time [s].
+
+    Parameters
+    ----------
+    record : Record
+        The record; its history, units and clock go into ``.attrs``.
+
+    Returns
+    -------
+    pandas.DataFrame
+        n rows; ``attrs["units"]`` maps columns to units, and :func:`from_pandas` gives the record back exactly.
+
+    Examples
+    --------
+    >>> from stickslip.record.exchange import from_pandas
+    >>> from stickslip.record.record import Record
+    >>> record = Record.of({"x": [0.0, 1.0, 3.0]}, fs=10.0, units={"x": "mm"})
+    >>> frame = to_pandas(record)
+    >>> frame.attrs["units"], from_pandas(frame).equals(record)
+    ({'x': 'm'}, True)
+    """
+    import pandas as pd
+
+    frame = pd.DataFrame(dict(record.samples), index=pd.Index(record.time, name="time"), copy=True)
+    frame.attrs = {"units": {name: channel.unit for name, channel in record.channels.items()}, KEY: _described(record)}
+    return frame
+
+
+def to_xarray(record: Record) -> xr.Dataset:
+    """The record as an xarray Dataset over the coordinate ``time`` [s].
+
+    Parameters
+    ----------
+    record : Record
+        The record.
+
+    Returns
+    -------
+    xarray.Dataset
+        One variable a channel with attributes ``units`` and ``long_name``; :func:`from_xarray` gives the record
+        back exactly. (Arithmetic in xarray does not carry units: "m" squared stays "m".)
+
+    Examples
+    --------
+    >>> from stickslip.record.exchange import from_xarray
+    >>> from stickslip.record.record import Record
+    >>> record = Record.of({"x": [0.0, 1.0, 3.0]}, fs=10.0, units={"x": "mm"})
+    >>> dataset = to_xarray(record)
+    >>> dataset["x"].attrs["units"], from_xarray(dataset).equals(record)
+    ('m', True)
+    """
+    xarray = labelled_arrays()
+    axis = time_column(record)
+    variables = {
+        name: (axis, values.copy(), {"units": record.channels[name].unit, "long_name": record.channels[name].quantity})
+        for name, values in record.samples.items()
+    }
+    dataset: xr.Dataset = xarray.Dataset(variables, coords={axis: (axis, np.array(record.time), {"units": "s"})})
+    dataset.attrs = {"fs": record.fs, KEY: _described(record)}
+    return dataset
+
+
+def to_sep005(record: Record) -> list[dict[str, Any]]:
+    """The record as SDyPy's unified time series (SEP 005): one dictionary a channel.
+
+    Parameters
+    ----------
+    record : Record
+        The record.
+
+    Returns
+    -------
+    list of dict
+        ``name``, ``data`` [SI], ``unit_str``, ``fs`` [Hz] (or ``time`` [s] where the clock is broken), and what
+        :func:`from_sep005` needs to give the record back exactly.
+
+    Examples
+    --------
+    >>> from stickslip.record.exchange import from_sep005
+    >>> from stickslip.record.record import Record
+    >>> record = Record.of({"x": [0.0, 1.0, 3.0]}, fs=10.0, units={"x": "mm"})
+    >>> [channel["unit_str"] for channel in to_sep005(record)], from_sep005(to_sep005(record)).equals(record)
+    (['m'], True)
+    """
+    described = _described(record)
+    clock: dict[str, Any] = {"fs": record.fs} if record.stamps is None else {"time": record.stamps.copy()}
+    return [
+        {
+            "name": name,
+            "data": values.copy(),
+            "unit_str": record.channels[name].unit,
+            **clock,
+            "quantity": record.channels[name].quantity,
+            KEY: described,
+        }
+        for name, values in record.samples.items()
+    ]
+
+
+def _described(record: Record) -> str:
+    return json.dumps(record_to_metadata(record))
+
+
+def labelled_arrays(asker: str = "to_xarray and from_xarray") -> Any:
+    """The package xarray, or a refusal that says how to get it."""
+    try:
+        import xarray
+    except ImportError as error:
+        raise FormatError(
+            "the package xarray is not installed",
+            f"{asker} need it",
+            'install it with: pip install ".[io]" in the checkout',
+        ) from error
+    return xarray

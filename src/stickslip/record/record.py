@@ -13,15 +13,16 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from stickslip.errors import RecordError
+from stickslip.printing import html_table
+from stickslip.record import metadata
 from stickslip.record.channels import VOCABULARY, Channel, checked_name, described
+from stickslip.record.check import Fault, clock_cure, cure, find_faults
 from stickslip.record.log import Log
 from stickslip.units import parse_unit
 
 if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
-
-    from stickslip.record.check import Fault
 
 Array = NDArray[np.float64]
 
@@ -51,15 +52,18 @@ class Step:
         What it was called with.
     outcome : str
         What came of it, in words.
+    repair : str
+        The name by which :func:`~stickslip.answers.mend` and ``--repair`` know it; empty of what is no repair.
     """
 
     action: str
     arguments: Mapping[str, Any] = field(default_factory=dict)
     outcome: str = ""
+    repair: str = ""
 
     def __post_init__(self) -> None:
         named = isinstance(self.arguments, Mapping) and all(isinstance(key, str) for key in self.arguments)
-        if not (named and isinstance(self.action, str) and isinstance(self.outcome, str)):
+        if not (named and all(isinstance(text, str) for text in (self.action, self.outcome, self.repair))):
             raise RecordError(
                 f"a step {str(self.action)[:40]!r} with {str(self.arguments)[:40]!r}",
                 "a step is a function's name, its arguments by name, and what came of it in words",
@@ -68,7 +72,8 @@ class Step:
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON."""
-        return {"action": self.action, "arguments": dict(self.arguments), "outcome": self.outcome}
+        mends = {"repair": self.repair} if self.repair else {}
+        return {"action": self.action, "arguments": dict(self.arguments), "outcome": self.outcome, **mends}
 
     def __str__(self) -> str:
         arguments = ", ".join(f"{key}={value!r}" for key, value in self.arguments.items())
@@ -290,8 +295,6 @@ class Record:
                 f"the record has {len(self)} samples", f"{question} needs at least {samples}", "give a longer record"
             )
         if self.stamps is not None:
-            from stickslip.record.check import clock_cure
-
             raise RecordError(
                 "the time stamps are not uniform",
                 f"{question} needs one sampling rate",
@@ -300,8 +303,6 @@ class Record:
         for name in names:
             bad = np.flatnonzero(~np.isfinite(self.samples[name]))
             if len(bad):
-                from stickslip.record.check import cure
-
                 many = (
                     f"{len(bad)} values that are not numbers, the first"
                     if len(bad) > 1
@@ -412,27 +413,19 @@ class Record:
     @cached_property
     def _faults(self) -> tuple[Fault, ...]:
         """Looked for once: a record does not change, and every question asks."""
-        from stickslip.record.check import find_faults
-
         return tuple(find_faults(self))
 
     def to_pandas(self) -> pd.DataFrame:
         """A DataFrame indexed by time [s]; units and history in ``.attrs``."""
-        from stickslip.record.exchange import to_pandas
-
-        return to_pandas(self)
+        return metadata.to_pandas(self)
 
     def to_xarray(self) -> xr.Dataset:
         """An xarray Dataset over ``time`` [s] with units and history as attributes."""
-        from stickslip.record.exchange import to_xarray
-
-        return to_xarray(self)
+        return metadata.to_xarray(self)
 
     def to_sep005(self) -> list[dict[str, Any]]:
         """The list of channel dictionaries of SDyPy's SEP 005."""
-        from stickslip.record.exchange import to_sep005
-
-        return to_sep005(self)
+        return metadata.to_sep005(self)
 
     def equals(self, other: object) -> bool:
         """Whether another record holds exactly the same samples, channels, clock, history, truth, rig and log."""
@@ -450,10 +443,39 @@ class Record:
         ]
         return same and details[0] == details[1]
 
+    def _repr_html_(self) -> str:
+        rows = [
+            (name, f"[{self.channels[name].unit}]", self.channels[name].quantity, f"{np.nanmin(values):.5g}",
+             f"{np.nanmax(values):.5g}")
+            for name, values in self.samples.items() if np.isfinite(values).any()
+        ]  # fmt: skip
+        clock = f"{len(self)} samples, {self.fs:g} Hz, {self.time[0]:g} to {self.time[-1]:g} s"
+        title = f"Record: {clock}{', broken clock' if self.stamps is not None else ''}"
+        return html_table(title, ("channel", "unit", "quantity", "least", "greatest"), rows)
+
     def __repr__(self) -> str:
         names = ", ".join(f"{channel.name} [{channel.unit}]" for channel in self.channels.values())
         clock = "broken clock, about " if self.stamps is not None else ""
         return f"Record({names}; {len(self)} samples, {clock}{self.fs:g} Hz, from {self.start:g} s)"
+
+
+def require_record(*things: object) -> None:
+    """Refuse what is no Record, and say how one is made; a sequence is looked into."""
+    for thing in things:
+        if isinstance(thing, list | tuple):
+            require_record(*thing)
+        elif not isinstance(thing, Record):
+            frame = type(thing).__module__.partition(".")[0]
+            made = {
+                "dict": 'stickslip.Record.of({"x": [...]}, fs=1000, units={"x": "mm"})',
+                "str": "stickslip.read_record(path)", "PosixPath": "stickslip.read_record(path)",
+                "DataFrame": f"stickslip.record.from_{frame}(frame)", "Dataset": f"stickslip.record.from_{frame}(data)",
+            }  # fmt: skip
+            raise RecordError(
+                f"a {type(thing).__name__} where a Record belongs",
+                "a question is asked of a Record, whose channels have units and one clock",
+                f"make one: {made.get(type(thing).__name__, made['dict'])}",
+            )
 
 
 def _require_size(channel: Channel, values: Array, question: str) -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -94,7 +93,7 @@ def _restated(record: Record, fs: float | None) -> Record:
     outcome = (
         "the clock was uniform already" if fs is None else f"the rate is {rate:g} Hz, not {record.fs:g} Hz, as stated"
     )
-    return record.with_samples(record.samples, Step("repair_clock", {"fs": rate}, outcome), fs=rate)
+    return record.with_samples(record.samples, Step("repair_clock", {"fs": rate}, outcome, "clock"), fs=rate)
 
 
 def _relabelled(record: Record, line: Line, fs: float | None, reason: str) -> Record:
@@ -107,7 +106,9 @@ def _relabelled(record: Record, line: Line, fs: float | None, reason: str) -> Re
         f"{len(record)} samples put on a uniform clock of {quoted}; "
         f"the stamps lay within {late:.3g} ms of each other about it ({reason})"
     )
-    return record.with_samples(record.samples, Step("repair_clock", arguments, outcome), fs=rate, start=line.start)
+    return record.with_samples(
+        record.samples, Step("repair_clock", arguments, outcome, "clock"), fs=rate, start=line.start
+    )
 
 
 def _trusted(record: Record, stamps: Array) -> tuple[str, str]:
@@ -178,7 +179,7 @@ def fill_gaps(record: Record, *, fs: float | None = None, longest: float | None 
     (500, 100.0)
     """
     if record.stamps is None:
-        step = Step("fill_gaps", {"fs": record.fs, "longest": longest}, "the clock was uniform already")
+        step = Step("fill_gaps", {"fs": record.fs, "longest": longest}, "the clock was uniform already", "gaps")
         return record.with_samples(record.samples, step) if fs is None else resample(record, fs)
     clock = inspect(record.stamps)
     if clock.held or len(clock.backward):
@@ -187,12 +188,10 @@ def fill_gaps(record: Record, *, fs: float | None = None, longest: float | None 
             "gaps are filled by stamps that advance",
             "use repair_clock(record) first",
         )
-    return _from_stamps(record, fs or 1 / clock.step, "gaps filled", longest, "fill_gaps")
+    return _from_stamps(record, fs or 1 / clock.step, "gaps filled", longest, "gaps")
 
 
-def _from_stamps(
-    record: Record, fs: float, reason: str, longest: float | None = None, action: str = "repair_clock"
-) -> Record:
+def _from_stamps(record: Record, fs: float, reason: str, longest: float | None = None, repair: str = "clock") -> Record:
     from scipy.interpolate import Akima1DInterpolator
 
     stamps = record.time
@@ -226,10 +225,10 @@ def _from_stamps(
     dropped = int(np.sum(~keep))
     left += f"; {dropped} samples with repeated or missing stamps dropped" if dropped else ""
     outcome = f"{len(record)} samples interpolated onto {len(grid)} at {fs:.6g} Hz by their stamps ({reason}){left}"
-    arguments: dict[str, Any] = {"fs": fs, "fs_interval": [fs, fs], "trust": "stamps"}
-    if action == "fill_gaps":
-        arguments = {"fs": fs, "longest": limit}
-    return record.with_samples(samples, Step(action, arguments, outcome), fs=fs, start=float(times[0]), filtered=True)
+    step = Step("repair_clock", {"fs": fs, "fs_interval": [fs, fs], "trust": "stamps"}, outcome, "clock")
+    if repair == "gaps":
+        step = Step("fill_gaps", {"fs": fs, "longest": limit}, outcome, "gaps")
+    return record.with_samples(samples, step, fs=fs, start=float(times[0]), filtered=True)
 
 
 def fill_missing(record: Record, *channels: str, longest: int | None = None) -> Record:
@@ -286,7 +285,7 @@ def fill_missing(record: Record, *channels: str, longest: int | None = None) -> 
         parts.append("; ".join([f"{filled} {'value' if filled == 1 else 'values'} of {name} filled{where}", *stay]))
     outcome = "; ".join(parts) or "no value was missing"
     arguments = {"channels": list(names), "longest": longest, "filled": counts}
-    return _mended(record, samples, Step("fill_missing", arguments, outcome))
+    return _mended(record, samples, Step("fill_missing", arguments, outcome, "missing"))
 
 
 def remove_spikes(record: Record, *channels: str) -> Record:
@@ -331,7 +330,7 @@ def remove_spikes(record: Record, *channels: str) -> Record:
                 f"{int(spiked.sum())} samples of {name} replaced, by up to {height:.3g} {unit} ({in_words(runs)})"
             )
     outcome = "; ".join(parts) or "no spike was found"
-    return _mended(record, samples, Step("remove_spikes", {"channels": list(names)}, outcome))
+    return _mended(record, samples, Step("remove_spikes", {"channels": list(names)}, outcome, "spikes"))
 
 
 def restore_clipped(record: Record, channel: str, *, method: str = "rebuild", level: float | None = None) -> Record:
@@ -375,17 +374,21 @@ def restore_clipped(record: Record, channel: str, *, method: str = "rebuild", le
         runs = flaws.runs_of(np.abs(values) >= level)
     arguments = {"channel": channel, "method": method, "level": level}
     if not runs:
-        return record.with_samples(record.samples, Step("restore_clipped", arguments, "no sample was clipped"))
+        return record.with_samples(
+            record.samples, Step("restore_clipped", arguments, "no sample was clipped", "clipping")
+        )
     cut = flaws.rows_of(runs, len(record))
     count = f"{int(cut.sum())} clipped samples of {channel} ({in_words(runs)})"
     if method == "mark":
         marked = {**record.samples, channel: np.where(cut, np.nan, values)}
-        return _mended(record, marked, Step("restore_clipped", arguments, f"{count} marked as NaN"))
+        return _mended(record, marked, Step("restore_clipped", arguments, f"{count} marked as NaN", "clipping"))
     sign = np.sign(values - np.median(values))
     rebuilt = np.where(cut, sign * np.maximum(sign * bridge(values, cut), sign * values), values)
     beyond = float(np.max(np.abs(rebuilt - values)))
     outcome = f"{count} rebuilt by autoregression, by up to {beyond:.3g} {unit}: a guess, not a measurement"
-    return _mended(record, {**record.samples, channel: rebuilt}, Step("restore_clipped", arguments, outcome))
+    return _mended(
+        record, {**record.samples, channel: rebuilt}, Step("restore_clipped", arguments, outcome, "clipping")
+    )
 
 
 def remove_drift(record: Record, channel: str, *, order: int | None = None) -> Record:
@@ -420,7 +423,7 @@ def remove_drift(record: Record, channel: str, *, order: int | None = None) -> R
     if order is not None and not 1 <= order <= 6:
         raise RecordError(f"order = {order}", "a drift is a polynomial of order 1 to 6", "choose a lower order")
     if order is None and flaws.drift(values) == 0:
-        step = Step("remove_drift", {"channel": channel, "order": None}, "no drift was found")
+        step = Step("remove_drift", {"channel": channel, "order": None}, "no drift was found", "drift")
         return record.with_samples(record.samples, step)
     rows, slow = flaws.trend(values)
     order = order or _best_order(rows, slow)
@@ -428,7 +431,7 @@ def remove_drift(record: Record, channel: str, *, order: int | None = None) -> R
     along = fit(np.arange(len(values)))
     drifted = along - along[0]
     outcome = f"a polynomial of order {order} taken off {channel}, {float(np.ptp(drifted)):.3g} {unit} over the record"
-    step = Step("remove_drift", {"channel": channel, "order": order}, outcome)
+    step = Step("remove_drift", {"channel": channel, "order": order}, outcome, "drift")
     return _mended(record, {**record.samples, channel: values - drifted}, step)
 
 

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from stickslip.errors import RecordError
-from stickslip.record.exchange import labelled_arrays
-from stickslip.record.record import Record
+from stickslip.record.metadata import labelled_arrays
+from stickslip.record.record import Record, require_record
 from stickslip.signals.morlet import REACH, normalised_gain, transform
 from stickslip.signals.wavelet_grid import CENTRE, LEAST, QUESTION, Grid, attributes_of, check_centre, grid_of, labelled
 
@@ -95,6 +95,7 @@ def wavelet_map(
     >>> round(float(ridge.idxmax()), 0), round(float(ridge.max()), 3)
     (47.0, 0.3)
     """
+    require_record(record)
     record.require_clean(channel, question=QUESTION, samples=LEAST)
     grid = grid_of(frequencies, voices, wavelet_frequency, normalisation, corrected, record.fs, record.duration)
     if precision not in REACH:

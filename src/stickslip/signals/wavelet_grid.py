@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from stickslip.errors import RecordError
-from stickslip.record.exchange import labelled_arrays
+from stickslip.record.metadata import labelled_arrays
 from stickslip.record.record import Record
 from stickslip.signals.morlet import ridge_centre, transform
 

@@ -17,6 +17,8 @@ from numpy.typing import NDArray
 from stickslip.errors import ModelError
 from stickslip.laws.base import Mode
 from stickslip.laws.curved import CurvedLaw
+from stickslip.oscillator import Oscillator
+from stickslip.solve.bound import stilled
 from stickslip.solve.cells import DEGREE, cells_of, derivatives, derive
 from stickslip.solve.settling import settled
 from stickslip.solve.tables import (
@@ -28,6 +30,8 @@ from stickslip.solve.tables import (
     Tables,
     batch_of,
     by_value,
+    is_curved,
+    laws_of,
     numbered,
     reached,
     systems_of,
@@ -41,15 +45,14 @@ WHOLE = 1e3 * float(np.finfo(np.longdouble).eps)  # a part this close to a whole
 
 def table_of(system: System) -> Tables:
     """The flat tables of one system."""
-    if isinstance(system, Structure):
-        return _built(system)
-    if isinstance(system.law, CurvedLaw):
+    if is_curved(system):
+        curved = [type(law).__name__ for law in laws_of(system) if isinstance(law, CurvedLaw)]
         raise ModelError(
-            f"{type(system.law).__name__} has curved modes",
+            f"{' and '.join(curved)} with curved modes",
             "this question needs a law of linear modes",
             "ask simulate(), or make a polygon of the curve with Tabulated.of()",
         )
-    return _known(system) if by_value(system) else _built(system)
+    return _known(system) if isinstance(system, Oscillator) and by_value(system) else _built(system)
 
 
 def _built(system: System) -> Tables:
@@ -133,7 +136,7 @@ class _Builder:
             [contact.tables[0][number] for contact, number in zip(self.contacts, joint.numbers, strict=True)]
             for joint in self.joints
         ]
-        self.still: dict[tuple[int, ...], Rows] = {}
+        self.still: dict[tuple[tuple[int, float], ...], Rows] = {}
 
     def _name(self) -> None:
         """The entries of the state, and the rows that read them."""
@@ -213,7 +216,7 @@ class _Builder:
             if part.friction is not None:
                 friction[:, c] = (self.forms[c].modes[numbers[c]][:, :1] @ known[c])[:, 0]
                 force -= contact.tangent[:, None] * friction[:, None, c]
-        flow[:, :n], flow[:, n : 2 * n], friction[:, held] = self._moving(force, held)
+        flow[:, :n], flow[:, n : 2 * n], friction[:, held] = self._moving(force, parts, held)
         for c, own in enumerate(known):
             own[:, FRICTION] = friction[:, c]
             own[:, FRICTION_RATE], own[:, LOAD_RATE] = (_through(own[:, k], flow) for k in (FRICTION, 2))
@@ -223,12 +226,13 @@ class _Builder:
             own[:, FRICTION_RATE], own[:, LOAD_RATE] = (_through(own[:, k], flow) for k in (FRICTION, 2))
         return flow, friction, known
 
-    def _moving(self, force: Rows, held: list[int]) -> tuple[Rows, Rows, Rows]:
+    def _moving(self, force: Rows, parts: Sequence[Mode], held: list[int]) -> tuple[Rows, Rows, Rows]:
         """Velocity and acceleration of every mass, and the friction of the contacts that hold."""
         if not held:
             return self.speed, self._accelerated(force), np.zeros((self.count, 0, self.size))
         rows = np.array([self.contacts[c].tangent for c in held], dtype=self.digits)
-        speed, acceleration = self._faces(held, 1), self._faces(held, 2)
+        speed = self._faces(held, 1) + np.outer([parts[c].speed for c in held], self.one)
+        acceleration = self._faces(held, 2)
         if len(held) == self.degrees:  # nothing is free: the contacts take what the masses' forced motion leaves
             spread = rows.T @ _solved(rows @ rows.T, np.eye(len(rows)))
             forced = spread @ acceleration
@@ -265,42 +269,31 @@ class _Builder:
             held = self._held(j, e)
             if held:
                 if held not in self.still:
-                    self.still[held] = self._stilled(list(held))
+                    self.still[held] = self._stilled(dict(held))
                 out[:, e] = self.still[held] if carry is None else self.still[held] @ carry
             elif carry is not None:
                 out[:, e] = carry
 
-    def _held(self, j: int, e: int) -> tuple[int, ...]:
-        """The contacts that have no velocity after an exit."""
+    def _held(self, j: int, e: int) -> tuple[tuple[int, float], ...]:
+        """The contacts whose velocity is told after an exit, and that velocity."""
         joint = self.joints[j]
         c, number = joint.exits[e]
         parts, following = self.parts[j], self.parts[joint.targets[e]]
-        held = {k for k, part in enumerate(following) if part.friction is None}
+        held = {k: part.speed for k, part in enumerate(following) if part.friction is None}
         if self.degrees > 1:  # one mass that is held has the counter-face's motion to the last digit
-            held |= {k for k, part in enumerate(parts) if part.friction is None}
+            held = {k: part.speed for k, part in enumerate(parts) if part.friction is None} | held
         # an exit at zero velocity leaves exactly none: rounding must not decide what follows
         if set(parts[c].exits[number].quantity) == {"v"} and parts[c].kind != "landing":
-            held.add(c)
-        return tuple(sorted(held))
+            held.setdefault(c, 0.0)
+        return tuple(sorted(held.items()))
 
-    def _stilled(self, held: list[int]) -> Rows:
-        """The state with no velocity left under some contacts but for the rounding of its own terms.
-
-        One degree of freedom after the other takes the velocity that the rest leave it, contacts that see the fewest
-        first. No projection: that would mix in the rounding of velocities that a contact does not see, and rounding
-        must not decide what follows.
-        """
-        still = np.tile(self.unit, (self.count, 1, 1))
-        speeds = slice(self.degrees, 2 * self.degrees)
-        for c in sorted(held, key=lambda c: int(np.count_nonzero(self.contacts[c].tangent))):
-            contact = self.contacts[c]
-            left = contact.carried * self.face[1] - contact.tangent @ still[:, speeds]
-            p = self.degrees + int(np.argmax(np.abs(left[0, speeds])))
-            if abs(left[0, p]) > 1e-12 * np.max(np.abs(contact.tangent)):
-                taken = -left / left[:, p, None]
-                taken[:, p] = -1.0
-                still += still[:, :, p, None] * taken[:, None]
-        return still
+    def _stilled(self, held: Mapping[int, float]) -> Rows:
+        """The state with the velocities of some contacts told, none where they hold."""
+        told = {
+            c: (self.contacts[c].tangent, self.contacts[c].carried * self.face[1] + speed * self.one)
+            for c, speed in held.items()
+        }
+        return np.asarray(stilled(np.tile(self.unit, (self.count, 1, 1)), self.degrees, told))
 
     def build(self) -> Tables:
         joints, count, size = self.joints, self.count, self.size

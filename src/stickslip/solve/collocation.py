@@ -34,8 +34,9 @@ class Scheme(NamedTuple):
 
 class Model(NamedTuple):
     """A curved system as the march reads it: code by address (Taylor coefficients with their numbers, rates alone), the
-    leaps' method, what rounds, exits, what may sleep, the drive's tones and period [s], the counter-face's velocity,
-    entries that are no signals, the tolerance of a step and its order."""
+    leaps' method, what rounds, exits, what may sleep, the drive's tones and period [s], the counter-face's velocity
+    and the entry that follows it (-1: none alone), degrees of freedom, entries that are no signals, the tolerance of a
+    step and its order."""
 
     series: int
     numbers: Array
@@ -47,6 +48,8 @@ class Model(NamedTuple):
     tones: Array
     period: float
     face: Array
+    follows: int
+    degrees: int
     physical: int
     tolerance: float
     order: int
@@ -135,12 +138,17 @@ def _slopes(model, mode, i, big, stages):
         value[j] = work[2 * j + 1]
     for j in range(len(every)):
         every[j] = work[2 * j]
-    speed = _faced(model.face, stage)
+    speed = _faced(model.face, stage) if model.follows >= 0 else 0.0
     for j in range(len(stage)):
         moved[j] = stage[j]
     for d in range(physical):
         # friction may follow the logarithm of the velocity against the counter-face
-        step = 1e-7 * abs(stage[1] - speed) + 1e-13 * big[1] if d == 1 else 1e-7 * abs(stage[d]) + 1e-10 * big[d]
+        if d == model.follows:
+            step = 1e-7 * abs(stage[d] - speed) + 1e-13 * big[d]
+        elif model.degrees <= d < 2 * model.degrees:
+            step = 1e-7 * abs(stage[d]) + 1e-13 * big[d]
+        else:
+            step = 1e-7 * abs(stage[d]) + 1e-10 * big[d]
         if step == 0.0:
             step = 1e-14
         moved[d] = stage[d] + step
@@ -251,7 +259,8 @@ def leap(model, mode, unit, state, big, h, poly, work):
         for j in range(model.physical):
             stages.values[i, j] = state[j]
         # the slip of now, however fast the counter-face: friction may follow the logarithm of it
-        stages.values[i, 1] += _faced(model.face, stages.values[i]) - _faced(model.face, state)
+        if model.follows >= 0:
+            stages.values[i, model.follows] += _faced(model.face, stages.values[i]) - _faced(model.face, state)
     change = settle(model, mode, state, h, big, stages)
     if change == math.inf:
         return 0.0

@@ -22,11 +22,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from stickslip.errors import ModelError, SolveError
+from stickslip.oscillator import Oscillator
 from stickslip.solve import collocation, march, taylor
 from stickslip.solve.collocation import Model
 from stickslip.solve.march import LAPS, TIME, TRY, Dense, Shown, Steps, Work
 from stickslip.solve.refusal import Budget, chatter, held_back, named, require_numbers, unproved
 from stickslip.solve.series import expansion
+from stickslip.solve.tables import numbered
 from stickslip.solve.tape import Tape
 from stickslip.solve.taylor import Array
 from stickslip.solve.trajectory import Trajectory
@@ -77,9 +79,13 @@ class CurvedTrajectory(Trajectory):
         """Values at increasing instants; parameters and returns as of :meth:`Trajectory.sample`."""
         times = self.instants(times)
         table: Any = self.table
-        names = [n for name in outputs for n in (table.names[: table.physical] if name == "state" else (name,))]
-        nodes = np.column_stack([table.places[name] for name in names])
-        out, step = np.empty((len(names), len(times))), np.empty(len(times), dtype=np.int64)
+        for name in outputs:
+            if name not in table.places:
+                raise SolveError(
+                    f"no output is called '{name}'", f"there are {', '.join(table.places)}", "name one of them"
+                )
+        nodes = np.concatenate([table.places[name] for name in outputs], axis=1)
+        out, step = np.empty((nodes.shape[1], len(times))), np.empty(len(times), dtype=np.int64)
         count = table.watched.most
         work = np.empty(count * (self.order + 1)), np.empty(self.steps.states.shape[1]), np.empty(count)
         march.sample(_shown(table, self.order), self.steps, times, nodes, out, step, work)
@@ -87,8 +93,9 @@ class CurvedTrajectory(Trajectory):
         return out, piece
 
     def labels(self, name: str) -> tuple[str, ...]:
-        """What the rows of an output are called: its name."""
-        return (name,)
+        """What the rows of an output are called: the name alone where there is one, else name1, name2 ..."""
+        table: Any = self.table
+        return numbered(name, table.places[name].shape[1])
 
 
 def degree(rtol: float) -> int:
@@ -123,6 +130,8 @@ def model_of(table: Tape, rtol: float) -> Model:
         table.tones,
         table.motion.period,
         table.outputs["face_rate"],
+        1 if isinstance(table.system, Oscillator) else -1,
+        table.degrees,
         table.physical,
         SHARE * rtol,
         order,
@@ -174,7 +183,7 @@ class _Run:
         system, size, period, count = table.system, len(table.names), table.motion.period, table.nodes.most
         self.table, self.mode, self.total = table, mode, total
         self.model = model_of(table, rtol)
-        longest = period if math.isfinite(period) else 1 / system.frequency if system.stiffness else total
+        longest = period if math.isfinite(period) else 1 / system.frequency if system.frequency else total
         self.scale = min(longest, total)
         self.events = Budget(table, scale=self.scale, most=budget)
         self.clock = np.array([0.0, 0.0, 1e-6 * self.scale, 0.0, 0.0, march.PATIENCE])
@@ -230,7 +239,7 @@ class _Run:
             raise SolveError(
                 f"a step of no length, {place}",
                 "friction and its rates are finite and smooth within a mode",
-                "check the law there (a logarithm or a power of nothing)",
+                "check the law there (a logarithm or a power of nothing; in series, damping= too small for its slope)",
             )
         long = CHUNK * len(self.kept) >= PATIENCE and passed * STEPS < CHUNK * self.ahead
         if outcome == march.FULL and long:

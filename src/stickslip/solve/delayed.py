@@ -85,6 +85,7 @@ def run_delayed(
     table: Tape, state: Array, mode: int, *, course: tuple[tuple[float, float], Stops], rtol: float, **rest: Any
 ) -> CurvedTrajectory:
     """As :func:`run_curved`, from a state before which the speed was what it is."""
+    assert isinstance(table.system, Oscillator)
     period, law = table.motion.period, table.system.law
     assert isinstance(law, TimeDelay)
     (laps, offset), _ = course

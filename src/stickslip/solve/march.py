@@ -195,11 +195,15 @@ def _write(steps, row, clock, state, mode, ahead, leaving, which):
 
 
 @compiled(**EXACT)
-def _at_speed(model, state, speed):
-    """The state with a speed against the counter-face: with none it stays on it until the contact gives way."""
+def _carry_over(reset, state, before):
+    """The state behind an exit; `before` is scratch."""
     for i in range(len(state)):
-        speed += model.face[i] * state[i]
-    state[1] = speed
+        before[i] = state[i]
+    for i in range(len(state)):
+        total = 0.0
+        for j in range(len(state)):
+            total += reset[i, j] * before[j]
+        state[i] = total
 
 
 @compiled(**EXACT)
@@ -265,12 +269,12 @@ def march(model, clock, state, big, mode, until, steps, work):
                 return CHATTER, written, leapt, mode
         # Leave the mode.
         if leaving >= 0:
-            if not math.isnan(exits.speed[leaving]):
-                _at_speed(model, state, exits.speed[leaving])
-            elif ahead > 0.0:
+            if exits.polished[leaving] and ahead > 0.0:
                 delay = _polish(model, exits.node[leaving], mode, h, state, step)
                 steps.lengths[written - 1] += delay
                 clock[TIME] += delay
+            if exits.carried[leaving]:
+                _carry_over(exits.reset[leaving], state, work.stages.moved)
             mode = exits.target[leaving]
             clock[REACH], clock[STEADY] = 0.0, 0.0
 

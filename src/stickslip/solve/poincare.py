@@ -9,17 +9,17 @@ differences of the second and the fourth order part by more than `TORN`, an exit
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from stickslip.errors import ModelError
-from stickslip.laws.curved import CurvedLaw
 from stickslip.laws.time_delay import TimeDelay
-from stickslip.oscillator import Oscillator
 from stickslip.solve.assembly import table_of
 from stickslip.solve.curved import CurvedTrajectory, run_curved
 from stickslip.solve.glide import Pieces
 from stickslip.solve.simulate import run, stops_of
-from stickslip.solve.tables import Array, System, Tables
+from stickslip.solve.tables import Array, System, Tables, is_curved, laws_of
 from stickslip.solve.tangent import carry_tangents
 from stickslip.solve.tape import Tape, tape
 from stickslip.solve.trajectory import Trajectory
@@ -35,9 +35,9 @@ CLOSED = 1e-12  # an orbit closes when it returns this close, relative to its ow
 
 def tables(system: System) -> Table:
     """The flat tables of a system."""
-    if not (isinstance(system, Oscillator) and isinstance(system.law, CurvedLaw)):
+    if not is_curved(system):
         return table_of(system)
-    if isinstance(system.law, TimeDelay):
+    if any(isinstance(law, TimeDelay) for law in laws_of(system)):
         raise ModelError(
             "the law has a time lag",
             "this question needs a state of a few numbers, and that of a lag is the whole motion since",
@@ -141,10 +141,9 @@ def carried(orbit: Trajectory, after: int, difference: Array) -> Array:
 
 def _differenced(orbit: CurvedTrajectory, direction: Array) -> tuple[Array, Array]:
     """Derivative of an orbit's end along a direction of its start, and by how much the second order differs."""
-    table, mode = orbit.table, int(orbit.modes[0])
-    direction = direction.copy()
-    if table.modes[mode].friction is None:
-        direction[1] = 0.0  # what is held has no velocity of its own
+    table: Any = orbit.table
+    mode, direction = int(orbit.modes[0]), direction.copy()
+    direction[: table.physical] = table.free(mode) @ direction[: table.physical]
     if not np.any(direction):
         return direction, direction
     period = table.motion.period

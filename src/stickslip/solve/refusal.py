@@ -39,7 +39,8 @@ def chatter(modes: Sequence[str], place: str) -> Endless:
     return Endless(
         f"transitions without time between the modes {_listed(modes)}, {place}",
         "a law leaves every state in one direction, or has a mode that holds the mass there",
-        "check the law's exits there; a mode with friction=None holds the mass",
+        "check the law's exits there; a mode with friction=None holds the mass, and two slips that end in each other "
+        "at one velocity, without a reset, are given one",
     )
 
 

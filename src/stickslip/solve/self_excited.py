@@ -39,7 +39,7 @@ def self_excited(system: System, table: Table, start: Mapping[str, float | str],
         raise SolveError("nothing drives the system", "only a driven motion repeats", "give a drive=")
     state, mode = opening(table, start)
     scale = 1 / system.frequency if system.frequency else 1.0
-    if isinstance(table, Tape) and all(mode.friction is not None for mode in table.modes):
+    if isinstance(table, Tape) and table.degrees == 1 and all(mode.friction is not None for mode in table.modes):
         return _between_turns(system, table, state, mode, transient * scale)
     # the way of the belt moves on, so the relative coordinate is compared, not the signals
     duration = transient * scale

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from stickslip.errors import ModelError, SolveError
-from stickslip.laws.curved import CurvedLaw
 from stickslip.laws.time_delay import TimeDelay
 from stickslip.oscillator import Oscillator
 from stickslip.parameters import finite
@@ -23,7 +22,7 @@ from stickslip.solve.glide import Clock, Model, Pieces, blank_past, blank_pieces
 from stickslip.solve.phasors import fast_tables
 from stickslip.solve.refusal import LISTED, Budget, chatter, held_back, named, require_numbers, unproved
 from stickslip.solve.roots import NOISE
-from stickslip.solve.tables import Array, System, Tables
+from stickslip.solve.tables import Array, System, Tables, is_curved
 from stickslip.solve.tape import tape
 from stickslip.solve.trajectory import Trajectory
 
@@ -97,7 +96,7 @@ def simulate(
     """
     if not budget >= 1:
         raise ModelError(f"budget = {budget}", "a period has room for at least one event", "raise budget=")
-    if isinstance(system, Oscillator) and isinstance(system.law, CurvedLaw):
+    if is_curved(system):
         return _simulate_curved(system, (duration, cycles), start or {}, budget, rtol, progress)
     table = table_of(system)
     span = _end(system, table, duration, cycles)
@@ -106,15 +105,18 @@ def simulate(
 
 
 def _simulate_curved(
-    system: Oscillator,
+    system: System,
     time_: tuple[float | None, float | None],
     start: Mapping[str, float | str],
     budget: int,
     rtol: float,
     progress: Callable[[float], object] | None,
 ) -> Trajectory:
-    lags = isinstance(system.law, TimeDelay)
-    table: Any = delayed_tape(system, degree(rtol)) if lags else tape(system)
+    table: Any
+    if lags := isinstance(system, Oscillator) and isinstance(system.law, TimeDelay):
+        table = delayed_tape(system, degree(rtol))
+    else:
+        table = tape(system)
     span = _end(system, table, *time_)
     state, mode = opening(table, start)
     follow, course = run_delayed if lags else run_curved, (span, stops_of(table, *span))

@@ -22,7 +22,8 @@ from numpy.typing import NDArray
 from stickslip.drives.kinds import Drive, Motion
 from stickslip.errors import ModelError
 from stickslip.laws.base import Exit, Law, Mode
-from stickslip.laws.curved import CurvedMode
+from stickslip.laws.curved import CurvedLaw, CurvedMode
+from stickslip.laws.filippov import with_sliding_modes
 from stickslip.oscillator import Oscillator
 from stickslip.solve.cells import Linear
 from stickslip.structure import Structure
@@ -279,6 +280,16 @@ class Systems:
     joint: bool
 
 
+def is_curved(system: System) -> bool:
+    """Whether a contact has a law of curved modes: then Taylor series are marched, not closed forms."""
+    return any(isinstance(law, CurvedLaw) for law in laws_of(system))
+
+
+def laws_of(system: System) -> list[Any]:
+    """The law of each contact."""
+    return [contact.law for contact in system.contacts] if isinstance(system, Structure) else [system.law]
+
+
 def by_value(system: Oscillator) -> bool:
     """Whether an equal system is the same one: law and drive are compared by their values."""
     return all(type(part).__hash__ not in (None, object.__hash__) for part in (system.law, system.drive))
@@ -304,7 +315,7 @@ def oscillators(
 ) -> Systems:
     """Oscillators as systems of one mass: the different laws and drives, which of them each has (B,), its mass,
     stiffness and damping (3, B), and whether its damper is fixed to the base (B,)."""
-    tables = [one.modes() for one in laws]
+    tables = [with_sliding_modes(one.modes()) for one in laws]
     one = np.ones(1)
     contact = Rubbing(laws, tables, law, one)
     mass, stiffness, damping = numbers[:, :, None, None]
@@ -347,7 +358,7 @@ def kind_of_law(law: Any) -> Any:
     """What the laws of systems of one kind have in common; None for a law without linear modes."""
     if hasattr(law, "rates") or not hasattr(law, "modes"):
         return None
-    modes = law.modes()
+    modes = with_sliding_modes(law.modes())
     exits = [tuple((e.to, e.crossing, set(e.quantity) == {"v"}, *e.reset) for e in mode.exits) for mode in modes]
     parts = [(mode.name, mode.kind, mode.side, mode.friction is None) for mode in modes]
     return tuple(parts), tuple(exits), tuple(law.memory), tuple(law.places), law.entry

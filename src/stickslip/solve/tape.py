@@ -4,25 +4,27 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from stickslip.drives.kinds import Motion
 from stickslip.errors import ModelError
-from stickslip.laws.base import Exit
-from stickslip.laws.curved import Creeping, CurvedLaw, CurvedMode, Expression
+from stickslip.laws.base import Exit, Mode
+from stickslip.laws.curved import Creeping, CurvedMode, Expression
+from stickslip.laws.filippov import with_sliding_modes
 from stickslip.oscillator import Oscillator
 from stickslip.solve import taylor
+from stickslip.solve.bound import Bound, Form, combined, stilled
 from stickslip.solve.series import Nodes
-from stickslip.solve.tables import by_value, mode_number
+from stickslip.solve.tables import JointMode, System, by_value, mode_number, numbered, reached
 from stickslip.solve.taylor import Array, Exits, Guards, Sums
+from stickslip.structure import Contact, Structure
 
-Form = tuple[dict[int, float], float]  # weights of nodes, and a constant
 Scaled = tuple[int, float]  # a node and a factor
 
 DTYPES = (np.int64, np.float64)
@@ -35,7 +37,7 @@ class Tape:
 
     Attributes
     ----------
-    system : Oscillator
+    system : Oscillator or Structure
         The system.
     names : tuple of str
         What each entry of the state is.
@@ -44,7 +46,9 @@ class Tape:
     motion : Motion
         The drive.
     physical : int
-        Number of leading entries that belong to the oscillator and its law.
+        Number of leading entries that belong to the masses and the laws.
+    degrees : int
+        Degrees of freedom.
     entry : tuple of int
         Modes in which motion starts with negative, zero and positive relative velocity.
     opening : ndarray (physical, N)
@@ -65,15 +69,16 @@ class Tape:
         How each mode may end.
     guards : Guards
         Functions that fall asleep.
-    places : mapping of str to ndarray (M,)
-        Node of each output in each mode of `watched`.
+    places : mapping of str to ndarray (M, R)
+        Nodes of each output in each mode of `watched`.
     """
 
-    system: Oscillator
+    system: System
     names: tuple[str, ...]
     modes: tuple[CurvedMode, ...]
     motion: Motion
     physical: int
+    degrees: int
     entry: tuple[int, int, int]
     opening: Array
     tones: Array
@@ -90,8 +95,8 @@ class Tape:
     def shown(self) -> tuple[tuple[int, ...], ...]:
         """Nodes of each mode that outputs have."""
         size = len(self.names)
-        columns = np.array(list(self.places.values())).T
-        return tuple(tuple(sorted({*row[row >= size].tolist()})) for row in columns)
+        rows = np.concatenate(list(self.places.values()), axis=1)
+        return tuple(tuple(sorted({*row[row >= size].tolist()})) for row in rows)
 
     @property
     def settling(self) -> frozenset[int]:
@@ -107,6 +112,18 @@ class Tape:
     def target(self) -> NDArray[np.int64]:
         """The mode behind each exit."""
         return self.exits.target
+
+    def free(self, mode: int) -> Array:
+        """What a small difference of the physical state may be in a mode: what is held has no velocity of its own."""
+        free, n = np.eye(self.physical), self.degrees
+        own: Any = self.modes[mode]
+        parts = own.parts if isinstance(own, JointMode) else (own,)
+        contacts = self.system.contacts if isinstance(self.system, Structure) else ()
+        tangents = [c.tangent for c in contacts] if contacts else [np.ones(1)]
+        held = np.array([row for row, part in zip(tangents, parts, strict=True) if part.friction is None])
+        if len(held):
+            free[n : 2 * n, n : 2 * n] -= np.linalg.pinv(held) @ held
+        return free
 
     def index(self, mode: str) -> int:
         """Number of the mode of that name."""
@@ -162,10 +179,7 @@ class _Operations:
         if kind == "product":
             return self.product(*forms)
         if kind == "quotient":
-            if not forms[1][0]:
-                return combined([(1 / forms[1][1], forms[0])])
-            (over, a), (under, b) = (self.scaled(form) for form in forms)
-            return {self.put(taylor.QUOTIENT, over, under): a / b}, 0.0
+            return self.quotient(*forms)
         if kind == "power":
             return self.power(forms[0], expression.value)
         return self.function(kind, forms[0])
@@ -178,6 +192,13 @@ class _Operations:
         if left == right:
             return {self.put(taylor.SQUARE, left): one * other}, 0.0
         return {self.put(taylor.PRODUCT, min(left, right), max(left, right)): one * other}, 0.0
+
+    def quotient(self, a: Form, b: Form) -> Form:
+        """a / b."""
+        if not b[0]:
+            return combined([(1 / b[1], a)])
+        (over, one), (under, other) = self.scaled(a), self.scaled(b)
+        return {self.put(taylor.QUOTIENT, over, under): one / other}, 0.0
 
     def power(self, base: Form, exponent: float) -> Form:
         """base ** exponent; whole exponents are products."""
@@ -216,74 +237,140 @@ class _Operations:
         return {known: 1.0}, 0.0
 
 
-def combined(terms: Any) -> Form:
-    """A weighted sum of linear forms."""
-    weights: dict[int, float] = {}
-    constant = 0.0
-    for factor, (part, value) in terms:
-        constant += factor * value
-        for node, weight in part.items():
-            weights[node] = weights.get(node, 0.0) + factor * weight
-    return {node: weight for node, weight in weights.items() if weight != 0.0}, constant
-
-
-def tape(system: Oscillator) -> Tape:
+def tape(system: System) -> Tape:
     """The flat arrays of a system with a curved law."""
-    return _known(system) if by_value(system) else _built(system)
+    return _known(system) if isinstance(system, Oscillator) and by_value(system) else _built(system)
 
 
-def _built(system: Oscillator) -> Tape:
+def _built(system: System) -> Tape:
     return _Builder(system).build()
 
 
 _known = lru_cache(maxsize=32)(_built)
 
 
-class _Builder:
-    """Turns a law's expressions into nodes; lives for one call of :func:`tape`."""
+class _Made(NamedTuple):
+    """A mode: its nodes for the march, node and factor of each entry's rate, what each contact knows, the rates as
+    linear forms of nodes, and the friction of each contact."""
 
-    def __init__(self, system: Oscillator) -> None:
-        law = system.law
-        assert isinstance(law, CurvedLaw)
-        self.system, self.law, self.motion, self.entry = system, law, system.drive.motion(), law.entry
-        self.memory = tuple(law.memory)
-        self.names = ("x", "v", *self.memory, "1", *self.motion.rates)
-        self.size, self.one = len(self.names), 2 + len(self.memory)
-        motion = self.motion
-        self.base, self.force = self.form(motion.base), self.form(motion.force)
-        self.signal = {self.names.index(name): self.form(rate) for name, rate in motion.rates.items()}
-        face = self.form(motion.face)
-        self.face = [face, self.moved(face), self.moved(self.moved(face))]
-        damper = self.moved(self.base) if system.damper == "base" else ({}, 0.0)
-        self.push = combined([
-            (1.0, self.force), (system.stiffness, self.base), (-system.stiffness, ({0: 1.0}, 0.0)),
-            (-system.damping, ({1: 1.0}, 0.0)), (system.damping, damper),
-        ])  # fmt: skip
-        self.modes, self.least = law.rates(), 0.0
-        if isinstance(law, Creeping):
-            self.least = self.standstill(law)
-            stop = {side: (Exit({"v": -float(side), "1": 0.5 * self.least}, "held"),) for side in (-1, 1)}
-            sliding = (replace(mode, exits=stop[mode.side]) for mode in self.modes)
-            self.modes, self.entry = (*sliding, law.holding(self.least)), (self.entry[0], "held", self.entry[2])
+    moving: _Operations
+    entries: list[Scaled]
+    known: list[dict[str, Form]]
+    rates: dict[int, Form]
+    friction: list[Form]
 
-    def standstill(self, law: Creeping) -> float:
-        """The speed [m/s] that is as good as none: what friction takes from the mass in a part `LEAST` of a period."""
-        system, forward = self.system, law.rates()[-1]
-        assert forward.friction is not None
-        memory = {name: row.get("1", 0.0) for name, row in self.law.memory.items()}
-        period = self.motion.period
-        time = period if math.isfinite(period) else 1 / system.frequency if system.stiffness else 1.0
-        face = sum(abs(weight) for weight in self.face[1][0].values()) + abs(self.face[1][1])
-        return LEAST * (forward.friction.at(x=0.0, v=1.0, **memory) / system.mass * time + face)
 
-    def left(self, mode: CurvedMode, exit_: Exit, to: CurvedMode) -> float:
+class _Contact:
+    """A contact as the tape reads it: its law's modes, its names in the state, what it knows. Lives with a builder."""
+
+    def __init__(self, contact: Contact, memory: range, *, alone: bool) -> None:
+        self.contact, self.law, self.memory, self.alone = contact, contact.law, memory, alone
+        self.tangent = np.asarray(contact.tangent, dtype=np.float64)
+        self.normal = None if contact.normal is None else np.asarray(contact.normal, dtype=np.float64)
+        law: Any = contact.law
+        self.modes: tuple[Any, ...] = with_sliding_modes(law.rates()) if alone else contact.modes()
+        self.entry = contact.entry
+        self.least = 0.0
+        self.symbols: dict[str, Form] = {}
+
+    def creep(self, least: float) -> None:
+        """Go through a mode that holds the mass, up to a speed that is as good as none [m/s]."""
+        self.least = least
+        stop = {side: Exit({"v": -float(side), "always": 0.5 * least}, "held") for side in (-1, 1)}
+        law: Any = self.law
+        back, _, forward = law.entry
+        modes = (*(replace(mode, exits=(stop[mode.side],)) for mode in law.rates()), law.holding(least))
+        self.modes = modes if self.alone else self.contact.closing(modes, (back, "held", forward))
+
+    def left(self, mode: Any, exit_: Exit, to: Any) -> float:
         """The speed [m/s] that an exit leaves against the counter-face; nan where it leaves what there is.
 
         Exactly none where the contact holds, or stops: rounding must not decide what follows.
         """
-        if to.friction is None or set(exit_.quantity) == {"v"}:
-            return 0.0
-        return to.side * self.least if mode.creep is not None else math.nan
+        if to.friction is None or (set(exit_.quantity) == {"v"} and mode.kind != "landing"):
+            return float(to.speed)
+        return to.side * self.least if getattr(mode, "creep", None) is not None else math.nan
+
+
+class _Builder:
+    """Turns laws' expressions into nodes; lives for one call of :func:`tape`."""
+
+    def __init__(self, system: System) -> None:
+        self.system, self.motion = system, system.drive.motion()
+        self.joint = isinstance(system, Structure)
+        whole = system if isinstance(system, Structure) else _alone(system)
+        self.whole, self.degrees = whole, whole.size
+        self.contacts, self.one = self.contacts_of(whole), 0
+        self.one = 2 * whole.size + sum(len(contact.memory) for contact in self.contacts)
+        several = len(self.contacts) > 1
+        memory = (
+            f"{name}{c + 1}" if several else name for c, own in enumerate(self.contacts) for name in own.law.memory
+        )
+        self.names = (*numbered("x", whole.size), *numbered("v", whole.size), *memory, "1", *self.motion.rates)
+        self.size = len(self.names)
+        self.mass = np.asarray(whole.mass, dtype=np.float64)
+        self.inverse: Array = np.asarray(np.linalg.inv(self.mass) if whole.size > 1 else 1 / self.mass)
+        self.drive()
+        for contact in self.contacts:
+            self.know(contact)
+            if isinstance(contact.law, Creeping):
+                contact.creep(self.standstill(contact))
+
+    def contacts_of(self, whole: Structure) -> list[_Contact]:
+        """The contacts, with the places of their memory in the state."""
+        contacts, begin = [], 2 * whole.size
+        for contact in whole.contacts:
+            memory = range(begin, begin + len(contact.law.memory))
+            contacts.append(_Contact(contact, memory, alone=not self.joint))
+            begin += len(contact.law.memory)
+        return contacts
+
+    def drive(self) -> None:
+        """What the drive moves: the counter-face with its rates, and the force of spring, damper and drive."""
+        motion, whole = self.motion, self.whole
+        self.base, self.force = self.form(motion.base), self.form(motion.force)
+        self.signal = {self.names.index(name): self.form(rate) for name, rate in motion.rates.items()}
+        face = self.form(motion.face)
+        self.face = [face, self.moved(face), self.moved(self.moved(face))]
+        damper = self.moved(self.base) if whole.damper == "base" else ({}, 0.0)
+        share, n = np.asarray(whole.acts_on, dtype=np.float64), self.degrees
+        stiffness, damping = (np.asarray(part, dtype=np.float64) for part in (whole.stiffness, whole.damping))
+        self.push = [
+            combined([
+                (share[i], self.force), (float(stiffness[i] @ share), self.base),
+                *((-stiffness[i, k], ({k: 1.0}, 0.0)) for k in range(n)),
+                *((-damping[i, k], ({n + k: 1.0}, 0.0)) for k in range(n)),
+                (float(damping[i] @ share), damper),
+                *((c.normal[i] * c.contact.preload, ({}, 1.0)) for c in self.contacts if c.normal is not None),
+            ]) for i in range(n)
+        ]  # fmt: skip
+
+    def know(self, contact: _Contact) -> None:
+        """What a contact's symbols are: x and v relative to the counter-face, the load for 1, places as x is."""
+        carried, tangent, n = contact.contact.carried, contact.tangent, self.degrees
+        place, speed = (combined((tangent[i], ({shift + i: 1.0}, 0.0)) for i in range(n)) for shift in (0, n))
+        face = [combined([(carried, part)]) for part in self.face]
+        known = {"x": combined([(1.0, place), (-1.0, face[0])]), "v": combined([(1.0, speed), (-1.0, face[1])])}
+        load: Form = ({}, contact.contact.preload)
+        if contact.normal is not None:
+            press = contact.contact.stiffness * contact.normal
+            load = combined([(1.0, load), *((press[i], ({i: 1.0}, 0.0)) for i in range(n))])
+        known |= {"1": load, "always": ({}, 1.0), "face_acceleration": face[2]}
+        for name, j in zip(contact.law.memory, contact.memory, strict=True):
+            own: Form = ({j: 1.0}, 0.0)
+            known[name] = combined([(1.0, own), (-1.0, face[0])]) if name in contact.law.places else own
+        contact.symbols = known
+
+    def standstill(self, contact: _Contact) -> float:
+        """The speed [m/s] that is as good as none: what friction takes from the mass in a part `LEAST` of a period."""
+        law: Any = contact.law
+        forward = law.rates()[-1]
+        memory = {name: row.get("1", 0.0) for name, row in law.memory.items()}
+        period, frequency = self.motion.period, self.system.frequency
+        time = period if math.isfinite(period) else 1 / frequency if frequency else 1.0
+        face = sum(abs(weight) for weight in self.face[1][0].values()) + abs(self.face[1][1])
+        lightness = float(contact.tangent @ self.inverse @ contact.tangent) * abs(contact.contact.preload)
+        return float(LEAST * (forward.friction.at(x=0.0, v=1.0, **memory) * lightness * time + face))
 
     def form(self, row: Mapping[str, float]) -> Form:
         """A drive's linear form over the state."""
@@ -294,13 +381,6 @@ class _Builder:
         """The rate of a form of the drive's signals."""
         return combined((weight, self.signal[node]) for node, weight in form[0].items())
 
-    def symbols(self) -> dict[str, Form]:
-        """What a law's symbols are: x and v relative to the counter-face."""
-        own = {name: ({j: 1.0}, 0.0) for j, name in enumerate(self.names[: self.one])}
-        own["x"] = combined([(1.0, own["x"]), (-1.0, self.face[0])])
-        own["v"] = combined([(1.0, own["v"]), (-1.0, self.face[1])])
-        return {**own, "1": ({}, 1.0)}
-
     def row(self, form: Form) -> Array:
         """A linear form of the state as an array."""
         row = np.zeros(self.size)
@@ -308,83 +388,242 @@ class _Builder:
         row[self.one] += form[1]
         return row
 
-    def mode(self, mode: CurvedMode) -> tuple[_Operations, _Operations, list[Scaled], list[Scaled], dict[str, int]]:
+    def told(self, contact: _Contact, row: Mapping[str, float], known: Mapping[str, Form]) -> Form:
+        """A law's linear form over what its contact knows."""
+        for name in row:
+            if name not in known:
+                raise ModelError(
+                    f"{type(contact.law).__name__}, which follows '{name}', in one system with a curved law",
+                    f"beside curved laws a contact knows {', '.join(known)}",
+                    "use SmoothStateVariable for StateVariable, or a contact without mass",
+                )
+        return combined((value, known[name]) for name, value in row.items())
+
+    def slides(self, contact: _Contact, part: Any, moving: _Operations) -> Form:
+        """Friction of a contact that slides: a curved law's is a coefficient of the load."""
+        if isinstance(part, Mode):
+            return self.told(contact, part.friction or {}, contact.symbols)
+        moving.symbols = contact.symbols
+        return moving.product(moving.form(part.friction), contact.symbols["1"])
+
+    def mode(self, parts: Sequence[Any]) -> _Made:
         """Nodes for the march and with outputs, rates of the entries, nodes of the exits and of the outputs."""
-        symbols = self.symbols()
-        moving = _Operations(self.size, symbols)
-        if mode.friction is None:
-            friction = combined([(1.0, self.push), (-self.system.mass, self.face[2])])
-            symbols["f"] = friction
-            symbols["v"] = moving.form(mode.creep) if mode.creep is not None else symbols["v"]
-            creep: Form = symbols["v"] if mode.creep is not None else ({}, 0.0)
-            rates = {0: combined([(1.0, self.face[1]), (1.0, creep)]), 1: self.face[2]}
-        else:
-            friction = moving.form(mode.friction)
-            rates = {0: ({1: 1.0}, 0.0), 1: combined([(1.0, self.push), (-1.0, friction)])}
-            rates[1] = combined([(1 / self.system.mass, rates[1])])
-        for j, name in enumerate(self.memory):
-            rates[2 + j] = moving.form(mode.rates[name]) if name in mode.rates else ({}, 0.0)
-        rates |= self.signal
+        moving, n = _Operations(self.size, {}), self.degrees
         still: Form = ({}, 0.0)
+        landing = any(part.kind == "landing" for part in parts)  # no time passes: a contact has yet to find its mode
+        friction: list[Form] = [still for _ in parts]
+        force = list(self.push)
+        for c, (part, contact) in enumerate(zip(parts, self.contacts, strict=True)):
+            if part.friction is not None:
+                friction[c] = self.slides(contact, part, moving)
+            load: Form = contact.symbols["1"] if part.kind != "flight" else still
+            pressed = contact.normal if contact.normal is not None else np.zeros(n)
+            force = [
+                combined([(1.0, force[i]), (-contact.tangent[i], friction[c]), (-pressed[i], load)]) for i in range(n)
+            ]
+        held = [c for c, part in enumerate(parts) if part.friction is None]
+        bound = self.bound(held)
+        for c, form in zip(held, bound.friction(force, [self.faced(c, 2) for c in held]), strict=True):
+            friction[c] = form
+        known = [self.knows(c, part, friction[c], moving) for c, part in enumerate(parts)]
+        speeds = [
+            combined([(1.0, self.faced(c, 1)), (1.0, ({}, parts[c].speed))]
+                     + [(1.0, known[c]["v"])] * (getattr(parts[c], "creep", None) is not None))
+            for c in held
+        ]  # fmt: skip
+        rates = dict(enumerate(bound.speed(speeds)))
+        rates |= {n + i: form for i, form in enumerate(bound.acceleration(force, [self.faced(c, 2) for c in held]))}
+        for c, (part, contact) in enumerate(zip(parts, self.contacts, strict=True)):
+            speeding = [(contact.tangent[i], rates[n + i]) for i in range(n)]
+            known[c]["a"] = combined([*speeding, (-1.0, self.faced(c, 2))])
+            rates |= self.remembered(contact, part, known[c], moving)
+        rates |= self.signal
+        if landing:
+            rates = {}
         entries = [moving.scaled(rates[j]) if rates.get(j, still) != still else (-1, 0.0) for j in range(self.size)]
-        known = {**symbols, "f": friction} | {name: moving.form(level) for name, level in mode.levels.items()}
-        exits = [
-            moving.scaled(combined((value, known[name]) for name, value in exit_.quantity.items()))
-            for exit_ in mode.exits
-        ]
-        watched = _Operations(self.size, symbols)
-        watched.rows, watched.known = list(moving.rows), dict(moving.known)
-        outputs = {
-            "a": rates[1], "friction": friction, "z": self.base, "slip": symbols["v"], "force": self.force,
-            **{name: ({j: 1.0}, 0.0) for j, name in enumerate(self.names)},
-            **({"v": rates[0]} if mode.creep is not None else {}),
+        return _Made(moving, entries, known, rates, friction)
+
+    def faced(self, c: int, order: int) -> Form:
+        """The counter-face's motion under a contact."""
+        return combined([(self.contacts[c].contact.carried, self.face[order])])
+
+    def bound(self, held: Sequence[int]) -> Bound:
+        """How the masses move that some contacts hold."""
+        return Bound(
+            self.mass, self.inverse, np.array([self.contacts[c].tangent for c in held]).reshape(-1, self.degrees)
+        )
+
+    def knows(self, c: int, part: Any, friction: Form, moving: _Operations) -> dict[str, Form]:
+        """What the exits and the memory of a contact may speak of in a mode."""
+        contact = self.contacts[c]
+        known = {**contact.symbols, "f": friction}
+        if isinstance(part, Mode):
+            return known
+        load = contact.symbols["1"]
+        share = friction if load == ({}, 1.0) else moving.quotient(friction, load)
+        moving.symbols = {**contact.symbols, "f": share}
+        if part.creep is not None:
+            known["v"] = moving.symbols["v"] = moving.form(part.creep)
+        return known | {name: moving.product(moving.form(level), load) for name, level in part.levels.items()}
+
+    def remembered(
+        self, contact: _Contact, part: Any, known: Mapping[str, Form], moving: _Operations
+    ) -> dict[int, Form]:
+        """The rates of a contact's memory in a mode."""
+        rates: dict[int, Form] = {}
+        load = contact.symbols["1"]
+        for name, j in zip(contact.law.memory, contact.memory, strict=True):
+            rate: Form = ({}, 0.0)
+            if name in part.rates and isinstance(part, Mode):
+                rate = self.told(contact, part.rates[name], known)
+            elif name in part.rates:
+                share = (
+                    known["f"]
+                    if load == ({}, 1.0) or "f" not in part.rates[name].symbols
+                    else moving.quotient(known["f"], load)
+                )
+                moving.symbols = {**known, "f": share}
+                rate = moving.form(part.rates[name])
+            if name in contact.law.places:
+                rate = combined([(1.0, rate), (contact.contact.carried, self.face[1])])
+            rates[j] = rate
+        return rates
+
+    def shown(self, made: _Made, parts: Sequence[Any]) -> tuple[_Operations, dict[str, list[int]]]:
+        """Nodes with those of all outputs, and which these are."""
+        watched, n = _Operations(self.size, {}), self.degrees
+        watched.rows, watched.known = list(made.moving.rows), dict(made.moving.known)
+        still: Form = ({}, 0.0)
+        creeps = any(getattr(part, "creep", None) is not None for part in parts)
+        entry: list[Form] = [({j: 1.0}, 0.0) for j in range(self.size)]
+        speeds = [made.rates.get(i, still) for i in range(n)] if creeps else entry[n : 2 * n]
+        outputs: dict[str, list[Form]] = {
+            "x": entry[:n], "v": speeds, "a": [made.rates.get(n + i, still) for i in range(n)],
+            "state": [*entry[:n], *speeds, *entry[2 * n : self.one]],
+            "friction": made.friction, "slip": [known["v"] for known in made.known],
+            "load": [
+                still if part.kind == "flight" else known["1"] for part, known in zip(parts, made.known, strict=True)
+            ],
+            "z": [self.base], "force": [self.force], "face": [self.face[0]], "face_rate": [self.face[1]],
         }  # fmt: skip
-        return moving, watched, entries, exits, {name: watched.node(form) for name, form in outputs.items()}
+        outputs |= {name: [entry[j]] for j, name in enumerate(self.names) if name not in outputs}
+        return watched, {name: [watched.node(form) for form in forms] for name, forms in outputs.items()}
 
     def build(self) -> Tape:
-        order = {mode.name: j for j, mode in enumerate(self.modes)}
-        parts = [self.mode(mode) for mode in self.modes]
-        rate = tuple(np.array([[r[c] for r in part[2]] for part in parts], dtype=d) for c, d in enumerate(DTYPES))
-        leaving = [(mode, exit_) for mode in self.modes for exit_ in mode.exits]
-        exits = Exits(
-            node=np.array([node for part in parts for node, _ in part[3]], dtype=np.int64),
-            factor=np.array([factor for part in parts for _, factor in part[3]], dtype=np.float64),
-            target=np.array([order[e.to] for _, e in leaving], dtype=np.int64),
-            crossing=np.array([e.crossing for _, e in leaving], dtype=np.bool_),
-            speed=np.array([self.left(mode, exit_, self.modes[order[exit_.to]]) for mode, exit_ in leaving]),
-            first=np.cumsum([0, *(len(mode.exits) for mode in self.modes)]),
-        )
-        nodes = Nodes(*_flat([part[0] for part in parts]), *rate)
-        guards = _guards([part[0] for part in parts])
-        sums = _sums([part[0] for part in parts], [part[2] for part in parts], [part[3] for part in parts])
+        seeds = [tuple([contact.entry for contact in self.contacts])]
+        if not self.joint:
+            (contact,) = self.contacts
+            seeds = [(mode.name,) for mode in contact.modes]
+        joints = reached([contact.modes for contact in self.contacts], seeds)
+        parts = [[c.modes[number] for c, number in zip(self.contacts, joint.numbers, strict=True)] for joint in joints]
+        made = [self.mode(own) for own in parts]
+        leaving = [(j, c, parts[j][c].exits[e]) for j, joint in enumerate(joints) for c, e in joint.exits]
+        quantities = [
+            [
+                one.moving.scaled(self.told(self.contacts[c], exit_.quantity, one.known[c]))
+                for i, c, exit_ in leaving if i == j
+            ]
+            for j, one in enumerate(made)
+        ]  # fmt: skip
+        shown = [self.shown(one, own) for one, own in zip(made, parts, strict=True)]
+        rate = tuple(np.array([[r[c] for r in one.entries] for one in made], dtype=d) for c, d in enumerate(DTYPES))
+        exits = self.exits(joints, parts, leaving, quantities)
+        operations = [one.moving for one in made]
+        guards, sums = _guards(operations), _sums(operations, [one.entries for one in made], quantities)
+        modes: tuple[Any, ...] = tuple(own[0] for own in parts) if not self.joint else tuple(
+            JointMode.of(tuple(own), [(own[c].exits[e], c) for c, e in joint.exits])
+            for own, joint in zip(parts, joints, strict=True)
+        )  # fmt: skip
         tones = [(self.names.index(c), self.names.index(s), w, phase) for c, s, w, phase in self.motion.tones]
+        slip = np.array([self.row(contact.symbols["v"]) for contact in self.contacts])
         return Tape(
             system=self.system,
             names=self.names,
-            modes=self.modes,
+            modes=modes,
             motion=self.motion,
             physical=self.one,
-            entry=(order[self.entry[0]], order[self.entry[1]], order[self.entry[2]]),
-            opening=np.array(
-                [
-                    np.zeros(self.size),
-                    self.row(self.face[1]),
-                    *(
-                        self.row(combined((value, self.symbols()[name]) for name, value in row.items()))
-                        for row in self.law.memory.values()
-                    ),
-                ]
-            ),
+            degrees=self.degrees,
+            entry=self.entry(modes),
+            opening=self.opening(),
             tones=np.array(tones, dtype=np.float64).reshape(len(tones), 4),
-            outputs={"face_rate": self.row(self.face[1]), "slip": self.row(self.symbols()["v"])},
-            nodes=nodes,
+            outputs={"face_rate": self.row(self.face[1]), "slip": slip if self.joint else slip[0]},
+            nodes=Nodes(*_flat(operations), *rate),
             kept=_kept(self.size, sums, exits, guards),
             sums=sums,
-            watched=Nodes(*_flat([part[1] for part in parts]), *rate),
+            watched=Nodes(*_flat([watched for watched, _ in shown]), *rate),
             exits=exits,
             guards=guards,
-            places={name: np.array([part[4][name] for part in parts], dtype=np.int64) for name in parts[0][4]},
+            places={name: np.array([own[name] for _, own in shown], dtype=np.int64) for name in shown[0][1]},
         )
+
+    def entry(self, modes: Sequence[Any]) -> tuple[int, int, int]:
+        """The modes in which motion starts."""
+        if self.joint:
+            return 0, 0, 0
+        (contact,) = self.contacts
+        order = [mode.name for mode in modes]
+        back, still, forward = contact.law.entry
+        still = "held" if contact.least else still
+        return order.index(back), order.index(still), order.index(forward)
+
+    def opening(self) -> Array:
+        """The physical state at the start: no displacement, least velocities without slip, memory as the laws say."""
+        opening, n = np.zeros((self.one, self.size)), self.degrees
+        faces = np.array([self.row(self.faced(c, 1)) for c in range(len(self.contacts))])
+        opening[n : 2 * n] = np.linalg.pinv(np.array([contact.tangent for contact in self.contacts])) @ faces
+        for contact in self.contacts:
+            for name, j in zip(contact.law.memory, contact.memory, strict=True):
+                opening[j] = self.row(self.remade(contact, name, contact.law.memory[name], contact.symbols))
+        return opening
+
+    def remade(self, contact: _Contact, name: str, row: Mapping[str, float], known: Mapping[str, Form]) -> Form:
+        """A new value of a memory: a place moves with the counter-face."""
+        value = combined((value, known["always" if key == "1" else key]) for key, value in row.items())
+        return combined([(1.0, value), (contact.contact.carried * (name in contact.law.places), self.face[0])])
+
+    def exits(self, joints: Any, parts: Any, leaving: Any, quantities: Any) -> Exits:
+        """How each mode may end, and what of the state an end sets anew."""
+        target = [number for joint in joints for number in joint.targets]
+        speeds = [
+            self.contacts[c].left(parts[j][c], exit_, parts[t][c])
+            for (j, c, exit_), t in zip(leaving, target, strict=True)
+        ]
+        reset = np.tile(np.eye(self.size), (len(leaving), 1, 1))
+        for e, ((j, c, exit_), t) in enumerate(zip(leaving, target, strict=True)):
+            contact = self.contacts[c]
+            for name, row in exit_.reset.items():
+                j_ = contact.memory[list(contact.law.memory).index(name)]
+                reset[e, j_] = self.row(self.remade(contact, name, row, contact.symbols))
+            held = {} if math.isnan(speeds[e]) else {c: speeds[e]}
+            if self.degrees > 1:  # one mass that is held has the counter-face's motion to the last digit
+                following = {k: part.speed for k, part in enumerate(parts[t]) if part.friction is None}
+                before = {k: part.speed for k, part in enumerate(parts[j]) if part.friction is None}
+                held = before | following | held
+            reset[e] = self.stilled(held) @ reset[e]
+        return Exits(
+            node=np.array([node for own in quantities for node, _ in own], dtype=np.int64),
+            factor=np.array([factor for own in quantities for _, factor in own], dtype=np.float64),
+            target=np.array(target, dtype=np.int64),
+            crossing=np.array([exit_.crossing for *_, exit_ in leaving], dtype=np.bool_),
+            polished=np.isnan(speeds),
+            carried=np.array([not np.array_equal(one, np.eye(self.size)) for one in reset], dtype=np.bool_),
+            reset=reset,
+            first=np.cumsum([0, *(len(joint.exits) for joint in joints)]),
+        )
+
+    def stilled(self, held: Mapping[int, float]) -> Array:
+        """The state with the velocities of some contacts told, and no more of them left but for rounding."""
+        one = self.row(({}, 1.0))
+        told = {
+            c: (self.contacts[c].tangent, (self.row(self.faced(c, 1)) + speed * one)[None]) for c, speed in held.items()
+        }
+        return np.asarray(stilled(np.eye(self.size)[None], self.degrees, told)[0])
+
+
+def _alone(system: Oscillator) -> Structure:
+    """The structure of one mass and one contact that an oscillator is."""
+    contact = Contact(system.law, [1.0])  # type: ignore[arg-type]
+    return Structure(system.mass, system.damping, system.stiffness, [contact], system.drive, damper=system.damper)
 
 
 def _flat(modes: list[_Operations]) -> tuple[NDArray[Any], ...]:

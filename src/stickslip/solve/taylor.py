@@ -61,14 +61,17 @@ class Sums(NamedTuple):
 
 
 class Exits(NamedTuple):
-    """Node of each exit and its factor, the mode behind it, whether it is crossed, the speed against the counter-face
-    that it leaves to the last digit [m/s] (nan: whatever there is); the first exit of each mode."""
+    """Node of each exit and its factor, the mode behind it, whether it is crossed; whether its instant is polished (a
+    release), and whether the state is carried over by a matrix (speeds told to the last digit, memory made anew); the
+    first exit of each mode."""
 
     node: Index
     factor: Array
     target: Index
     crossing: NDArray[np.bool_]
-    speed: Array
+    polished: NDArray[np.bool_]
+    carried: NDArray[np.bool_]
+    reset: Array
     first: Index
 
 

@@ -6,23 +6,29 @@ from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from stickslip.errors import SolveError
+from stickslip.printing import html_table
 from stickslip.record.channels import Channel, described
 from stickslip.record.record import Record, Step
 from stickslip.solve.cells import DEGREE
 from stickslip.solve.kernel import follow, sample
 from stickslip.solve.tables import Array, System, Tables
 
+if TYPE_CHECKING:
+    import pandas as pd
+    import xarray as xr
+
 UNITS = {
     "x": "m", "v": "m/s", "a": "m/s^2", "friction": "N", "z": "m", "force": "N",
     "way": "m", "slip": "m/s", "load": "N",
 }  # fmt: skip
 TURNING = {"x": "angle", "v": "angular velocity", "a": "angular acceleration"}
+A_PERIOD = 200  # samples of a table, where no rate is asked for
 MOST = 1e10  # samples of a record; more fit no desk
 
 
@@ -353,6 +359,30 @@ class Trajectory:
         step = Step("simulate", {"system": repr(self.system), "fs": fs}, f"{len(self.modes)} pieces, {self.status}")
         samples: Mapping[str, Array] = dict(zip(channels, values, strict=True))
         return Record(samples, channels, float(fs), 0.0, (step,), None, {"system": repr(self.system)})
+
+    def to_pandas(self, *, fs: float | None = None) -> pd.DataFrame:
+        """The motion as a DataFrame over time [s], sampled at `fs`; 200 times a period where left out."""
+        return self.record(fs=fs or self._enough).to_pandas()
+
+    def to_xarray(self, *, fs: float | None = None) -> xr.Dataset:
+        """The same as an xarray Dataset."""
+        return self.record(fs=fs or self._enough).to_xarray()
+
+    @property
+    def _enough(self) -> float:
+        """Samples a second that show a period's shape."""
+        period = self.table.motion.period
+        frequency = 1 / period if np.isfinite(period) else self.system.frequency
+        return A_PERIOD * (frequency or 1 / self.duration)
+
+    def _repr_html_(self) -> str:
+        counts = {"events": len(self.events), **self.event_counts()}
+        rows = [
+            ("simulated", f"{self.duration:g} s"),
+            ("ended", self.status),
+            *((k, str(n)) for k, n in counts.items()),
+        ]
+        return html_table(f"Trajectory of {type(self.system).__name__}", ("", ""), rows)
 
     def __repr__(self) -> str:
         return f"Trajectory({self.duration:g} s, {len(self.modes)} pieces, {self.status})"

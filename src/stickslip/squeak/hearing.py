@@ -26,6 +26,7 @@ AROUND = 15  # bins to either side that are its neighbours
 JUMP = 1 / 8  # octaves from frame to frame that a gliding tone makes at most
 DIP = 10.0  # dB: two bursts of one tone have a valley between them
 SHORTEST, LASTS = 10, 100.0  # cycles of a tone, and of one that is told from what is broad about it
+LEANS = 1e-6  # dB a frame
 AUDIBLE = 30.0  # dB below the loudest moment
 ABOVE = 6.0  # dB above the quiet level
 TOGETHER = 0.08  # s: broad bursts nearer are one
@@ -244,7 +245,10 @@ class Hearing:
         found = []
         for first, last in self._one_pitch(line, tonal):
             stretch = median_filter(strength[first : last + 1], STEADY, mode="nearest")
-            padded = np.concatenate([[stretch.min() - DIP], stretch, [stretch.min() - DIP]])
+            unlike = stretch + LEANS * np.arange(
+                len(stretch)
+            )  # of two peaks of one height neither would count as lower
+            padded = np.concatenate([[stretch.min() - DIP], unlike, [stretch.min() - DIP]])
             peaks, _ = find_peaks(padded, prominence=DIP)
             peaks = peaks - 1
             cuts = [int(a + np.argmin(stretch[a:b])) for a, b in itertools.pairwise(peaks)]

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from stickslip.drives.kinds import Belt
 from stickslip.errors import ModelError
 from stickslip.laws.base import Exit
-from stickslip.laws.curved import lifted, symbol
+from stickslip.laws.curved import CurvedMode, lifted, symbol
 from stickslip.oscillator import Oscillator
 from stickslip.parameters import finite
 from stickslip.structure import Contact, Structure
@@ -318,6 +318,13 @@ def _row(part: Any, velocity: float) -> tuple[float, float]:
     """Friction of the slip that lasts at a relative velocity: its share of the load, and its slope."""
     side = 1 if velocity > 0 else -1
     for mode in part.modes() if hasattr(part, "modes") else ():
+        if isinstance(mode, CurvedMode):
+            if (mode.kind, mode.side) != ("slip", side) or mode.friction is None or mode.friction.symbols - {"v"}:
+                continue
+            if getattr(part, "normal", None) is not None:
+                break  # its slope follows the load
+            slope = mode.friction.slope("v").at(v=velocity)
+            return mode.friction.at(v=velocity) - slope * velocity, slope * getattr(part, "preload", 1.0)
         if mode.kind == "slip" and mode.side == side and all(_lasts(exit_, velocity) for exit_ in mode.exits):
             if mode.rates or mode.friction is None or set(mode.friction) - {"1", "v"}:
                 break

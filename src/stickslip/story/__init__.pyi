@@ -5,7 +5,6 @@ from stickslip.story.simulation import require_output as require_output
 from stickslip.story.story import Line as Line
 from stickslip.story.story import Story as Story
 from stickslip.story.story import Table as Table
-from stickslip.story.words import REPAIRS as REPAIRS
 from stickslip.story.words import Caution as Caution
 
 __all__: list[str]

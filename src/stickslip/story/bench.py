@@ -11,8 +11,8 @@ from stickslip.bench.response import ModalFit
 from stickslip.bench.steps import STEPS, BenchStep
 from stickslip.bench.walk import Commissioned
 from stickslip.estimate import Estimate, Result, stands
-from stickslip.plot.bench import plot_calibrations, plot_response
-from stickslip.plot.plate import Plate, plate
+from stickslip.figures.bench import plot_calibrations, plot_response
+from stickslip.figures.plate import Plate, plate
 from stickslip.story.findings import plain
 from stickslip.story.story import Line, Story, Table
 from stickslip.story.words import Caution, interval_of, value_of

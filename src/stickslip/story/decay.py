@@ -17,7 +17,7 @@ from stickslip.decay.decrement import Decrement
 from stickslip.decay.fit_decay import LEFT_OVER
 from stickslip.decay.release import CAUGHT
 from stickslip.estimate import Estimate, kinds
-from stickslip.plot.decay import plates_of, plates_together
+from stickslip.figures.decay import plates_of, plates_together
 from stickslip.story.scope import Scope, of_fit
 from stickslip.story.story import Line, Story, Table, tried
 from stickslip.story.words import WITHIN_DIGIT, cautions, doubts, interval_of, number, value_of

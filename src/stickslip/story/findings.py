@@ -12,6 +12,8 @@ import numpy as np
 
 from stickslip.answers.findings import Comparison, Findings
 from stickslip.estimate import Estimate
+from stickslip.files.write import require_form, write_record
+from stickslip.story.scope import of_findings as scope_of
 from stickslip.story.story import Line, Story, logged
 from stickslip.story.words import leading, number
 
@@ -34,10 +36,16 @@ def _place(estimate: Estimate) -> tuple[bool, int]:
     return not estimate.known, FIRST.index(estimate.name) if estimate.name in FIRST else len(FIRST)
 
 
-def of_findings(findings: Findings) -> Story:
-    """One record."""
+def of_findings(findings: Findings, *, form: str = "") -> Story:
+    """One record; in `form`, where one is named, its folder holds the record too."""
     record = findings.record
     own: Story = _family(findings).of_findings(findings)
+    if form:
+        require_form(form)
+        file = f"record.{form}"
+        own = replace(
+            own, look=lambda: scope_of(findings, file), write=lambda folder: write_record(record, folder / file)
+        )
     load = {} if findings.normal is None else {"normal load": number(findings.normal, 0.0, "N")}
     length = {"sampling rate": f"{record.fs:g} Hz", "length": f"{len(record)} samples, {record.duration:g} s"}
     return replace(

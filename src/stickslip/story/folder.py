@@ -11,7 +11,7 @@ from typing import Any
 
 from stickslip import __version__
 from stickslip.errors import ModelError, RecordError
-from stickslip.plot.plate import Plate
+from stickslip.figures.plate import Plate
 from stickslip.printing import printable
 from stickslip.squeak.spectra import Clip
 from stickslip.story.page import render, sections

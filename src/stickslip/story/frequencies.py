@@ -10,7 +10,7 @@ import numpy as np
 from stickslip.answers.frequencies import TimeFrequency
 from stickslip.contact.mechanisms import UNTOLD
 from stickslip.cycle.slips import SlipRinging
-from stickslip.plot.wavelet import plates_of
+from stickslip.figures.wavelet import plates_of
 from stickslip.story.story import Line, Story
 from stickslip.story.words import doubts, interval_of, leading, number, sentence, value_of
 

@@ -11,7 +11,7 @@ from stickslip.balance.balance import Pull
 from stickslip.cycle.before_slip import Presliding
 from stickslip.cycle.onset import Breakaway
 from stickslip.estimate import Estimate, stands
-from stickslip.plot.friction import plates_of, plates_together
+from stickslip.figures.friction import plates_of, plates_together
 from stickslip.record.record import RIG_UNITS
 from stickslip.story import scope
 from stickslip.story.story import Line, Story

@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from functools import partial
 from typing import Any
 
 import numpy as np
 
-from stickslip.plot.maps import plates_of
-from stickslip.plot.plate import Plate
+from stickslip.figures.bifurcation import plot_basins, plot_bifurcation, plot_boundary, plot_dither
+from stickslip.figures.maps import plates_of
+from stickslip.figures.plate import Plate, plate
+from stickslip.maps.basins import Basins
+from stickslip.maps.bifurcation import Bifurcation
+from stickslip.maps.boundaries import Boundary
+from stickslip.maps.dither import Dither
 from stickslip.solve.tables import System
 from stickslip.story.story import Story, Table
 
@@ -90,3 +96,45 @@ def _settings(attributes: Mapping[str, Any]) -> dict[str, str]:
         return ", ".join(map(str, value)) if isinstance(value, list | tuple) else str(value)
 
     return {key: text(value) for key, value in attributes.items()}
+
+
+# ---- along a parameter, over starts, between regimes and under dither: a figure each
+
+
+def of_bifurcation(found: Bifurcation) -> Story:
+    """Attractors along a parameter."""
+    return _story(
+        "Motion along a parameter", "bifurcation", partial(plot_bifurcation, found),
+        "Where the mass is once in each period of the drive: blue followed upwards, orange downwards; lines mark "
+        "where the kind of motion changes. Below, the largest multiplier: at 1 the motion ceases to attract.",
+    )  # fmt: skip
+
+
+def of_basins(found: Basins) -> Story:
+    """Attractors over starts."""
+    return _story(
+        "Which start leads where", "basins", partial(plot_basins, found),
+        "Each start in the colour of the motion it leads to; crosses: where that motion is at phase zero.",
+    )  # fmt: skip
+
+
+def of_boundary(found: Boundary) -> Story:
+    """Where the kind of motion changes."""
+    return _story(
+        "Where the kind of motion changes", "boundary", partial(plot_boundary, found),
+        "Points: found by bisection of exact runs. Line: the closed form.",
+    )  # fmt: skip
+
+
+def of_dither(found: Dither) -> Story:
+    """What dither leaves of the sticks and of the friction."""
+    return _story(
+        "What dither does", "dither", partial(plot_dither, found),
+        "Top: the longest stick left; below the line none outlasts a period of the dither. Bottom: the friction "
+        "left on average, and what the averaged law says; where they part, friction moves the mass in a period, "
+        "or the contact gives way.",
+    )  # fmt: skip
+
+
+def _story(title: str, name: str, draw: Callable[[], Any], caption: str) -> Story:
+    return Story(title, draw=lambda: [plate(name, draw, title, caption)])

@@ -11,9 +11,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from stickslip import __version__
+from stickslip.figures import style
+from stickslip.figures.plate import Plate
 from stickslip.files.write import whole
-from stickslip.plot import style
-from stickslip.plot.plate import Plate
 from stickslip.printing import printable
 from stickslip.squeak.spectra import Clip
 from stickslip.story.scope import Scope

@@ -7,9 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from stickslip.answers.predictions import Prediction, Predictions
+from stickslip.answers.fits import Prediction, Predictions
 from stickslip.estimate import UNKNOWN
-from stickslip.plot.law import law_plates
+from stickslip.figures.law import law_plates
 from stickslip.story.scope import Panel, Scope, command_of
 from stickslip.story.story import Story, Table
 from stickslip.story.words import doubts, interval_of, leading, number, value_of

@@ -8,9 +8,9 @@ from pathlib import Path
 
 from stickslip.answers.experiment import ExperimentPlan
 from stickslip.answers.findings import record_name
+from stickslip.figures.experiment import plot_plan
+from stickslip.figures.plate import plate
 from stickslip.files.write import require_form, write_record
-from stickslip.plot.experiment import plot_plan
-from stickslip.plot.plate import plate
 from stickslip.record.record import Record
 from stickslip.story.story import Story, Table, logged
 

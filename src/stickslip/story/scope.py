@@ -14,24 +14,24 @@ from stickslip.answers.findings import Findings
 from stickslip.balance.motion import is_measured
 from stickslip.consistent.checks import Slip
 from stickslip.errors import StickslipError
+from stickslip.figures.contact import across
+from stickslip.figures.style import Array, envelope, prefixed, spelled
 from stickslip.files.expression import split_spec, times
-from stickslip.plot.contact import across
-from stickslip.plot.style import Array, envelope, prefixed, spelled
 from stickslip.printing import printable
 from stickslip.record.record import RIG_UNITS, Record
 from stickslip.rig.rig import Rig
 from stickslip.rig.sensor import Digitiser, Noise, Sensor
 from stickslip.statistics import follows
-from stickslip.story.words import REPAIRS
 from stickslip.twin.belief import Belief
 
-DETAILED = 12_000  # samples that the page holds one by one; of the others the least and the most of each column
+DETAILED = 270_000  # values that the page holds one by one, of all lines; else the least and the most of each column
 COLUMNS = 1_500
 LEVELS = 65_534  # of a value, in two bytes; one more is a gap
 MOST_PANELS = 4
 PANELS = ("x", "theta", "v", "a", "load", "force", "friction", "normal", "sound")
 EXPLAINED = "inertia, viscous and dry friction"  # the model of a regression
 BESIDE = {"x": "z"}  # drawn in the same panel
+HERE = "{here}"  # before the name of a file that lies beside the page, which knows its folder
 ROWS = "--rows {first}:{last}"  # of a command, with the rows left open
 READING = ("channels", "units", "fs", "time", "delimiter", "decimal")  # options that read_record has too
 
@@ -101,9 +101,11 @@ class Scope:
     def packed(self) -> dict[str, Any]:
         """For the page: the whole as envelopes, and of a long record its middle in detail."""
         count = len(self.panels[0].lines["measured"])
+        lines = sum(len(panel.lines) for panel in (*self.panels, *([self.across] if self.across else [])))
+        most = DETAILED // lines
         middle = count // 2 if self.view is None else round((sum(self.view) / 2 - self.start) * self.fs)
-        first = max(0, min(middle - DETAILED // 2, count - DETAILED))
-        detail = slice(first, min(count, first + DETAILED))
+        first = max(0, min(middle - most // 2, count - most))
+        detail = slice(first, min(count, first + most))
         cycles = [round(float(cycle), 6) for cycle in self.cycles if self._within(cycle, detail)]
         return {
             "start": self.start, "fs": self.fs, "count": count, "detail": [detail.start, detail.stop],
@@ -135,8 +137,8 @@ def _line(values: Array, detail: slice) -> dict[str, Any]:
     return {"low": low, "step": step, "detail": coded(values[detail]), "whole": outline}
 
 
-def of_findings(findings: Findings) -> Scope | None:
-    """A record of friction, with its twin over it where it has one; none of a broken clock."""
+def of_findings(findings: Findings, file: str = "") -> Scope | None:
+    """A record of friction, with its twin over it where it has one; None of a broken clock."""
     record, trial, loops = findings.record, findings.trial, findings.loops
     if record.stamps is not None:
         return None
@@ -148,7 +150,8 @@ def of_findings(findings: Findings) -> Scope | None:
     if loops is not None:
         moved = _moved(findings, twin)
         cycles, period = loops.cycles, 1 / loops.frequency.value
-    command, first = command_of(record, "analyze", *_stated(findings.settings))
+    stated = [*_stated(findings.settings)]
+    command, first = command_of(record, "analyze", *stated) if not file else (_beside(file, stated), 0)
     return Scope(record.start, record.fs, panels, model, moved, cycles, period, command, first)
 
 
@@ -218,11 +221,15 @@ def of_run(record: Record, period: float, view: tuple[float, float], constants: 
         base = record["z"] if constants.get("contact") == "base" and "z" in record else 0.0
         moved = Panel("displacement", record.channels["x"].unit, {"measured": record["x"] - base})
     cycles = np.arange(view[0], min(view[1], record.start + record.duration - period), period)
-    asked = shlex.join(["stickslip", "analyze", file, *_stated(constants)])
+    asked = _beside(file, [*_stated(constants)])
     return Scope(
-        record.start, record.fs, list(_panels(record, None)), "", moved, cycles, period, f"{asked} {ROWS}",
-        view=view,
+        record.start, record.fs, list(_panels(record, None)), "", moved, cycles, period, asked, view=view,
     )  # fmt: skip
+
+
+def _beside(file: str, options: Sequence[str]) -> str:
+    """What asks about rows of a record in a file beside the page."""
+    return f"{shlex.join(['stickslip', 'analyze', HERE + file, *options])} {ROWS}"
 
 
 def command_of(record: Record, question: str, *options: str) -> tuple[str, int]:
@@ -262,14 +269,18 @@ def _asked(
     read = _read(record)
     if not read:
         return []
-    words = ["stickslip", question, "+".join(file["name"] for file in read["files"])]
+    words = [
+        "stickslip",
+        question,
+        "+".join(f"{file['folder']}/{file['name']}" if "folder" in file else file["name"] for file in read["files"]),
+    ]
     for option in READING:
         told = channels if channels and option == "channels" else read.get(option)
         if isinstance(told, Mapping):
             words += [word for name, value in told.items() for word in (f"--{option}", f"{name}={value}")]
         elif told is not None:
             words += [f"--{option}", f"{told:.12g}" if isinstance(told, float) else str(told)]
-    repairs = [REPAIRS[step.action] for step in record.history if step.action in REPAIRS]
+    repairs = [step.repair for step in record.history if step.repair]
     words += ["--repair", ",".join(dict.fromkeys(repairs))] if repairs else []
     return [*words, *options]
 

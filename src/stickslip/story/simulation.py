@@ -13,11 +13,8 @@ import numpy as np
 
 from stickslip import scenarios
 from stickslip.errors import ModelError
-from stickslip.files.write import require_form, write_record
-from stickslip.laws.formula import Formula
-from stickslip.parameters import PARTS
-from stickslip.plot.plate import Plate
-from stickslip.plot.trajectory import (
+from stickslip.figures.plate import Plate
+from stickslip.figures.trajectory import (
     contacts_of,
     cycle_of,
     kinds_of,
@@ -27,7 +24,11 @@ from stickslip.plot.trajectory import (
     plates_of,
     pressed,
     sampled,
+    stretches,
 )  # fmt: skip
+from stickslip.files.write import require_form, write_record
+from stickslip.laws.formula import Formula
+from stickslip.parameters import PARTS
 from stickslip.record.record import RIG_UNITS
 from stickslip.solve.curved import CurvedTrajectory
 from stickslip.solve.energies import energy
@@ -54,6 +55,7 @@ MOST_NAMED = 4  # masses in a sentence
 KINDS = ("slip", "microstick", "stick", "flight")
 TANGENTIAL_NORMAL_TORSIONAL = 3  # displacements of a squeak rig
 LOOKED_CYCLES = 8  # of a run, at first
+COUNTED_CYCLES = 4  # the last ones, over which sticks are counted
 LOOKED = 100_000  # samples of a run that is looked at without a record
 HEARD = 10_000.0  # Hz of a sound whose rate was not asked for
 PEAKS = 4001  # instants looked at for the largest values of the last cycle
@@ -144,7 +146,7 @@ def of_outcome(
         write_record(run.record(fs=rate), folder / f"record.{form}")
         _write_events(run, folder / "events.csv")
         if animation is not None:
-            from stickslip.plot.animation import animate
+            from stickslip.figures.animation import animate
 
             animate(run, folder / f"animation.{animation}", tell=lambda n, of: tell("animating", 3 + n / of))
         if sound:
@@ -281,7 +283,7 @@ def require_output(
 def _require_record(case: Case, fs: float | None, form: str, animation: str | None) -> None:
     require_form(form)
     if animation is not None:
-        from stickslip.plot.animation import require_writer
+        from stickslip.figures.animation import require_writer
 
         require_writer(f".{animation}")
     rate = fs or case.fs
@@ -353,6 +355,7 @@ def _sentences(run: Trajectory, values: Mapping[str, tuple[float, str]]) -> list
         subject = "The mass comes" if len(masses) == 1 else "All masses come"
         found.append(f"{subject} to rest after {after}, at a displacement of {_listed(places)}.")
     else:
+        found += [holding(run)] if len(masses) == contacts_of(run) == 1 else []
         ways = []
         for j, name in enumerate(masses):
             words, _ = _ways(run, j)
@@ -373,6 +376,26 @@ def _sentences(run: Trajectory, values: Mapping[str, tuple[float, str]]) -> list
     elif len(run.modes) == 1 and contacts_of(run):
         found.append("The contact never changes its mode." if contacts_of(run) == 1 else "No contact changes its mode.")
     return found
+
+
+def holding(run: Trajectory) -> str:
+    """How often in a cycle a single contact holds, and for which share of the time, over the last cycles."""
+    cycle = cycle_of(run)
+    cycles = max(1, min(COUNTED_CYCLES, int(run.duration / cycle * (1 + 1e-9))))
+    first, told = run.duration - cycles * cycle, []
+    for kind, verb in (("stick", "sticks"), ("microstick", "holds, giving a little,"), ("flight", "lifts off")):
+        spans = stretches(run, kind, first=first, last=run.duration)
+        if not len(spans):
+            continue
+        begins = spans[1:, 0] - spans[:-1].sum(axis=1) > 1e-9 * cycle  # parts of one stretch follow without a gap
+        cut = spans[0, 0] <= first and spans[-1].sum() >= run.duration * (1 - 1e-12) and begins.any()
+        count = (1 + int(begins.sum()) - bool(cut)) / cycles
+        often = {1.0: "once", 2.0: "twice"}.get(count, f"{count:.2g} times")
+        share = float(spans[:, 1].sum()) / (cycles * cycle)
+        told.append(
+            f"{verb} {often} a cycle, {100 * share:.2g} % of the time" if share < 1 - 1e-9 else f"{verb} throughout"
+        )
+    return f"The mass {_listed(told) if told else 'slides without a stop'}."
 
 
 def _listed(parts: Sequence[str]) -> str:

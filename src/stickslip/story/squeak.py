@@ -9,10 +9,9 @@ from typing import Any
 import numpy as np
 
 from stickslip.answers.findings import Comparison, Findings
-from stickslip.answers.squeak_comparison import Condition
-from stickslip.answers.squeaks import trend_of
+from stickslip.answers.squeaks import Condition, trend_of
 from stickslip.estimate import Estimate, decimals, doubts_of
-from stickslip.plot.squeak import plates_of, plates_together
+from stickslip.figures.squeak import plates_of, plates_together
 from stickslip.squeak.bursts import WORDS, Squeak, Squeaks
 from stickslip.squeak.couplings import Coupling, Pair
 from stickslip.squeak.spectra import burst_clips

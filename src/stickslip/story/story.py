@@ -10,11 +10,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from stickslip.errors import ModelError
+from stickslip.printing import html_table
 from stickslip.story.words import Caution, flags, interval_of, value_of
 
 if TYPE_CHECKING:
     from stickslip.estimate import Estimate
-    from stickslip.plot.plate import Plate
+    from stickslip.figures.plate import Plate
     from stickslip.record.channels import Channel
     from stickslip.record.record import Record, Step
     from stickslip.squeak.spectra import Clip
@@ -257,10 +258,16 @@ class Story:
 
     def drawn(self, *, png: bool = False) -> Story:
         """With the figures that can be drawn, as PNG too where these are asked for, and of the others a note."""
-        from stickslip.plot.plate import drawable
+        from stickslip.figures.plate import drawable
 
         plates, lost = drawable(self.plates, png=png)
         return replace(self, notes=(*self.notes, *lost), draw=lambda: plates)
+
+    def _repr_html_(self) -> str:
+        rows = [(line.name, line.value, line.interval, self.marks(line)) for line in self.leading]
+        notes = [f"{self.mark(each)} {each.reason}".strip() for each in self.shown]
+        title = " ".join([*self.urgent, self.answer]) or self.title
+        return html_table(title, ("quantity", "value", "95 % interval", ""), rows, notes)
 
     @classmethod
     def of_record(cls, title: str, record: Record, **told: Any) -> Story:
@@ -303,42 +310,11 @@ def summary(result: Any, **context: Any) -> Story:
     if place is None:
         raise ModelError(
             f"a {type(result).__name__}",
-            "figures, summary, report and publish tell what analyze, compare, analyze_decay, compare_decays, "
+            "summary, report and publish tell what analyze, compare, analyze_decay, compare_decays, "
             "time_frequency, analyze_squeaks, compare_squeaks, simulate, bifurcation, basins, boundary, dither, "
             "compare_laws, fit_law or fit_curve returned, and estimates",
-            "give what one of these returned, or draw with a plot_ function of the result",
+            "give what one of these returned, or draw it with plot",
         )
     file, name = place.split(".")
     story: Story = getattr(importlib.import_module(f"stickslip.story.{file}"), name)(result, **context)
     return story
-
-
-def figures(result: Any, **context: Any) -> tuple[Plate, ...]:
-    """The figures that show a result, in reading order.
-
-    Parameters
-    ----------
-    result : Findings, Comparison, Trajectory, Bifurcation or any other result
-        As in :func:`summary`.
-    **context
-        As in :func:`summary`.
-
-    Returns
-    -------
-    tuple of Plate
-        Each with ``.figure`` (matplotlib), ``.title``, ``.caption``, ``.svg()`` and ``.png()``.
-
-    Raises
-    ------
-    ModelError
-        A result of a kind that is not told.
-
-    Examples
-    --------
-    >>> import stickslip as ss
-    >>> record = ss.datasets.demo()
-    >>> plates = figures(ss.analyze(record, mass=2.42, stiffness=2310, damping=0.12))
-    >>> [plate.name for plate in plates][:2]
-    ['friction-velocity', 'friction-displacement']
-    """
-    return summary(result, **context).plates

@@ -15,11 +15,6 @@ from stickslip.units import NOTHING, prefixed
 if TYPE_CHECKING:
     from stickslip.answers.findings import Findings
 
-# What a step of a record's history is called where a command asks for it.
-REPAIRS = {
-    "repair_clock": "clock", "fill_gaps": "gaps", "fill_missing": "missing", "remove_spikes": "spikes",
-    "restore_clipped": "clipping", "remove_drift": "drift",
-}  # fmt: skip
 WITHIN_DIGIT = "within its last digit"  # an interval narrower than the digits shown
 FIGURES = 5  # significant figures at most: what is surer than that still reads well
 

@@ -37,7 +37,7 @@ export function written(text, unit) {
 
 export class Controls {
   constructor(root, catalog, changed) {
-    Object.assign(this, { root, catalog, changed });
+    Object.assign(this, { root, catalog, changed, units: new Map() });
   }
   show(state) {
     this.state = state;
@@ -53,8 +53,8 @@ export class Controls {
     const names = several ? Object.keys(state.start ?? {}) : ["x", "v"];
     const numbers = (found) => found.map((name) => ({ name, unit: UNITS[name] ?? UNITS[name[0]] ?? "", words: "", default: 0, optional: true, choices: [] }));
     if (extra.length) this.group("More of the structure", numbers(extra), ["system"], "system");
-    this.group("Start", numbers(names), ["start"], "start");
-    this.group("Run", numbers(["duration" in (state.run ?? {}) ? "duration" : "cycles"]), ["run"], "run");
+    this.group("Start", numbers(names), ["start"], "start", true);
+    this.group("Run", numbers(["duration" in (state.run ?? {}) ? "duration" : "cycles"]), ["run"], "run", true);
   }
   contact(contact, j) {
     const box = this.fieldset(`Contact ${j + 1}`);
@@ -88,8 +88,15 @@ export class Controls {
     this.fill(box, known[part.name].parameters.filter((each) => !each.part), path, path.at(-1) === "drive" ? "drive" : "law");
     for (const inner of ["law", "drive"]) if (typeof part[inner] === "object") this.part(inner === "law" ? "Law within" : "Drive within", `${inner}s`, [...path, inner], box);
   }
-  group(words, parameters, path, kind) {
-    if (parameters.length) this.fill(this.fieldset(words), parameters, path, kind);
+  group(words, parameters, path, kind, folded = false) {
+    if (!parameters.length) return;
+    if (!folded) { this.fill(this.fieldset(words), parameters, path, kind); return; }
+    const box = this.root.appendChild(document.createElement("details"));
+    box.className = "knobs";
+    box.open = this.open?.has(words);
+    box.appendChild(document.createElement("summary")).textContent = words;
+    box.addEventListener("toggle", () => { (this.open ??= new Set())[box.open ? "add" : "delete"](words); });
+    this.fill(box, parameters, path, kind);
   }
   fill(box, parameters, path, kind) {
     for (const each of parameters) {
@@ -128,7 +135,7 @@ export class Controls {
     const [knob, id, words] = this.knob(box, each, path, kind), place = [...path, each.name];
     const text = knob.appendChild(document.createElement("input")), slide = knob.appendChild(document.createElement("input"));
     const unit = spelled(each.unit);
-    Object.assign(text, { id, type: "text", inputMode: "decimal", placeholder: each.optional && value == null ? each.name === "static" ? "= kinetic" : "as it is" : "", value: value == null ? "" : readable(value, each.unit) });
+    Object.assign(text, { id, type: "text", inputMode: "decimal", placeholder: each.optional && value == null ? each.name === "static" ? "= kinetic" : "as it is" : "", value: value == null ? "" : this.spelt(value, each.unit, id) });
     Object.assign(slide, { type: "range", min: 0, max: 1000, step: 1 });
     slide.setAttribute("aria-label", `${words}, slider`);
     const scale = this.scale(each, place, typeof value === "number" ? value : 0);
@@ -137,18 +144,27 @@ export class Controls {
     told(value);
     slide.addEventListener("input", (event) => {
       const now = scale.value(Number(slide.value));
-      text.value = readable(now, each.unit);
+      text.value = this.spelt(now, each.unit, id);
       told(now);
       this.set(place, now, event.timeStamp);
     });
     text.addEventListener("change", (event) => {
       let now;
       try { now = written(text.value, each.unit); } catch (error) { this.fault(place, error.message); return; }
-      if (typeof now === "number") { slide.value = scale.place(now); text.value = readable(now, each.unit); told(now); }
+      const typed = text.value.replace(/^\s*[-+\d.,]+(e[-+]?\d+)?\s*/i, "").trim();
+      if (typed && typed === unit) this.units.set(id, "");
+      else if (typed && typed.slice(1) === unit && LETTERS[typed[0]]) this.units.set(id, typed[0].replace("u", "µ"));
+      if (typeof now === "number") { slide.value = scale.place(now); text.value = this.spelt(now, each.unit, id); told(now); }
       this.set(place, now, event.timeStamp);
     });
     this.followers.set(place.join("."), (now) => { slide.value = scale.place(now); told(now); });
     if (unit && typeof value !== "number") text.title = `in ${unit}`;
+  }
+  // In the unit in which it was typed here, else in a readable one.
+  spelt(value, unit, id) {
+    if (!this.units.has(id)) return readable(value, unit);
+    const letter = this.units.get(id);
+    return `${+(value / (LETTERS[letter] ?? 1)).toPrecision(6)} ${letter}${spelled(unit)}`;
   }
   // Sliders go to values that were typed in units which only the library reads.
   follow(state) {

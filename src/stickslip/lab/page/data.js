@@ -1,5 +1,7 @@
 // The records: files dropped, channels looked at, a question asked, its answer shown.
 
+import { prefixed } from "./canvas.js";
+
 const ROLES = {
   x: "displacement", v: "velocity", a: "acceleration", z: "base displacement", friction: "friction force",
   load: "load cell", force: "applied force", normal: "normal force", coefficient: "coefficient of friction",
@@ -50,6 +52,16 @@ export function start(section, given) {
   dropping(root);
   lab.onTheme(redraw);
   addEventListener("pagehide", leave);
+  lab.sessions.data = { save: () => ({ rig, told, question: parts.question }), load };
+  if (lab.restored?.data) load(lab.restored.data);
+}
+
+// Of a session the files are not kept: what was said of them and of the rig is.
+function load(held) {
+  Object.assign(rig, held.rig);
+  told = { ...nothing(), ...held.told };
+  parts.question = held.question;
+  if (ready().length) guarded(describe);
 }
 
 function welcome() {
@@ -93,7 +105,7 @@ function dropping(place) {
 }
 
 async function add(chosen) {
-  if (!ready().length) told = nothing();
+  if (!ready().length && !lab.restored?.data) told = nothing();
   const { largest } = await lab.ask("files");
   for (const file of chosen) {
     const entry = { name: file.name, size: file.size, sent: 0, id: null, error: "" };
@@ -111,8 +123,6 @@ async function add(chosen) {
     }
     showFiles();
   }
-  const failed = files.filter((entry) => entry.error);
-  if (failed.length) lab.say(`${failed[0].name}: ${failed[0].error}`);
   await guarded(describe);
 }
 
@@ -194,6 +204,7 @@ function records() {
 
 // ---- channels
 
+const rig = {}; // what was typed of the rig: it stays when the question or the record changes
 const nothing = () => ({ columns: null, repair: [], fs: "", time: "", delimiter: "", decimal: "", rows: "" });
 let told = nothing();
 
@@ -235,7 +246,7 @@ function showRecord(record, number) {
       "write it below (what has a known meaning is taken in SI units otherwise)."));
   }
   box.append(make("p", { class: "note" }, "Where a column was not understood, choose under “Is” what it measures."),
-    channelTable(record, number), previews(record));
+    channelTable(record, number), ...(record.fs === null ? [] : [chosen(record)]), previews(record));
   if (record.faults.length) box.append(make("h3", {}, "What the check-up found"), faults(record));
   if (record.notes.length) {
     box.append(make("details", {}, make("summary", {}, "How it was read"),
@@ -259,7 +270,8 @@ function channelTable(record, number) {
     if (!(channel.name in words)) words[channel.name] = `${channel.name} (not used)`;
     const role = select(`data-role-${number}-${column}`, words, channel.name);
     role.setAttribute("aria-label", `What ${column} is`);
-    const unit = make("input", { type: "text", size: "7", value: record.unknown.includes(channel.name) ? "" : channel.unit });
+    const typed = told.columns?.[row]?.unit;
+    const unit = make("input", { type: "text", size: "7", value: typed || (record.unknown.includes(channel.name) ? "" : channel.unit) });
     unit.id = `data-unit-${number}-${column}`;
     unit.setAttribute("aria-label", `Unit of ${column}`);
     if (record.unknown.includes(channel.name)) {
@@ -270,7 +282,7 @@ function channelTable(record, number) {
     role.addEventListener("change", change);
     unit.addEventListener("change", change);
     return make("tr", {}, make("th", { scope: "row" }, column), make("td", {}, role), make("td", {}, unit),
-      make("td", {}, amount(channel.low)), make("td", {}, amount(channel.high)));
+      make("td", {}, amount(channel.low, channel.unit)), make("td", {}, amount(channel.high, channel.unit)));
   });
   return make("div", { class: "data-scroll", tabindex: "0", role: "region", "aria-label": `Channels of ${record.name}` },
     make("table", {}, make("thead", {}, head), make("tbody", {}, ...rows)));
@@ -295,10 +307,26 @@ function previews(record) {
       draw(place, {
         title: ROLES[channel.name] || channel.name, unit: channel.unit, time: record.preview.time,
         series: [{ label: channel.name, values: record.preview.channels[channel.name] }],
+        chosen: (from, to) => span(record, from, to),
       });
     }
   });
   return box;
+}
+
+// A stretch of time, dragged over: only its rows are read from then on.
+function span(record, from, to) {
+  const before = told.rows ? Number(told.rows.split(":")[0]) || 0 : 0;
+  const row = (time) => before + Math.max(0, Math.round((time - record.start) * record.fs));
+  told.rows = `${row(from)}:${row(to) + 1}`;
+  showFiles();
+  guarded(describe);
+}
+function chosen(record) {
+  if (!told.rows) return make("p", { class: "note" }, "Drag over a stretch of a chart to take its rows alone.");
+  const all = make("button", { type: "button", id: "data-all-rows" }, "Take all rows again");
+  all.addEventListener("click", () => { told.rows = ""; showFiles(); guarded(describe); });
+  return make("p", { class: "note" }, `Rows ${told.rows}, from ${digits(record.start)} s. `, all);
 }
 
 function faults(record) {
@@ -332,7 +360,8 @@ function showQuestions() {
     return make("div", {}, input, make("label", { for: `data-ask-${name}` }, ` ${words}`, why));
   });
   parts.form = make("form", { class: "data-form" });
-  parts.form.addEventListener("submit", (event) => { event.preventDefault(); guarded(askIt); });
+  parts.form.addEventListener("change", ({ target }) => { if (target.dataset.option) rig[target.dataset.option] = target.value; });
+  parts.form.addEventListener("submit", (event) => { event.preventDefault(); guarded(() => askIt()); });
   parts.asking.replaceChildren(make("fieldset", {}, make("legend", {}, "Ask"), ...options), parts.form);
   showFields();
 }
@@ -347,9 +376,10 @@ function showFields() {
       const words = Object.fromEntries([["", "not stated"], ...hint.map((each) => [each, each])]);
       const input = select(id, words, "");
       input.dataset.option = name;
+      input.value = rig[name] ?? "";
       return make("div", { class: "data-field" }, make("label", { for: id }, label), input);
     }
-    const [box, input] = field(id, label, unit, hint, name in stated ? digits(stated[name]) : "");
+    const [box, input] = field(id, label, unit, hint, rig[name] ?? (name in stated ? digits(stated[name]) : ""));
     input.required = needed;
     input.dataset.option = name;
     if (needed) input.dataset.needed = name;
@@ -389,10 +419,10 @@ function options() {
   return said;
 }
 
-async function askIt() {
-  const said = options();
+async function askIt(more = {}) {
+  const said = { ...options(), ...more };
   const answer = await run(parts.question, said);
-  if (answer) showAnswer(answer, commandLine(parts.question, said));
+  if (answer) showAnswer(answer, commandLine(parts.question, said), said);
 }
 
 // What to type for the same answer.
@@ -405,7 +435,8 @@ function commandLine(question, said) {
   const { channels = {}, repair, ...read } = reading();
   for (const [name, column] of Object.entries(channels)) give("channels", `${name}=${column}`);
   if (repair.length) give("repair", repair.join(","));
-  const { normal = [], ...plain } = said;
+  const { normal = [], twins, ...plain } = said;
+  if (question === "analyze" && !twins) give("twins", "0");
   for (const [name, value] of Object.entries({ ...read, ...plain })) give(name, value);
   normal.forEach((load, number) => { if (load) give("normal", groups.length > 1 ? `${groups[number]}=${load}` : load); });
   return words.join(" ");
@@ -464,7 +495,7 @@ function ended(id, watch) {
 }
 
 function fail(message) {
-  lab.say(message);
+  lab.say("");
   parts.answer.replaceChildren(make("p", { class: "card data-error", role: "alert" }, message));
 }
 
@@ -479,29 +510,25 @@ async function guarded(work) {
 
 // ---- the answer
 
-function showAnswer(answer, command) {
+function showAnswer(answer, command, said) {
   const link = (path, text) => make("a", { href: `jobs/${parts.job}/${path}`, download: "", class: "button" }, text);
-  const rows = answer.lines.map((line) => make("tr", {}, make("th", { scope: "row" }, line[0]),
+  const most = 8, rows = answer.lines.map((line) => make("tr", {}, make("th", { scope: "row" }, line[0]),
     ...line.slice(1, 3).map((cell) => make("td", {}, cell)), make("td", {}, line[3] ? `see ${line[3]}` : "ok")));
-  const head = ["Quantity", "Value", "95 % interval", "How sure"].map((text) => make("th", { scope: "col" }, text));
-  const table = make("div", { class: "data-scroll", tabindex: "0", role: "region", "aria-label": "Results" },
-    make("table", { id: "data-results" }, make("thead", {}, make("tr", {}, ...head)), make("tbody", {}, ...rows)));
   const overlay = make("div", { class: "data-overlay" });
-  const page = make("iframe", { src: `jobs/${parts.job}/report`, title: `Report of ${answer.title}`, sandbox: "",
-    class: "data-report" });
   parts.answer.replaceChildren(make("article", { class: "card" },
     make("h2", {}, answer.title),
     ...answer.headline.map((text) => make("p", { class: "data-headline" }, text)),
     ...answer.cautions.map((text, j) => make("p", { class: "data-caution" }, `${j + 1}. `, text)),
-    ...(rows.length ? [table] : []), overlay,
+    ...(rows.length ? [results("data-results", rows.slice(0, most))] : []),
+    ...(rows.length > most ? [folded(`${rows.length - most} more quantities`, results("data-more", rows.slice(most)))] : []),
+    overlay, ...heard(answer.sounds), ...answer.figures.map(pictured),
     make("p", { class: "data-downloads" }, link("report?keep=1", "Report (HTML)"), link("results.json", "Numbers (JSON)"),
       link("results.zip", "All with figures (ZIP)"),
-      make("a", { href: `jobs/${parts.job}/report`, target: "_blank", rel: "noopener", class: "button" }, "Report in a tab")),
+      make("a", { href: `jobs/${parts.job}/report`, target: "_blank", rel: "noopener", class: "button" }, "Report in a tab"),
+      ...(parts.question === "analyze" && !said.twins ? [onTwins()] : [])),
     ...(answer.state ? [playIt(answer.state)] : []),
-    make("details", {}, make("summary", {}, "The same on the command line"), make("pre", {}, command)),
-    ...(answer.notes.length ? [make("details", {}, make("summary", {}, "Notes"),
-      make("ul", {}, ...answer.notes.map((note) => make("li", {}, note))))] : []),
-    page));
+    folded("The same on the command line", make("pre", {}, command)),
+    ...(answer.notes.length ? [folded("Notes", make("ul", {}, ...answer.notes.map((note) => make("li", {}, note))))] : [])));
   for (const each of answer.overlay) {
     const place = make("div", { class: "data-preview" });
     overlay.append(place);
@@ -511,7 +538,36 @@ function showAnswer(answer, command) {
     });
   }
   parts.answer.focus();
-  lab.say(answer.headline[0] || "done");
+  lab.say("Done.");
+}
+
+function results(id, rows) {
+  const head = ["Quantity", "Value", "95 % interval", "How sure"].map((text) => make("th", { scope: "col" }, text));
+  return make("div", { class: "data-scroll" },
+    make("table", { id, class: "data-results" }, make("thead", {}, make("tr", {}, ...head)), make("tbody", {}, ...rows)));
+}
+
+function folded(words, ...within) {
+  return make("details", {}, make("summary", {}, words), ...within);
+}
+
+// A figure as the report has it; the first is open.
+function pictured([title, svg, caption], number) {
+  const image = make("img", { src: `data:image/svg+xml,${encodeURIComponent(svg)}`, alt: title, class: "data-figure" });
+  const box = folded(title, image, make("p", { class: "note" }, caption));
+  box.open = number === 0;
+  return box;
+}
+
+function heard(sounds) {
+  return sounds.map(([caption, wav]) => make("p", { class: "data-sound" },
+    make("audio", { controls: "", preload: "none", src: `data:audio/wav;base64,${wav}`, "aria-label": caption }), ` ${caption}`));
+}
+
+function onTwins() {
+  const button = make("button", { type: "button", id: "data-twins" }, "Try the answers on 40 simulated rigs (a minute or two)");
+  button.addEventListener("click", () => guarded(() => askIt({ twins: true })));
+  return button;
 }
 
 function playIt(state) {
@@ -569,6 +625,9 @@ function digits(value) {
   return String(Number(value.toPrecision(6)));
 }
 
-function amount(value) {
-  return value === null ? "" : String(Number(value.toPrecision(4)));
+// In a readable unit, as the traces of a motion have it.
+function amount(value, unit) {
+  if (value === null) return "";
+  const [factor, words] = prefixed(Math.abs(value), unit);
+  return `${Number((value * factor).toPrecision(4))} ${words}`;
 }

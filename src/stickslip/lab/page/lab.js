@@ -77,7 +77,7 @@ const opened = {
 };
 
 // A chart over time for any tab: {title, unit, time, series: [{label, values, colour, dash}]}.
-function plot(element, { title, unit, time, series }) {
+function plot(element, { title, unit, time, series, chosen }) {
   const palette = colours();
   const axis = {
     stroke: palette.soft, grid: { stroke: palette.line, width: 1 }, ticks: { stroke: palette.line },
@@ -89,6 +89,8 @@ function plot(element, { title, unit, time, series }) {
   const chart = new uPlot({
     width: element.clientWidth || 600, height: 220, title, legend: { show: true }, scales: { x: { time: false } },
     axes: [{ ...axis, label: "time [s]" }, { ...axis, label: unit, size: 70 }], series: [{ label: "time" }, ...lines],
+    cursor: { drag: { x: true, y: false, setScale: !chosen } },
+    hooks: chosen ? { setSelect: [({ select: { left, width }, posToVal }) => { if (width > 4) chosen(posToVal(left, "x"), posToVal(left + width, "x")); }] } : {},
   }, [time, ...series.map((line) => line.values)], element);
   new ResizeObserver(() => chart.setSize({ width: element.clientWidth, height: 220 })).observe(element);
   return chart;
@@ -98,6 +100,8 @@ export const lab = {
   ask, say, busy, COMPILES, colours, show, plot,
   onTheme: (then) => onTheme.push(then),
   openInPlay: null, // by play.js
+  sessions: {}, // by tab: {save, load} of what a session's file holds of it
+  restored: null, // the session that was opened last: a tab that opens later takes its part
   onShow: {}, // by tab: what it does when it is shown again
 };
 

@@ -14,7 +14,7 @@ const NONE = -1, REST = -2; // as the lab sends them
 const WORDS = { [NONE]: "no such system", [REST]: "comes to rest" };
 const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
 
-let begun = 0;
+let begun = 0, line1931 = [];
 let lab, state, canvas, conversation, number = 0, parts = [], wanted = null, plan = null, place = [0.5, 0.5];
 const $ = (id) => document.getElementById(id);
 
@@ -28,6 +28,7 @@ export function start(root, given) {
   new ResizeObserver(redraw).observe(canvas);
   lab.onShow.map = offer;
   offer();
+  lab.ask("boundary").then(({ boundary }) => { line1931 = boundary; redraw(); }, () => {}); // a map is whole without it
 }
 
 function form() {
@@ -232,15 +233,14 @@ function bounded() {
   const ratios = wanted.x.dotted === "drive.frequency" && wanted.y.dotted === "law.kinetic";
   return rigid && driven && ratios && wanted.measure === "stops";
 }
-// Where sliding without a stop ends, at the ratios that the library's table has.
+// Where sliding without a stop ends.
 function boundary() {
-  if (!bounded()) return;
+  if (!line1931.length || !bounded()) return;
   const [natural] = ratio(wanted.x.dotted), [force] = ratio(wanted.y.dotted), { pen } = plan, ink = "#ffffff";
-  const xs = lab.boundary.map(([b]) => b * natural), ys = lab.boundary.map(([, r]) => r * force);
+  const xs = line1931.map(([b]) => b * natural), ys = line1931.map(([, r]) => r * force);
   clipped(() => {
     line(plan, xs, ys, { colour: ink, width: 1.6 });
     pen.fillStyle = ink;
-    xs.forEach((x, j) => { pen.beginPath(); pen.arc(plan.x(x), plan.y(ys[j]), 3, 0, 7); pen.fill(); });
     pen.font = "12px system-ui, sans-serif";
     pen.textAlign = "left";
     pen.fillText("Den Hartog 1931", plan.x(1.35 * natural), plan.y(0.675 * force) + 22);

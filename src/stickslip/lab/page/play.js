@@ -9,14 +9,16 @@ const PANELS = [["x", "displacement"], ["x", "angle", true], ["v", "velocity"], 
   ["a", "acceleration"], ["friction", "friction"]];
 const INKS = { x: "blue", v: "green", a: "purple", friction: "orange" };
 const MORE_INKS = ["blue", "orange", "green", "purple", "sky", "ink"];
-const HEIGHT = 118, REST = 90, IDLE = 350; // pixels of a trace; ms without a change until numbers, and until the rest
+const HEIGHT = 96, REST = 90, IDLE = 350; // pixels of a trace; ms without a change until numbers, and until the rest
 const KINDS = ["slip", "microstick", "stick", "flight"];
 const SLOWER = [2, 5, 10, 100, 1000].map((times) => [`${times} × slower`, 1 / times]);
 const PACES = [["one cycle in 2 s", null], ["true time", 1], ...SLOWER, ["10 × faster", 10]];
+const SHORT = 8; // cycles of a pictured scenario, so that their shape is seen
 const FONT = "12px system-ui, sans-serif";
 
 const newest = {}; // number of the last request of each kind
 let lab, state, controls, stage, conversation, run, charts = [], plans = {}, number = 0, flying = null, next = null;
+let begun = "", ghost = null, rested = null, kept = null;
 let changedLast = null, patience = 0, resting = 0, idling = 0, player = null;
 
 export async function start(given) {
@@ -33,7 +35,7 @@ export async function start(given) {
   const catalog = await lab.ask("catalog").catch((error) => lab.say(error.message, true));
   clearTimeout(slow);
   if (!catalog) return;
-  Object.assign(lab, { catalog, boundary: catalog.boundary });
+  lab.catalog = catalog;
   whole(catalog);
   controls = new Controls($("parts"), catalog, (path, since, afresh = false) => {
     changedLast = path;
@@ -59,42 +61,85 @@ function use(given) {
   state.run ??= { cycles: 40 };
   changedLast = null;
   controls.show(state);
+  tries();
   ask(performance.now(), true);
 }
 
 // What is changed is no scenario any more; choosing it again goes back.
 function own() {
-  if (!$("preset").value) return;
-  $("about").textContent = `Changed from ${$("preset").value}; choose it again to go back.`;
-  if (state) state.about = `changed from ${$("preset").value}`;
-  $("preset").value = "";
+  if (!begun) return;
+  $("about").textContent = `Changed from ${begun}; choose it again to go back.`;
+  if (state) state.about = `changed from ${begun}`;
+  begun = $("preset").value = "";
+  pressed();
 }
 
+// Six to begin with, each by its friction loop; the others by words.
+const PICTURED = [
+  ["THESIS rigid 2.5Hz fk=1.1", "Stick-slip", "M8 8V26H52V8Z"],
+  ["THESIS rigid 8.7Hz", "Slides through", "M8 8C8 4 52 4 52 8V26C52 30 8 30 8 26Z"],
+  ["THESIS compliant 2.5Hz fk=1.1 Ky=192000 z.0174(k+Ky)", "Contact that gives", "M8 26L16 8H52L44 26Z"],
+  ["BS-1", "Pulled by a belt", "M8 28L22 6L26 24L40 6L44 24L54 10"],
+  ["FD-4", "Let go", "M6 6C12 40 18 4 24 14C28 26 32 14 36 17H54"],
+  ["SQUEAK wet 6.13 N", "Squeals", "M6 17C8 2 10 32 12 17S16 2 18 17S22 32 24 17S28 2 30 17S34 32 36 17S40 2 42 17S46 32 48 17"],
+];
 function presets(offered, chosen) {
-  const groups = new Map(), about = new Map(offered.flatMap((each) => each.names.map((name) => [name, each])));
-  for (const each of offered) {
-    const key = each.about.replace(/^./, (letter) => letter.toUpperCase());
-    if (!groups.has(key)) groups.set(key, []);
-    groups.get(key).push(each);
+  const words = new Map();
+  for (const { about, names } of offered) for (const name of names) words.set(name, about);
+  for (const [name, about] of words) $("presets").append(new Option("", `${plainly(name, about)} (${name})`));
+  for (const [name, title, path] of PICTURED) {
+    const button = $("pictured").appendChild(document.createElement("button"));
+    button.type = "button";
+    button.dataset.name = name;
+    button.innerHTML = `<svg viewBox="0 0 60 34" aria-hidden="true"><path d="${path}"/></svg><span></span>`;
+    button.lastChild.textContent = title;
+    button.addEventListener("click", () => begin(name, true));
   }
-  $("preset").add(new Option("your own", ""));
-  for (const [key, members] of groups) {
-    const group = document.createElement("optgroup");
-    group.label = key;
-    for (const name of members.flatMap((each) => each.names)) {
-      group.append(new Option(`${plainly(name, key)} (${name})`, name, false, name === chosen));
-    }
-    $("preset").append(group);
-  }
-  const other = "A system of your own, or from a link or file.";
-  const told = () => { $("about").textContent = about.get($("preset").value)?.about ?? other; };
-  told();
-  $("preset").addEventListener("change", async () => {
-    told();
-    const name = $("preset").value;
-    if (name) await lab.ask(`scenarios/${encodeURIComponent(name)}`).then(({ state }) => use(state), failed);
+  const begin = async (name, short = false) => {
+    const { state } = await lab.ask(`scenarios/${encodeURIComponent(name)}`).catch(failed) ?? {};
+    if (!state) return;
+    if (short && state.run?.cycles > SHORT) state.run.cycles = SHORT;
+    begun = name;
+    $("about").textContent = words.get(name);
+    pressed();
+    use(state);
+  };
+  begun = chosen;
+  $("about").textContent = words.get(chosen) ?? "A system of your own, or from a link or file.";
+  pressed();
+  $("preset").addEventListener("change", () => {
+    const name = /\((.*)\)$/.exec($("preset").value)?.[1] ?? $("preset").value;
+    if (words.has(name)) begin(name);
+    else if (name) lab.say(`No scenario is called “${name}”; choose one of the list.`, true);
   });
 }
+function pressed() {
+  for (const button of $("pictured").children) button.setAttribute("aria-pressed", button.dataset.name === begun);
+}
+
+// Three changes that show what matters, of a system that has what they change.
+const TRIES = [
+  ["Less friction: does it still stick?", (now) => { now.law.kinetic *= 0.3; if (now.law.static) now.law.static *= 0.3; }],
+  ["Harder to start than to keep moving", (now) => { now.law.static = +(1.4 * now.law.kinetic).toPrecision(3); }],
+  ["Nearer to resonance", (now) => {
+    now.drive.frequency = +(0.8 * Math.sqrt(now.system.stiffness / now.system.mass) / (2 * Math.PI)).toPrecision(3);
+  }],
+];
+function tries() {
+  const able = typeof state.law?.kinetic === "number" && "frequency" in (state.drive ?? {}) && state.system.mass > 0;
+  $("tries").replaceChildren(...(able ? TRIES : []).map(([words, change]) => {
+    const button = Object.assign(document.createElement("button"), { type: "button", textContent: words });
+    button.addEventListener("click", () => {
+      const now = structuredClone(state);
+      change(now);
+      own();
+      use(now);
+    });
+    return button;
+  }));
+  if (able) $("tries").prepend("Try: ");
+}
+
 const failed = (error) => lab.say(error.message, true);
 
 // A scenario's code in words: what its letters stand for, and what its group is about where it has none.
@@ -183,8 +228,10 @@ function arrived(answer) {
 // The traces first; the other pictures when those are seen.
 function shown(answer, since) {
   $("told").classList.add("stale");
+  ghost = kept?.run ?? rested;
   run = answer;
   run.kinds = kinds(run.arrays);
+  keys();
   drawTraces();
   queueMicrotask(() => {
     const detail = { id: answer.id, took: performance.now() - since };
@@ -196,6 +243,13 @@ function shown(answer, since) {
       pace();
     }));
   });
+}
+
+// The legend names what occurs.
+function keys() {
+  const seen = new Set(Array.from(run.arrays.kinds, (kind) => KINDS[kind] ?? "slip"));
+  for (const kind of KINDS) $("legend").querySelector(`.${kind}`).hidden = !seen.has(kind);
+  $("legend").querySelector(".micro").hidden = !run.arrays.microslips.length;
 }
 
 // What the contact does at each instant.
@@ -248,11 +302,14 @@ function panel(group, words, lines) {
     series: [{}, ...lines.map(({ ink, name }) =>
       ({ stroke: ink, width: 1.4, dash: name === "z" ? [5, 4] : undefined, points: { show: false } }))],
     hooks: {
-      drawClear: [(plot) => shade(plot, group)],
+      drawClear: [(plot) => { shade(plot, group); haunt(plot, lines); }],
+      setCursor: [(plot) => values(plot)],
       setScale: [(plot, key) => { if (key === "x") zoom(plot); }],
     },
   }, null, box);
   Object.assign(chart, { lines, words, title, group, unit: lines[0].unit, factor: 1 });
+  chart.reading = title.parentElement.appendChild(document.createElement("span"));
+  chart.reading.className = "reading";
   chart.now = chart.over.appendChild(document.createElement("div"));
   chart.now.className = "now";
   return chart;
@@ -342,6 +399,38 @@ function shade(plot, group) {
   pen.restore();
 }
 
+// The motion before, or A: faint, behind what plays; nothing where it has not the same lines.
+function haunt(plot, lines) {
+  if (!ghost || ghost === run) return;
+  const { time } = ghost.arrays, pen = plot.ctx, { left, top, width, height } = plot.bbox;
+  const { min, max } = plot.scales.x, step = Math.max(1, Math.floor(time.length / 4000));
+  pen.save();
+  pen.beginPath(); pen.rect(left, top, width, height); pen.clip();
+  pen.strokeStyle = lab.colours().faint;
+  pen.lineWidth = devicePixelRatio || 1;
+  for (const { name } of lines) {
+    const row = ghost.arrays[name];
+    if (!row || name === "z") continue;
+    pen.beginPath();
+    for (let k = 0; k < time.length; k += step) {
+      if (time[k] < min || time[k] > max) continue;
+      pen.lineTo(plot.valToPos(time[k], "x", true), plot.valToPos(row[k], "y", true));
+    }
+    pen.stroke();
+  }
+  pen.restore();
+}
+
+// What stands under the pointer, beside the title of each trace.
+function values(plot) {
+  const { idx } = plot.cursor, chart = plot;
+  if (!chart.reading) return;
+  if (idx == null || !run) { chart.reading.textContent = ""; return; }
+  const [, unit] = prefixed(1 / chart.factor, chart.unit);
+  const told = chart.lines.map(({ name }) => shortly(run.arrays[name][idx] * chart.factor));
+  chart.reading.textContent = ` ${told.join(", ")}${unit ? ` ${unit}` : ""} at ${shortly(run.arrays.time[idx])} s`;
+}
+
 /* ---------- loops, portrait, spectrum, wavelet map ---------- */
 const unitOf = (group) => run.series.find((each) => each.group === group)?.unit ?? "";
 const one = (name) => (run.arrays[name] ? name : `${name}1`);
@@ -419,9 +508,10 @@ function stale(is) {
 }
 
 function told({ sentences, rows, state: found }) {
+  rested = run;
   controls.follow(found);
   $("told").classList.remove("stale");
-  $("happened").textContent = sentences[0] ?? "";
+  $("happened").textContent = sentences.slice(0, 2).join(" ");
   const body = $("rows");
   const make = (tag, textContent) => Object.assign(document.createElement(tag), { textContent });
   $("sentences").replaceChildren(...sentences.map((each) => make("p", each)));
@@ -458,6 +548,9 @@ function buttons() {
   motionButtons();
   textButtons();
   $("file").addEventListener("change", openFile);
+  $("session").addEventListener("click", () => saved(JSON.stringify(session(), null, 1), "session.json"));
+  $("keep").addEventListener("click", keep);
+  $("swap").addEventListener("click", swap);
   new ResizeObserver(resized).observe($("traces"));
 }
 function motionButtons() {
@@ -488,11 +581,48 @@ async function openFile() {
   if (!file) return;
   const headers = { "content-type": "text/plain" };
   try {
-    use((await lab.ask("open", { method: "POST", body: await file.text(), headers })).state);
-    $("preset").value = "";
+    const text = await file.text();
+    if (file.name.endsWith(".json")) restored(text);
+    else use((await lab.ask("open", { method: "POST", body: text, headers })).state);
+    own();
     lab.say(`${file.name} is open.`);
   } catch (error) { failed(error); }
 }
+// What a file holds of the lab: what plays, what was kept as A, and what each other tab says of itself.
+function session() {
+  const others = Object.entries(lab.sessions).map(([name, { save }]) => [name, save()]);
+  return { program: "stickslip lab", play: state, a: kept?.state ?? null, ...Object.fromEntries(others) };
+}
+function restored(text) {
+  const held = JSON.parse(text);
+  if (held.program !== "stickslip lab" || !held.play) throw new Error("The file holds no session of the lab; open one that it saved.");
+  kept = held.a ? { state: held.a, run: null } : null;
+  compared();
+  for (const [name, { load }] of Object.entries(lab.sessions)) if (held[name]) load(held[name]);
+  lab.restored = held;
+  use(held.play);
+}
+
+// A is kept and drawn behind what plays; showing it makes what plays the other.
+function keep() {
+  kept = { state: structuredClone(state), run };
+  ghost = run;
+  compared();
+  for (const chart of charts) chart.redraw(false);
+}
+function swap() {
+  const other = { state: structuredClone(state), run };
+  const { state: shown } = kept;
+  kept = other;
+  ghost = run;
+  own();
+  use(structuredClone(shown));
+}
+function compared() {
+  $("swap").hidden = !kept;
+  $("keep").textContent = kept ? "Keep this as A instead" : "Keep as A";
+}
+
 function resized() {
   if (!run || !$("traces").clientWidth) return;
   if (charts.tall !== tall()) { build(); drawTraces(); }

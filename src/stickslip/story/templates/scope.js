@@ -8,6 +8,8 @@ for (const place of document.querySelectorAll(".scope")) {
   const [near, far] = told.detail, end = told.count - 1;
   const friction = told.panels.find((panel) => panel.name === "friction");
   const cycles = told.cycles.map((time) => [time, time + told.period]);
+  const folder = location.protocol === "file:" ? decodeURIComponent(location.pathname).replace(/[^/]*$/, "") : "";
+  const here = folder.replaceAll("'", "'\\''");
   let view = [0, end], span = null, pointer = null, chosen = -1, drag = null, paper = false;
 
   function row(time) { return (time - told.start) * told.fs; }
@@ -138,7 +140,7 @@ for (const place of document.querySelectorAll(".scope")) {
     const { found, digits } = ticks(time(view[0]), time(view[1]), width / 90);
     pen.fillStyle = colour("soft");
     pen.textAlign = "center";
-    for (const value of found) if (x(row(value)) > LEFT + 12) pen.fillText(value.toFixed(digits), x(row(value)), height - 8);
+    for (const value of found) if (x(row(value)) > LEFT + 12) pen.fillText(value.toFixed(digits), Math.min(x(row(value)), width - pen.measureText(value.toFixed(digits)).width / 2), height - 8);
     pen.textAlign = "right";
     pen.fillText("t [s]", LEFT - 6, height - 8);
     if (pointer !== null) {
@@ -206,7 +208,7 @@ for (const place of document.querySelectorAll(".scope")) {
     if (span) {
       const [first, last] = [Math.round(span[0]), Math.round(span[1]) + 1];
       one("span").textContent = `${time(span[0]).toFixed(4)} to ${time(span[1]).toFixed(4)} s, ${last - first} samples`;
-      one("command").textContent = told.command.replace("{first}", first + told.first).replace("{last}", last + told.first);
+      one("command").textContent = told.command.replaceAll("{here}", here).replace("{first}", first + told.first).replace("{last}", last + told.first);
     }
   }
 

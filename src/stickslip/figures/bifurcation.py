@@ -1,0 +1,301 @@
+"""Attractors along a parameter, basins, boundaries, and what dither does."""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from stickslip.figures.maps import den_hartog
+from stickslip.figures.style import (
+    BLUE,
+    FAINT,
+    GREEN,
+    INK,
+    ORANGE,
+    PURPLE,
+    SHADE,
+    SKY,
+    axes_of,
+    axis_label,
+    coloured,
+    empty_figure,
+    legend_above,
+    new_figure,
+    plain_decades,
+    prefixed,
+    spelled,
+    styled,
+)
+from stickslip.maps.basins import Attractor, Basins
+from stickslip.maps.bifurcation import Bifurcation
+from stickslip.maps.boundaries import Boundary
+from stickslip.maps.dither import Dither, dithered_friction
+from stickslip.oscillator import Oscillator
+from stickslip.parameters import unit as unit_of
+from stickslip.solve.tables import System
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+COLOURS = (BLUE, ORANGE, GREEN, PURPLE, SKY, INK, FAINT, SHADE)
+MOST_NAMED = 8  # attractors in a legend
+
+
+@styled
+def plot_bifurcation(diagram: Bifurcation) -> Figure:
+    """The diagram: where the motion is once in each period of the drive, followed up and down, with every change.
+
+    Parameters
+    ----------
+    diagram : Bifurcation
+        What :func:`stickslip.bifurcation` returned.
+
+    Returns
+    -------
+    Figure
+        Displacement once in each period over the parameter (top) and the largest multiplier (bottom).
+
+    Examples
+    --------
+    >>> import stickslip as ss
+    >>> found = ss.bifurcation(ss.scenarios.forced(0.8, 0.5), "kinetic", values=[0.5, 0.7, 0.9])
+    >>> len(plot_bifurcation(found).axes)
+    2
+    """
+    figure, (top, bottom) = new_figure(2, height=4.6, heights=(3, 1))
+    motion = diagram.up[0].orbit.orbit
+    points = [attractor.points[:, 0] for attractor in (*diagram.up, *diagram.down)]
+    factor, unit = prefixed(np.concatenate(points), motion.units("x")[0])
+    crowded = max(map(len, points)) > 20
+    _follow(top, bottom, diagram, factor, dot=1.2 if crowded else None)
+    _beside(top, diagram, factor)
+    for change in diagram.changes:
+        colour = BLUE if change.direction == "up" else ORANGE
+        for ax in (top, bottom):
+            ax.axvline(change.value, color=colour, linewidth=0.8, linestyle=":" if change.direction == "up" else "--")
+    _name_regimes(top, diagram)
+    bottom.axhline(1.0, color=INK, linewidth=0.8)
+    bottom.set_ylim(0, 1.15)
+    bottom.set_ylabel("largest\nmultiplier")
+    top.set_ylabel(axis_label("displacement at phase zero", unit))
+    bottom.set_xlabel(_named(motion.system, diagram.parameter))
+    legend_above(top, columns=4, markerscale=3 if crowded else 1)
+    return figure
+
+
+def _follow(top: Axes, bottom: Axes, diagram: Bifurcation, factor: float, *, dot: float | None) -> None:
+    """The motion followed down and up: displacements, as dots of one size where they are crowded, and multipliers."""
+    looks = (("down", ORANGE, "o", 5.0, "none"), ("up", BLUE, ".", 4.0, BLUE))
+    for name, colour, marker, size, face in looks:
+        way = getattr(diagram, name)
+        places = np.repeat(diagram.values, [len(attractor.points) for attractor in way])
+        heights = factor * np.concatenate([attractor.points[:, 0] for attractor in way])
+        look: Any = {"color": colour, "marker": marker, "linestyle": "none", "markerfacecolor": face}
+        look |= {"markeredgewidth": 0.7, "zorder": 3 if name == "up" else 2}
+        top.plot(places, heights, markersize=dot or size, label=f"followed {name}", **look)
+        bottom.plot(diagram.values, [_largest(attractor) for attractor in way], markersize=size, **look)
+
+
+def _beside(top: Axes, diagram: Bifurcation, factor: float) -> None:
+    """Motions from other starts, and branches that lose their stability."""
+    others = [
+        (value, motion) for value, several in zip(diagram.values, diagram.beside, strict=True) for motion in several
+    ]
+    for number, (value, motion) in enumerate(others):
+        label = "beside, from another start" if not number else None
+        heights = factor * motion.points[:, 0]
+        top.plot([value] * len(heights), heights, "x", color=GREEN, markersize=5, label=label)
+    for number, branch in enumerate(diagram.branches):
+        unstable = np.array([orbit.status == "unstable" for orbit in branch.orbits])
+        heights = factor * np.array([orbit.orbit.states[0, 0] for orbit in branch.orbits])
+        label = "unstable" if not number else None
+        top.plot(branch.values, np.where(unstable, heights, np.nan), "--", color=INK, linewidth=1.0, label=label)
+
+
+def _largest(attractor: Attractor) -> float:
+    """The largest multiplier's modulus; a motion that never repeats has none."""
+    return math.nan if attractor.orbit.order < 1 else float(np.max(np.abs(attractor.orbit.multipliers)))
+
+
+def _name_regimes(ax: Axes, diagram: Bifurcation) -> None:
+    """What the motion does, written over each stretch of values: upwards at the top, downwards below."""
+    first, last = diagram.values[[0, -1]]
+    low, high = ax.get_ylim()
+    ax.set_ylim(low, high + 0.22 * (high - low))
+    for row, (direction, colour) in enumerate((("up", BLUE), ("down", ORANGE))):
+        changes = sorted(change.value for change in diagram.changes if change.direction == direction)
+        for begin, end in pairwise([first, *changes, last]):
+            inside = np.flatnonzero((diagram.values >= begin) & (diagram.values <= end))
+            if not len(inside):
+                continue
+            text = getattr(diagram, direction)[inside[len(inside) // 2]].regime
+            if end - begin > 0.012 * len(text) * (last - first):
+                at: Any = {"ha": "center", "va": "top", "transform": ax.get_xaxis_transform()}
+                ax.text((begin + end) / 2, 0.985 - 0.075 * row, text, color=colour, fontsize=7, **at)
+
+
+def _named(system: System, parameter: str) -> str:
+    return axis_label(parameter.replace(".", " ").replace("_", " "), unit_of(system, parameter))
+
+
+@styled
+def plot_basins(basins: Basins, *, ax: Axes | None = None) -> Axes:
+    """The map of starts, each in the colour of the motion it leads to; crosses where the motion is at phase zero.
+
+    Parameters
+    ----------
+    basins : Basins
+        What :func:`stickslip.basins` returned.
+    ax : Axes, optional
+        Where to draw; a new figure where left out.
+
+    Returns
+    -------
+    Axes
+
+    Examples
+    --------
+    >>> import stickslip as ss
+    >>> slider = ss.scenarios.forced(0.8, 0.7, static_ratio=1.5)
+    >>> found = ss.basins(slider, grid={"x": [-1.0, 0.0, 1.0], "v": [-1.0, 0.0, 1.0]})
+    >>> plot_basins(found).get_xlabel()
+    'x [m]'
+    """
+    from matplotlib.colors import ListedColormap
+    from matplotlib.patches import Patch
+
+    ax = axes_of(ax, height=4.2)
+    (down, across), (rows, columns) = basins.names, basins.axes
+    motion = basins.attractors[0].orbit.orbit
+    units = dict(zip(motion.table.names, (*motion.units("x"), *motion.units("v")), strict=False))  # rad if it turns
+    across_factor, across_unit = prefixed(rows, units.get(down, "1"))
+    down_factor, down_unit = prefixed(columns, units.get(across, "1"))
+    count = len(basins.attractors)
+    colours = [COLOURS[j % len(COLOURS)] for j in range(count)]
+    known = np.ma.masked_less(basins.which.T, 0)
+    options: Any = {"cmap": ListedColormap(colours), "vmin": -0.5, "vmax": count - 0.5, "alpha": 0.55}
+    coloured(ax, across_factor * rows, down_factor * columns, known, **options)
+    handles = []
+    for j, (attractor, share) in enumerate(zip(basins.attractors, basins.shares, strict=True)):
+        table = attractor.orbit.orbit.table
+        if set(basins.names) <= set(table.names) and attractor.status != "rest":
+            places = [table.names.index(name) for name in basins.names]
+            points, factors = attractor.points[:, places], (across_factor, down_factor)
+            least, most = (np.array([axis[end] for axis in basins.axes]) for end in (0, -1))
+            inside = np.all((points >= least) & (points <= most), axis=1)
+            ax.plot(*(points[inside] * factors).T, "+", color=INK, markersize=8, markeredgewidth=1.4)
+        low, high = share.interval
+        label = f"{attractor.regime}: {100 * share.value:.1f} % ({100 * low:.1f} to {100 * high:.1f})"
+        handles.append(Patch(color=colours[j], alpha=0.55, label=label))
+    legend_above(ax, handles=handles[:MOST_NAMED], columns=2)
+    ax.set_xlabel(axis_label(down, across_unit))
+    ax.set_ylabel(axis_label(across, down_unit))
+    return ax
+
+
+@styled
+def plot_boundary(boundary: Boundary, *, ax: Axes | None = None) -> Axes:
+    """The boundary as a curve, with Den Hartog's closed form over it where it applies.
+
+    Parameters
+    ----------
+    boundary : Boundary
+        What :func:`stickslip.maps.boundary` returned with ``along=``.
+    ax : Axes, optional
+        Where to draw; a new figure where left out.
+
+    Returns
+    -------
+    Axes
+
+    Examples
+    --------
+    >>> import stickslip as ss
+    >>> slider = ss.scenarios.forced(0.8, 0.5)
+    >>> along = {"frequency": [0.1, 0.2]}
+    >>> found = ss.maps.boundary(slider, "kinetic", between=(0.05, 0.99), along=along, precision=1e-3)
+    >>> plot_boundary(found).get_lines()[1].get_label()
+    'Den Hartog (1931)'
+    """
+    ax = axes_of(ax)
+    system = next(motion for motion in boundary.low if motion is not None).orbit.orbit.system
+    free = np.array([motion is not None and motion.status == "not unique" for motion in boundary.low])
+    for chosen, face, label in (
+        (~free, BLUE, "bisection of exact runs"),
+        (free, "none", "of a family, from one start"),
+    ):
+        if np.any(chosen & np.isfinite(boundary.values)):
+            look: Any = {"color": BLUE, "markerfacecolor": face, "markersize": 4, "zorder": 3}
+            ax.plot(boundary.places[chosen], boundary.values[chosen], "o", label=label, **look)
+    kinds = next(pair for pair, value in zip(boundary.kinds, boundary.values, strict=True) if math.isfinite(value))
+    fine = np.linspace(boundary.places[0], boundary.places[-1], 400)
+    curve = (
+        den_hartog(system, (boundary.along, boundary.parameter), fine) if set(kinds) == {"no stops", "stops"} else None
+    )
+    if curve is not None:
+        assert isinstance(system, Oscillator)
+        ax.plot(fine, curve, color=ORANGE, label="Den Hartog (1931)")
+        ax.axvline(system.frequency, color=FAINT, linewidth=0.8)
+    ax.margins(y=0.12)
+    for place, kind in ((0.98, kinds[1]), (0.02, kinds[0])):
+        ax.text(0.98, place, str(kind), transform=ax.transAxes, ha="right", va="top" if place > 0.5 else "bottom")
+    ax.set_xlabel(_named(system, boundary.along) if boundary.along else "place")
+    ax.set_ylabel(_named(system, boundary.parameter))
+    legend_above(ax, columns=2)
+    return ax
+
+
+@styled
+def plot_dither(dither: Dither) -> Figure:
+    """How the longest stick goes down with the dither, and what the dither makes of the friction.
+
+    Parameters
+    ----------
+    dither : Dither
+        What :func:`stickslip.dither` returned.
+
+    Returns
+    -------
+    Figure
+        The longest stick in periods of the dither over its amplitude (top), and the mean friction over the sliding
+        speed, with the averaged law (bottom).
+
+    Examples
+    --------
+    >>> import stickslip as ss
+    >>> slider = ss.Oscillator(1, 1, ss.laws.Coulomb(1.0, static=1.5), ss.drives.Belt(0.5), damping=0.02)
+    >>> len(plot_dither(ss.dither(slider, frequency=5.0)).axes)
+    2
+    """
+    figure = empty_figure(4.8)
+    top, bottom = figure.subplots(2, 1)
+    factor, unit = prefixed(dither.scan[:, 0], dither.amplitude.unit)
+    sticks = dither.scan[:, 1] * dither.frequency
+    least = 0.3 * min(1.0, np.min(sticks[sticks > 0], initial=1.0))
+    known = np.where(np.isfinite(sticks), np.maximum(sticks, least), np.nan)
+    top.loglog(factor * dither.scan[:, 0], known, ".", color=BLUE, label="exact runs")
+    for axis in (top.xaxis, top.yaxis):
+        plain_decades(axis)
+    top.axhline(1.0, color=INK, linewidth=0.8)
+    smallest = factor * dither.amplitude.value
+    label = f"smallest that does it: {smallest:.3g} {spelled(unit)}"
+    top.axvline(smallest, color=ORANGE, linestyle="--", label=label)
+    if np.any(sticks == 0):
+        top.text(0.99, 0.04, "lowest row: no stick at all", transform=top.transAxes, ha="right", fontsize=7)
+    top.set_xlabel(axis_label(f"dither of {dither.frequency:.4g} Hz on the {dither.on}", unit))
+    top.set_ylabel("longest stick\n[periods of the dither]")
+    legend_above(top, columns=2)
+    shares = np.linspace(0, 1, 200)
+    bottom.plot(shares, dithered_friction(shares, speed=1.0), color=ORANGE, label="(2/pi) asin(v/aw)")
+    for column, colour, text in ((2, BLUE, "exact runs with this dither"), (3, GREEN, "with ten times as much")):
+        bottom.plot(dither.averaged[:, 0], dither.averaged[:, column], "o", color=colour, markersize=4, label=text)
+    bottom.axhline(1.0, color=FAINT, linewidth=0.8)
+    bottom.set_xlabel("sliding speed over that of the dither, v/aw")
+    bottom.set_ylabel("mean friction\nover sliding friction")
+    legend_above(bottom, columns=3)
+    figure.align_ylabels([top, bottom])
+    return figure

@@ -1,0 +1,230 @@
+"""One call that draws any result: with matplotlib's pyplot, or on axes of one's own."""
+
+from __future__ import annotations
+
+import importlib
+import inspect
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any, cast
+
+import numpy as np
+
+from stickslip.errors import ModelError
+from stickslip.estimate import Estimate, Result
+from stickslip.figures.style import (
+    BARS,
+    BLUE,
+    INK,
+    ORANGE,
+    axes_of,
+    axis_label,
+    envelope,
+    known_to_pyplot,
+    named_intervals,
+    new_figure,
+    prefixed,
+    styled,
+)
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from stickslip.answers.findings import Comparison, Findings
+    from stickslip.answers.frequencies import TimeFrequency
+    from stickslip.cycle.loops import Loops
+    from stickslip.decay.answer import DecayFit
+    from stickslip.record.record import Record
+
+# What draws each kind of result, the file of this room and the function. One that takes no `ax` fills a whole figure.
+DRAWN = {
+    "Record": "drawing.of_record", "Findings": "drawing.of_findings", "Comparison": "drawing.of_comparison",
+    "Loops": "drawing.of_loops", "DecayFit": "drawing.of_decay", "Decrement": "decay.plot_differences",
+    "ForceComparison": "traces.plot_force_comparison", "Consistency": "friction.plot_consistency",
+    "TransitionSpeed": "contact.plot_transition_speed", "Trial": "traces.plot_twin", "Squeaks": "squeak.plot_squeaks",
+    "TimeFrequency": "drawing.of_frequencies", "DataArray": "wavelet.plot_wavelet",
+    "LawComparison": "law.plot_laws", "LawFit": "law.plot_fit", "CurveFit": "law.plot_curve",
+    "Trajectory": "trajectory.plot_motion", "CycleBranches": "limit_cycle.plot_limit_cycles",
+    "Bifurcation": "bifurcation.plot_bifurcation", "Basins": "bifurcation.plot_basins",
+    "Boundary": "bifurcation.plot_boundary", "Dither": "bifurcation.plot_dither", "Dataset": "drawing.of_dataset",
+    "ExperimentPlan": "experiment.plot_plan", "Estimate": "drawing.of_estimates", "list": "drawing.of_estimates",
+    "tuple": "drawing.of_estimates", "Result": "drawing.of_result",
+}  # fmt: skip
+
+
+def plot(thing: Any, *, ax: Axes | None = None, **options: Any) -> Axes:
+    """Draw a record, a motion, an answer or a map.
+
+    Without `ax` the figure is pyplot's, which a notebook shows by itself and ``matplotlib.pyplot.show()`` elsewhere.
+
+    Parameters
+    ----------
+    thing : Record, Trajectory, Findings, Estimate or any other result
+        What to draw; a sequence of estimates is drawn as rows with their intervals.
+    ax : matplotlib Axes, optional
+        Where to draw. What needs several panels (a motion, a squeak, a plan ...) refuses it.
+    **options
+        Of the function that draws this kind of result, as ``first`` and ``last`` of a motion, ``system`` of a map.
+
+    Returns
+    -------
+    matplotlib Axes
+        The first, where there are several; its ``figure`` has them all.
+
+    Raises
+    ------
+    ModelError
+        A thing of a kind that is not drawn, or one of several panels with `ax`.
+
+    Examples
+    --------
+    >>> import stickslip as ss
+    >>> slider = ss.Oscillator(mass=1, stiffness=100, law=ss.laws.Coulomb(0.5))
+    >>> run = ss.simulate(slider, start={"x": 0.05}, duration=3.0)
+    >>> plot(run).get_ylabel(), plot(run.record(fs=100)).get_ylabel()
+    ('displacement\\n[mm]', 'x\\n[mm]')
+    """
+    draw = _drawer(thing)
+    if "ax" in inspect.signature(draw).parameters:
+        options["ax"] = ax
+    elif ax is not None:
+        raise ModelError(
+            f"a {type(thing).__name__} drawn on given axes", "it needs several panels of its own", "leave out ax="
+        )
+    with known_to_pyplot():
+        drawn = draw(thing, **options)
+    panels: Any = drawn.axes  # of a figure all of its axes, of axes themselves
+    first: Any = panels[0] if isinstance(panels, list) else drawn
+    return cast("Axes", first)
+
+
+def _drawer(thing: Any) -> Callable[..., Figure | Axes]:
+    place = next((DRAWN[kind.__name__] for kind in type(thing).__mro__ if kind.__name__ in DRAWN), None)
+    if place is None:
+        raise ModelError(
+            f"a {type(thing).__name__}",
+            f"what can be drawn is one of {', '.join(DRAWN)}",
+            "give what a question or a simulation returned",
+        )
+    file, name = place.split(".")
+    draw: Callable[..., Figure | Axes] = getattr(importlib.import_module(f"stickslip.figures.{file}"), name)
+    return draw
+
+
+@styled
+def of_record(record: Record, *, ax: Axes | None = None, channels: Sequence[str] | None = None) -> Figure | Axes:
+    """The channels over time, one under the other; on given axes those that share the first one's unit."""
+    names = list(channels or record)
+    if ax is not None:
+        unit = record.channels[names[0]].unit
+        names = [name for name in names if record.channels[name].unit == unit]
+        factor, spelled = prefixed(np.concatenate([record[name] for name in names]), unit)
+        for name in names:
+            times, values = envelope(record.time, factor * record[name])
+            ax.plot(times, values, label=name)
+        ax.set(xlabel="time [s]", ylabel=axis_label(", ".join(names), spelled))
+        return ax
+    figure, axes = new_figure(len(names), height=0.8 + 1.2 * len(names))
+    for name, panel in zip(names, np.atleast_1d(axes), strict=True):
+        factor, spelled = prefixed(record[name], record.channels[name].unit)
+        panel.plot(*envelope(record.time, factor * record[name]), color=BLUE, linewidth=1.0)
+        panel.set_ylabel(axis_label(name, spelled, between="\n"))
+    panel.set_xlabel("time [s]")
+    return figure
+
+
+def of_findings(findings: Findings, *, ax: Axes | None = None) -> Figure | Axes:
+    """The friction loop, the decay, the squeaks, or else the record."""
+    from stickslip.figures.contact import plot_displacement_loop
+    from stickslip.figures.decay import plot_decay
+    from stickslip.figures.squeak import plot_squeaks
+
+    results = findings.results
+    if results.get("loops") is not None:
+        return plot_displacement_loop(findings, ax=ax)
+    if results.get("decay") is not None:
+        return plot_decay(findings.decay, ax=ax)
+    if results.get("squeaks") is not None and ax is None:
+        return plot_squeaks(findings.squeaks)
+    return of_record(findings.record, ax=ax)
+
+
+def of_comparison(comparison: Comparison, *, ax: Axes | None = None) -> Figure | Axes:
+    """Friction of each record; of decays their damping ratio, of squeaks their conditions."""
+    from stickslip.figures.decay import plot_records
+    from stickslip.figures.friction import plot_levels
+    from stickslip.figures.squeak import plot_conditions
+
+    kinds = set(comparison.findings[0].results)
+    if "decay" in kinds:
+        return plot_records(comparison, ax=ax)
+    return plot_conditions(comparison) if "squeaks" in kinds and ax is None else plot_levels(comparison, ax=ax)
+
+
+@styled
+def of_loops(loops: Loops, *, ax: Axes | None = None, against: str = "displacement") -> Axes:
+    """The mean cycle of friction, with a band of one standard deviation between cycles."""
+    ax = axes_of(ax)
+    moved = getattr(loops, against)
+    across, unit = prefixed(moved, loops.unit if against == "displacement" else f"{loops.unit}/s")
+    up, force = prefixed(loops.friction, loops.level.unit)
+    x, f, band = (np.append(part, part[0]) for part in (across * moved, up * loops.friction, up * loops.scatter))
+    ring = np.concatenate([f + band, (f - band)[::-1]])
+    ax.fill(np.concatenate([x, x[::-1]]), ring, color=ORANGE, alpha=0.2, linewidth=0)
+    ax.plot(x, f, color=ORANGE)
+    ax.set(xlabel=axis_label(f"{against} of the contact", unit), ylabel=axis_label("friction", force))
+    return ax
+
+
+def of_frequencies(found: TimeFrequency) -> Figure:
+    """The map of a channel, with the signal above it."""
+    from stickslip.figures.wavelet import plot_wavelet
+
+    return plot_wavelet(found.wavelets, record=found.record)
+
+
+def of_decay(fit: DecayFit, *, ax: Axes | None = None) -> Axes:
+    """A free decay as it was measured, and as it was fitted."""
+    ax = axes_of(ax)
+    for number, (time, measured, fitted) in enumerate(zip(fit.time, fit.measured, fit.fitted, strict=True)):
+        ax.plot(time, measured, color=BLUE, label=None if number else "measured")
+        ax.plot(time, fitted, color=ORANGE, linestyle="--", label=None if number else "fitted")
+    ax.set(xlabel="time [s]", ylabel=fit.channel)
+    ax.legend()
+    return ax
+
+
+def of_dataset(data: Any, *, ax: Axes | None = None, **options: Any) -> Figure | Axes:
+    """A map of a sweep; where steady sliding lasts."""
+    from stickslip.figures.limit_cycle import plot_stability
+    from stickslip.figures.maps import plot_map
+
+    return plot_stability(data, **options) if "growth" in data else plot_map(data, ax=ax, **options)
+
+
+@styled
+def of_estimates(estimates: Estimate | Sequence[Estimate], *, ax: Axes | None = None) -> Axes:
+    """Estimates of one unit with their 95 % intervals; of several units each against its own value."""
+    rows = [estimates] if isinstance(estimates, Estimate) else list(estimates)
+    if strangers := {type(row).__name__ for row in rows if not isinstance(row, Estimate)} or (not rows and "nothing"):
+        raise ModelError(f"a plot of {', '.join(strangers)}", "a sequence that is drawn holds estimates", "pass these")
+    rows = [row for row in rows if row.known] or rows
+    if len({row.unit for row in rows}) == 1:
+        ax, _, unit = named_intervals([row.name for row in rows], rows, ax=ax)
+        ax.set_xlabel("" if unit == "1" else f"[{unit}]")
+        return ax
+    ax = axes_of(ax, height=1.3 + 0.32 * len(rows))
+    for place, row in enumerate(rows):
+        size = abs(row.value) or 1.0
+        away = np.abs(np.array(row.interval)[:, None] - row.value) / size * 100
+        ax.errorbar([0.0], [place], xerr=np.where(np.isfinite(away), away, 0.0), color=BLUE, **BARS)
+    ax.set_yticks(range(len(rows)), [" ".join(row.cells[:2]) for row in rows])
+    ax.set_ylim(len(rows) - 0.4, -0.6)
+    ax.axvline(0, color=INK, linewidth=0.6)
+    ax.set_xlabel("95 % interval over the value [%]")
+    return ax
+
+
+def of_result(result: Result, *, ax: Axes | None = None) -> Axes:
+    """The numbers of an answer that has no picture of its own."""
+    return of_estimates(result.estimates, ax=ax)

@@ -1,0 +1,163 @@
+"""One look for every figure: palette, sizes, and fewer points than samples."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from contextvars import ContextVar
+from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stickslip.estimate import Estimate
+from stickslip.units import prefixed as prefixed
+from stickslip.units import spelled as spelled
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.axis import Axis
+    from matplotlib.figure import Figure
+
+Array = NDArray[np.float64]
+Arguments = ParamSpec("Arguments")
+Drawn = TypeVar("Drawn")
+
+# Okabe and Ito's palette, told apart by the colour blind; ink and grid follow the page's colours in a report.
+BLUE, ORANGE, GREEN, PURPLE, SKY = "#0072b2", "#d55e00", "#009e73", "#b0559b", "#56b4e9"
+INK, FAINT, SHADE = "#1f2933", "#9aa5b1", "#c8d0da"
+WIDTH = 6.2  # inch: narrow enough that the letters stay readable on a phone
+COLUMNS = 1200  # of a min-max envelope: beyond the pixels of a figure
+BARS: Any = {"fmt": "o", "capsize": 3, "markersize": 5}  # of an interval
+STYLE: Any = {
+    "font.family": "sans-serif", "font.sans-serif": ["DejaVu Sans", "Verdana", "Arial"], "font.size": 9,
+    "axes.labelsize": 9, "axes.titlesize": 10, "xtick.labelsize": 8, "ytick.labelsize": 8, "legend.fontsize": 8,
+    "axes.edgecolor": INK, "axes.labelcolor": INK, "text.color": INK, "xtick.color": INK, "ytick.color": INK,
+    "axes.spines.top": False, "axes.spines.right": False, "axes.grid": True, "grid.color": FAINT, "grid.alpha": 0.3,
+    "grid.linewidth": 0.6, "axes.axisbelow": True, "lines.linewidth": 1.3, "legend.frameon": False,
+    "figure.facecolor": "none", "axes.facecolor": "none", "savefig.facecolor": "none", "svg.fonttype": "none",
+    "svg.hashsalt": "stickslip", "text.parse_math": False, "path.simplify": True, "axes.formatter.useoffset": False,
+}  # fmt: skip
+
+
+def styled(draw: Callable[Arguments, Drawn]) -> Callable[Arguments, Drawn]:
+    """`draw`, in the house's style whatever the user's own settings are."""
+
+    @functools.wraps(draw)
+    def drawing(*args: Arguments.args, **options: Arguments.kwargs) -> Drawn:
+        import matplotlib as mpl
+
+        with mpl.rc_context(STYLE):
+            return draw(*args, **options)
+
+    return drawing
+
+
+_shown: ContextVar[bool] = ContextVar("shown", default=False)
+
+
+@contextmanager
+def known_to_pyplot() -> Iterator[None]:
+    """Within it a new figure is pyplot's, which shows it; elsewhere nobody keeps it."""
+    token = _shown.set(True)
+    try:
+        yield
+    finally:
+        _shown.reset(token)
+
+
+def empty_figure(height: float) -> Figure:
+    """A figure of the report's width."""
+    if _shown.get():
+        from matplotlib import pyplot
+
+        return pyplot.figure(figsize=(WIDTH, height), layout="constrained")
+    from matplotlib.figure import Figure
+
+    return Figure(figsize=(WIDTH, height), layout="constrained")
+
+
+def new_figure(rows: int = 1, *, height: float = 3.4, heights: Sequence[float] | None = None) -> tuple[Figure, Any]:
+    """A figure of the report's width, and its axes, one under the other on one abscissa."""
+    figure = empty_figure(height)
+    return figure, figure.subplots(rows, 1, sharex=True, height_ratios=heights)
+
+
+def axes_of(ax: Axes | None, *, height: float = 3.8) -> Axes:
+    """The axes given, or those of a new figure."""
+    return ax if ax is not None else new_figure(height=height)[1]
+
+
+def legend_above(ax: Axes, *, columns: int = 1, **options: Any) -> None:
+    """A legend over the axes, where it hides nothing that is drawn."""
+    ax.legend(ncols=columns, loc="lower left", bbox_to_anchor=(0, 1), **options)
+
+
+def plain_decades(axis: Axis) -> None:
+    """Plain numbers along a logarithmic axis; between the powers of ten too, where less than a decade may hold none."""
+    from matplotlib.ticker import LogLocator, NullFormatter
+
+    low, high = axis.get_view_interval()
+    if 2 * low < high < 10 * low:
+        axis.set_major_locator(LogLocator(subs=(1.0, 1.5, 2.0, 3.0, 5.0, 7.0)))
+    axis.set_major_formatter("{x:g}")
+    axis.set_minor_formatter("{x:g}" if high <= 2 * low else NullFormatter())
+
+
+def axis_label(label: str, unit: str, between: str = " ") -> str:
+    """ "displacement [mm]"; no bracket for a pure number."""
+    return label if unit in ("1", "") else f"{label}{between}[{spelled(unit)}]"
+
+
+def named_intervals(
+    names: Sequence[str], estimates: Sequence[Estimate], *, ax: Axes | None, label: str = ""
+) -> tuple[Axes, float, str]:
+    """Estimates with their 95 % intervals, a named row each; the axes, and the factor and unit they are drawn in."""
+    values, ends = np.array([e.value for e in estimates]), np.array([e.interval for e in estimates])
+    ax, places = axes_of(ax, height=1.3 + 0.32 * len(names)), np.arange(len(names))
+    factor, unit = prefixed(values, estimates[0].unit)
+    away = factor * np.abs(ends - values[:, None]).T
+    ax.errorbar(factor * values, places, xerr=away, color=BLUE, label=label or None, **BARS)
+    ax.set_yticks(places, [shortened(name, 44) for name in names])
+    ax.set_ylim(len(names) - 0.4, -0.6)
+    return ax, factor, unit
+
+
+def shortened(name: str, limit: int) -> str:
+    return name if len(name) < limit else f"{name[: limit - 3]}..."
+
+
+def strongest(level: Array, times: Array, columns: int) -> tuple[Array, Array]:
+    """A map thinned to about `columns` columns, the largest of each kept, and their times."""
+    width = -(-level.shape[1] // columns)
+    starts = np.arange(0, level.shape[1], width)
+    return np.maximum.reduceat(level, starts, axis=1), times[np.minimum(starts + width // 2, len(times) - 1)]
+
+
+def coloured(ax: Axes, x: Array, y: Array, values: Any, **options: Any) -> Any:
+    """A map in colour over two axes, without the grid."""
+    ax.grid(visible=False)
+    return ax.pcolormesh(x, y, values, shading="nearest", rasterized=True, linewidth=0, **options)
+
+
+def envelope(time: Array, values: Array, columns: int = COLUMNS) -> tuple[Array, Array]:
+    """The lowest and highest value of each of `columns` equal stretches, so that no peak is lost in drawing.
+
+    Examples
+    --------
+    >>> time = np.arange(100_000.0)
+    >>> spike = np.where(time == 777, 5.0, 0.0)
+    >>> len(envelope(time, spike)[0]), envelope(time, spike)[1].max()
+    (2400, np.float64(5.0))
+    """
+    if len(values) <= 2 * columns:
+        return time, values
+    edges = np.linspace(0, len(values), columns, endpoint=False).astype(int)
+    low, high = np.fmin.reduceat(values, edges), np.fmax.reduceat(values, edges)
+    return np.repeat(time[edges], 2), np.column_stack([low, high]).ravel()
+
+
+def thinned(count: int, limit: int) -> NDArray[np.intp]:
+    """At most `limit` indices spread evenly over `count`."""
+    return np.unique(np.linspace(0, count - 1, min(count, limit)).astype(np.intp))

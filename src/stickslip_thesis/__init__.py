@@ -1,0 +1,1 @@
+"""The thesis, reproduced: every printed number beside ours, every figure beside its caption."""

@@ -1,0 +1,255 @@
+"""Chapter 2: friction measured two ways, by a load cell and from the forces that balance it."""
+
+from __future__ import annotations
+
+import functools
+import math
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+import stickslip as ss
+from stickslip.figures.plate import Plate
+from stickslip.figures.style import BLUE, GREEN, INK, ORANGE, PURPLE, envelope, styled
+from stickslip.signals.derivatives import five_point_average
+from stickslip_thesis.drawing import figure, panels, tag
+from stickslip_thesis.printed import Given, Ours
+from stickslip_thesis.sketches import apparatus
+
+Array = NDArray[np.float64]
+
+TITLE = "Friction measured two ways, by a load cell and from the forces that balance it"
+STARTS_FROM = ("rig",)  # sections of given.toml
+SETTLED = 40.0  # s: the air track hardly damps
+
+
+def numbers(given: Given) -> Ours:
+    """The chapter's numbers."""
+    told, free = given["rig"], free_vibration(given)
+    lines = {
+        each.name: each.frequency.value for each in ss.balance.impact_test(impact(given), mass=told["mass"]).resonances
+    }
+    return {
+        "damping ratio": ss.decay.log_decrement(free).damping_ratio.value,
+        "natural frequency": math.sqrt(told["spring"] / told["mass"]),
+        "phase": lead(given, free),
+        "contact": lines["coupled contact"],
+        "accelerometer": lines["mount of the accelerometer"],
+        "load cell": lines["mount of the load cell"],
+    }
+
+
+def plates(given: Given) -> Iterator[Plate]:
+    """The chapter's figures."""
+    words = "The virtual rig of chapter 2; amplitude and noise are ours."
+    yield figure("2.1", apparatus(given), "Drawn from the chapter's parameters and the virtual rig's sensors.")
+    yield figure("2.2", _free_response(given), words)
+    late, early = (np.std(resultant(given, free_vibration(given), sign)[400:-400]) for sign in (1, -1))
+    yield figure(
+        "2.3",
+        _balance(given, free_vibration(given), smoothed=True),
+        f"{words} The accelerometer leads and is read at t - τ: what is left deviates by {late:.3f} N; "
+        f"at t + τ, as the text writes it, by {early:.2f} N.",
+    )
+    for number, case in (("2.4", 0), ("2.5", 1), ("2.6", 2)):
+        share = (given["rig"]["forced"][case] / 125) ** 2
+        yield figure(
+            number,
+            _balance(given, forced(given, case)),
+            f"{words} What is left: noise, and the {share:.1%} that the accelerometer's mount of 125 Hz adds.",
+        )
+    for number, case in (("2.7", 0), ("2.8", 1), ("2.9", 2), ("2.10", 3)):
+        record = rubbing(given, case)
+        found = ss.balance.compare_force(record)
+        yield figure(
+            number,
+            _both_forces(given, record),
+            f"{words} Computed and felt force agree within a tenth up to {found.agree_up_to.value:.0f} Hz.",
+        )
+    yield figure(
+        "2.11",
+        _impact(given),
+        "The virtual rig, struck for 2 ms: the contact rings in both signals, the "
+        "accelerometer's mount in (c), the load cell's in (d).",
+    )
+
+
+@functools.lru_cache(16)
+def _measured(system: Any, release: float, first: float, seconds: float, *, fs: float, lag: float) -> ss.Record:
+    start = {"x": release} if release else None
+    run = ss.simulate(system, start=start, duration=first + seconds)
+    rig = ss.Rig().having("x", lag=lag).having("z", lag=lag)
+    return rig.stated(rig.measure(run, fs=fs, rng=2, start=first))
+
+
+def _sensors(given: Given) -> dict[str, float]:
+    """Rate, and a lag of the LVDTs under which the accelerometer leads by the printed phase in a free vibration.
+
+    It is late by its own mount; and where the motion decays, the acceleration leads by twice the damping ratio anyhow.
+    """
+    told = given["rig"]
+    mount = next(sensor.mount for sensor in ss.Rig().sensors if sensor.channel == "a")
+    assert mount is not None
+    late = mount.damping / (math.pi * mount.frequency)
+    return {"fs": told["fs"], "lag": (told["phase"] - 2 * told["damping_ratio"]) / told["natural"] + late}
+
+
+def lead(given: Given, free: ss.Record) -> float:
+    """The phase by which the accelerometer leads the LVDT in a free vibration, at its frequency (section 2.3)."""
+    turning = np.exp(-1j * math.sqrt(given["rig"]["spring"] / given["rig"]["mass"]) * free.time)
+    window = np.hanning(len(free.time)) * turning
+    return float(np.angle(np.sum(window * free["a"]) / np.sum(window * -free["x"])))
+
+
+def slider(given: Given, *, law: Any = None, drive: Any = None) -> ss.Oscillator:
+    """Mass and spring on the air track, with or without the friction contact."""
+    told = given["rig"]
+    damping = 2 * told["damping_ratio"] * math.sqrt(told["mass"] * told["spring"])
+    drive = {} if drive is None else {"drive": drive}
+    return ss.Oscillator(
+        mass=told["mass"], stiffness=told["spring"], damping=damping, law=law or ss.laws.Coulomb(0.0), **drive
+    )
+
+
+def contact(given: Given) -> ss.laws.CompliantContact:
+    """The friction contact, as in chapter 4."""
+    told = given["rig"]
+    return ss.laws.CompliantContact(told["kinetic"], stiffness=told["stiffness"], damping=told["contact_damping"])
+
+
+def free_vibration(given: Given) -> ss.Record:
+    """Figures 2.2 and 2.3: the mass let go, without friction."""
+    return _measured(slider(given), given["rig"]["release"], 0.0, 10.0, **_sensors(given))
+
+
+def forced(given: Given, case: int) -> ss.Record:
+    """Figures 2.4 to 2.6: the base moves, without friction; settled."""
+    told = given["rig"]
+    drive = ss.drives.HarmonicBase(told["forced_base"][case], frequency=told["forced"][case])
+    return _measured(slider(given, drive=drive), 0.0, SETTLED, 1.0, **_sensors(given))
+
+
+def rubbing(given: Given, case: int) -> ss.Record:
+    """Figures 2.7 to 2.10: with friction."""
+    told = given["rig"]
+    drive = ss.drives.HarmonicBase(told["base"][case], frequency=told["frequency"][case])
+    record = _measured(slider(given, law=contact(given), drive=drive), 0.0, SETTLED, 2.0, **_sensors(given))
+    return ss.friction_force(record, mass=told["mass"], stiffness=told["spring"])
+
+
+def impact(given: Given) -> ss.Record:
+    """Figure 2.11: the base held but for a half sine of 2 ms, which acts on the mass as a blow through the spring."""
+    told = given["rig"]
+    fs = 20_000.0
+    time = np.arange(round(0.6 * fs)) / fs
+    blow = np.where((time > 0.1) & (time < 0.102), told["blow"] * np.sin(math.pi * (time - 0.1) / 2e-3), 0.0)
+    return _struck(told["mass"], told["spring"], contact(given), tuple(blow / told["spring"]), fs)
+
+
+@functools.lru_cache(2)
+def _struck(mass: float, spring: float, law: Any, base: tuple[float, ...], fs: float) -> ss.Record:
+    drive = ss.drives.Recorded(base, fs=fs)
+    run = ss.simulate(ss.Oscillator(mass=mass, stiffness=spring, law=law, drive=drive), duration=(len(base) - 1) / fs)
+    return ss.Rig().measure(run, fs=4000, rng=4)
+
+
+def delayed(given: Given, values: Array, sign: int = 1) -> Array:
+    """S(t - tau), tau = phi / omega_n; with `sign` -1 S(t + tau)."""
+    told = given["rig"]
+    time = np.arange(len(values)) / told["fs"]
+    return np.interp(time - sign * told["phase"] / told["natural"], time, values)
+
+
+def forces(given: Given, record: ss.Record, sign: int = 1) -> dict[str, Array]:
+    """Spring, inertial and excitation force of section 2.3, from the sensors as they read."""
+    told = given["rig"]
+    found = {"spring": told["spring"] * record["x"], "inertia": told["mass"] * delayed(given, record["a"], sign)}
+    return found | ({"excitation": told["spring"] * record["z"]} if "z" in record else {})
+
+
+def resultant(given: Given, record: ss.Record, sign: int = 1) -> Array:
+    """What does not cancel: kS_3 - kS_1 - mS_2, the friction where there is a contact."""
+    found = forces(given, record, sign)
+    return found.get("excitation", 0.0) - found["spring"] - found["inertia"]
+
+
+LABELS = {"spring": ("f1 = kS1", BLUE), "inertia": ("f2 = mS2(t - τ)", ORANGE), "excitation": ("f3 = kS3", GREEN)}
+
+
+def _draw_forces(given: Given, record: ss.Record, ax: Any, part: slice) -> None:
+    for name, values in forces(given, record).items():
+        label, colour = LABELS[name]
+        ax.plot(record.time[part], values[part], color=colour, linewidth=1.0, label=label)
+    ax.set_ylabel("force [N]")
+    ax.legend(ncols=3, loc="lower right", bbox_to_anchor=(1, 1))
+
+
+@styled
+def _free_response(given: Given) -> Any:
+    record = free_vibration(given)
+    drawn, ax = panels(1, height=2.8)
+    ax.plot(*envelope(record.time, 1e3 * record["x"]), color=BLUE, linewidth=0.8)
+    ax.set(xlabel="time [s]", ylabel="displacement [mm]")
+    return drawn
+
+
+@styled
+def _balance(given: Given, record: ss.Record, *, smoothed: bool = False) -> Any:
+    """Figures 2.3 to 2.6: the forces, and what is left of them."""
+    left = resultant(given, record)
+    part = slice(40, 40 + round((1.0 if smoothed else 0.8) * record.fs))
+    drawn, axes = panels(2 + smoothed, height=4.6 + smoothed)
+    _draw_forces(given, record, axes[0], part)
+    axes[1].plot(record.time[part], left[part], color=PURPLE, linewidth=0.7)
+    axes[1].set_ylabel("resultant [N]")
+    if smoothed:
+        axes[2].plot(record.time[part], five_point_average(left)[part], color=PURPLE, linewidth=0.7)
+        axes[2].set(ylabel="smoothed [N]", ylim=axes[1].get_ylim())
+    axes[-1].set_xlabel("time [s]")
+    for ax, letter in zip(axes, "abc", strict=False):
+        tag(ax, letter)
+    return drawn
+
+
+@styled
+def _both_forces(given: Given, record: ss.Record) -> Any:
+    """Figures 2.7 to 2.10: the forces; F; its average F1; F2, of the load cell less the flange's inertia, averaged."""
+    computed = resultant(given, record)
+    felt = record["load"] - float(record.channels["load"].inertia) * record["a"]
+    part = slice(40, 40 + round(record.fs))
+    drawn, axes = panels(4, height=7.0)
+    _draw_forces(given, record, axes[0], part)
+    rows = (
+        ("F [N]", computed, INK),
+        ("F1 [N]", five_point_average(computed), ORANGE),
+        ("F2 [N]", five_point_average(felt), BLUE),
+    )
+    for ax, (label, values, colour) in zip(axes[1:], rows, strict=True):
+        ax.plot(record.time[part], values[part], color=colour, linewidth=0.7)
+        ax.set_ylabel(label)
+    axes[-1].set_xlabel("time [s]")
+    for ax, letter in zip(axes, "abcd", strict=True):
+        tag(ax, letter)
+    return drawn
+
+
+@styled
+def _impact(given: Given) -> Any:
+    record = impact(given)
+    drawn, axes = panels(2, 2, height=4.6)
+    part = (record.time > 0.08) & (record.time < 0.4)
+    rows = (("a", "acceleration [m/s²]", PURPLE), ("load", "friction [N]", ORANGE))
+    for ax, below, (name, label, colour) in zip(axes[0], axes[1], rows, strict=True):
+        ax.plot(record.time[part], record[name][part], color=colour, linewidth=0.8)
+        ax.set(xlabel="time [s]", ylabel=label)
+        values = record[name][record.time > 0.1]
+        power = np.abs(np.fft.rfft(values - np.mean(values), 1 << 14)) ** 2
+        frequency = np.fft.rfftfreq(1 << 14, 1 / record.fs)
+        shown = frequency < 400
+        below.plot(frequency[shown], 10 * np.log10(power[shown] / np.max(power)), color=colour, linewidth=0.9)
+        below.set(xlabel="frequency [Hz]", ylabel="power [dB]", ylim=(-60, 3))
+    for ax, letter in zip(axes.flat, "abcd", strict=True):
+        tag(ax, letter)
+    return drawn

@@ -1,0 +1,310 @@
+"""Chapter 4: the same contact where it sticks, and laws with a memory."""
+
+from __future__ import annotations
+
+import functools
+import math
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import brentq
+
+import stickslip as ss
+from stickslip.figures.plate import Plate
+from stickslip.figures.style import BLUE, GREEN, INK, ORANGE, PURPLE, styled
+from stickslip_thesis import readings
+from stickslip_thesis.drawing import around, characteristics, figure, panels, responses, tag
+from stickslip_thesis.printed import Given, Ours
+from stickslip_thesis.sketches import contact_with_inertia
+
+Array = NDArray[np.float64]
+
+TITLE = "The same contact where it sticks, and laws with a memory"
+STARTS_FROM = ("stick_slip", "state_variable", "inertial")  # sections of given.toml
+
+
+def numbers(given: Given) -> Ours:
+    """The chapter's numbers."""
+    told, inertial = given["stick_slip"], given["inertial"]
+    time, _, friction = free_vibration(given)
+    orbits = [inertial_contact(given, case) for case in (0, 1)]
+    return {
+        "coupled frequency": math.sqrt((told["spring"] + told["stiffness"]) / told["mass"]) / (2 * math.pi),
+        "free frequency": strongest(time, friction),
+        "bases of stick-slip": [1e3 * told["base"], 1e3 * given["state_variable"]["base"][0], math.nan],
+        "base of the state variable": [base_of_state_variable(given, case) for case in (1, 2)],
+        "micro-slips": [readings.micro_slips(stick_slip(given, told[name])) for name in ("case1", "case2")],
+        "abnormal stops": orbits[0].stops[1] / 2,
+        "static deflection": inertial["kinetic"] / inertial["stiffness"],
+    }
+
+
+def plates(given: Given) -> Iterator[Plate]:
+    """The chapter's figures."""
+    yield from _experiments(given)
+    told = given["stick_slip"]
+    for time, loops, name in (("4.4", "4.5", "case1"), ("4.6", "4.7", "case2")):
+        orbit = stick_slip(given, told[name])
+        slips = readings.micro_slips(orbit)
+        words = (
+            f"Steady motion, exactly solved, with the damping ratio {told[name]} and f_k = {told['kinetic']:g} N, read "
+            f"as c = {told['critical']:g} ζ √(m (k + K_y)): in each sticking interval the contact slips "
+            f"{slips or 'no'} time{'s' * (slips != 1)}{', and the ringing dies away' * (slips == 0)}."
+        )
+        yield figure(time, responses(*around(orbit, cycles=2)), words)
+        yield figure(
+            loops,
+            characteristics(around(orbit)[1], way=3e-5, speed=1e-2),
+            "The loops in (c) are the transition oscillation; where they touch the friction's level the contact slips.",
+        )
+    yield figure(
+        "micro-slips",
+        readings.drawn(given),
+        "Not in the thesis: micro-slips in each sticking interval of case 1 (.0558) and case 2 (.0174), one before the "
+        "other, by what the damping ratio is of, the contact's stiffness (Table 3.1's least, mean and largest) and the "
+        "friction, which is not printed (shaded: Table 3.2's range). Bold: none and two, as printed.",
+        title="Which reading gives the printed micro-slips",
+    )
+    for case, (time, loops) in enumerate((("4.8", "4.9"), ("4.10", "4.11"), ("4.12", "4.13"))):
+        orbit = state_variable(given, case)
+        yield figure(
+            time,
+            responses(*around(orbit, cycles=2)),
+            f"By the curved solver, with the f_k that equation 4.2's backbone lacks: the mass moves "
+            f"{1e3 * orbit.amplitude:.3f} mm.",
+        )
+        yield figure(
+            loops,
+            characteristics(around(orbit)[1], way=1.5e-4, speed=2e-2),
+            "Friction follows the backbone late: it never sticks.",
+        )
+    yield from _inertial(given)
+
+
+def stick_slip(given: Given, ratio: float) -> ss.solve.SteadyState:
+    """The motion of section 4.3 with a damping ratio in the contact."""
+    told = given["stick_slip"]
+    return _steady(told["mass"], told["spring"], _contact(given, ratio), told["base"], told["frequency"])
+
+
+def _contact(given: Given, ratio: float) -> ss.laws.CompliantContact:
+    told = given["stick_slip"]
+    return ss.laws.CompliantContact(
+        told["kinetic"], stiffness=told["stiffness"], damping=readings.damping(given, ratio)
+    )
+
+
+def _steady(mass: float, spring: float, law: Any, base: float, frequency: float) -> ss.solve.SteadyState:
+    return readings.stick_slip(law, base, frequency, mass, spring)
+
+
+def state_variable(given: Given, case: int, *, base: float | None = None) -> ss.solve.SteadyState:
+    """The motion of section 4.4 at 2.5, 5.61 or 8.7 Hz."""
+    told, slider = given["state_variable"], given["stick_slip"]
+    law = ss.laws.SmoothStateVariable(told["kinetic"][case], rate=told["rate"], steepness=told["steepness"])
+    base = told["base"][case] if base is None else base
+    return _steady(slider["mass"], slider["spring"], law, base, told["frequency"][case])
+
+
+def base_of_state_variable(given: Given, case: int) -> float | None:
+    """The base amplitude [mm] under which the state-variable model moves as far as the experiment of Table 3.2.
+
+    None where the motion jumps from less to more as the base moves farther.
+    """
+    wanted = given["sliding"]["amplitude"][case - 1]
+
+    def excess(base: float) -> float:
+        return state_variable(given, case, base=base).amplitude - wanted
+
+    most = given["state_variable"]["base"][case]
+    found = float(brentq(excess, 0.7 * most, most, xtol=1e-7))
+    return 1e3 * found if abs(excess(found)) < 0.01 * wanted else None
+
+
+@functools.lru_cache(8)
+def _free(mass: float, spring: float, law: Any, release: float) -> ss.Record:
+    run = ss.simulate(ss.Oscillator(mass=mass, stiffness=spring, law=law), start={"x": release}, duration=1.2)
+    return ss.Rig().measure(run, fs=4000, rng=3)
+
+
+def free_vibration(given: Given) -> tuple[Array, Array, Array]:
+    """Figure 4.2: time, smoothed acceleration and friction as the load cell feels it, of a released mass."""
+    told = given["stick_slip"]
+    record = _free(told["mass"], told["spring"], _contact(given, told["case2"]), told["release"])
+    smooth = np.convolve(record["a"], np.full(5, 0.2), mode="same")
+    return record.time, smooth, record["load"]
+
+
+def strongest(time: Array, friction: Array) -> float:
+    """Frequency of the strongest line between 20 and 200 Hz in the ringing after the last reversal [Hz]."""
+    frequency, power = _spectrum(time, friction)
+    band = (frequency > 20) & (frequency < 200)
+    return float(frequency[band][np.argmax(power[band])])
+
+
+def _spectrum(time: Array, values: Array) -> tuple[Array, Array]:
+    """Power over frequency, of the second half of the record."""
+    part = values[len(values) // 4 :]
+    window = np.hanning(2 * len(part))[len(part) :]  # from the largest ringing on
+    size = 1 << 17
+    found = np.abs(np.fft.rfft((part - np.mean(part)) * window, size)) ** 2
+    return np.fft.rfftfreq(size, time[1] - time[0]), found / np.max(found)
+
+
+@functools.lru_cache(4)
+def _measured(mass: float, spring: float, law: Any, base: float, frequency: float) -> ss.Record:
+    drive = ss.drives.HarmonicBase(base, frequency=frequency)
+    run = ss.simulate(ss.Oscillator(mass=mass, stiffness=spring, law=law, drive=drive), duration=10)
+    rig = ss.Rig()
+    record = rig.stated(rig.measure(run, fs=4000, rng=7, start=8.0))
+    return ss.friction_force(record, mass=mass, stiffness=spring, method="fusion")
+
+
+def measured(given: Given) -> ss.Record:
+    """What the virtual rig makes of case 2: two seconds, with friction."""
+    told = given["stick_slip"]
+    return _measured(told["mass"], told["spring"], _contact(given, told["case2"]), told["base"], told["frequency"])
+
+
+def _experiments(given: Given) -> Iterator[Plate]:
+    """Figures 4.1 to 4.3."""
+    record, words = measured(given), "The virtual rig of chapter 2, on the contact of case 2."
+    v = ss.signals.differentiate(record["x"], record.fs, method="five-point").values
+    motion = {"x": record["x"], "v": v, "a": record["a"], "friction": record["friction"]}
+    part = slice(0, round(record.fs))
+    yield figure("4.1", responses(record.time[part], {name: each[part] for name, each in motion.items()}), words)
+    yield figure(
+        "4.2",
+        _free_vibration(given),
+        "The virtual rig: a mass let go reverses twice and sticks. Its friction rings at "
+        f"{strongest(*free_vibration(given)[::2]):.1f} Hz, the coupled frequency of the contact.",
+    )
+    motion["v"] = record["v"]
+    yield figure("4.3", characteristics(motion, way=4e-5, speed=1.2e-2), words)
+
+
+@styled
+def _free_vibration(given: Given) -> Any:
+    time, acceleration, friction = free_vibration(given)
+    drawn, axes = panels(3, height=5.4)
+    axes[0].plot(time, friction, color=ORANGE, linewidth=0.8)
+    axes[0].set(xlabel="time [s]", ylabel="friction [N]", xlim=(0, 0.8))
+    axes[1].plot(time, acceleration, color=PURPLE, linewidth=0.8)
+    axes[1].set(xlabel="time [s]", ylabel="acceleration [m/s²]", xlim=(0, 0.8))
+    frequency, power = _spectrum(time, friction)
+    shown = frequency < 120
+    axes[2].plot(frequency[shown], 10 * np.log10(power[shown]), color=INK, linewidth=0.9)
+    axes[2].set(xlabel="frequency [Hz]", ylabel="power [dB]", ylim=(-60, 3))
+    for ax, letter in zip(axes, "abc", strict=True):
+        tag(ax, letter)
+    return drawn
+
+
+def inertial_contact(given: Given, case: int) -> ss.solve.SteadyState:
+    """z of equation 4.7 at its steady state, with the friction's sign set-valued at rest."""
+    told = given["inertial"]
+    alpha = told["amplitude"][case] * told["stiffness"] / told["kinetic"] * (told["ratio"] ** 2 - 1)
+    return _normalised(alpha, told["ratio"])
+
+
+@functools.lru_cache(8)
+def _normalised(alpha: float, ratio: float) -> ss.solve.SteadyState:
+    drive = ss.drives.HarmonicForce(abs(alpha), ratio / (2 * math.pi), phase=math.pi * (alpha < 0))
+    return ss.steady_state(ss.Oscillator(mass=1, stiffness=1, law=ss.laws.Coulomb(1.0), drive=drive))
+
+
+def of_contact(given: Given, case: int, *, cycles: int = 1) -> tuple[Array, dict[str, Array]]:
+    """tau, and z, z', y, y' (of the contact: y = z f_k/k + X_m cos Omega tau)."""
+    told = given["inertial"]
+    tau, motion = around(inertial_contact(given, case), cycles=cycles, names=("x", "v"))
+    give, ratio, amplitude = told["kinetic"] / told["stiffness"], told["ratio"], told["amplitude"][case]
+    y = give * motion["x"] + amplitude * np.cos(ratio * tau)
+    return tau, {
+        "z": motion["x"],
+        "z'": motion["v"],
+        "y": y,
+        "y'": give * motion["v"] - amplitude * ratio * np.sin(ratio * tau),
+    }
+
+
+def _inertial(given: Given) -> Iterator[Plate]:
+    """Figures 4.14 to 4.19."""
+    yield figure("4.14", contact_with_inertia(given), "Drawn from the parameters of section 4.5, which have no units.")
+    for number, case in (("4.15", 0), ("4.16", 1)):
+        orbit = inertial_contact(given, case)
+        normal, abnormal = orbit.stops
+        yield figure(
+            number,
+            _inertial_motion(given, case),
+            f"Equation 4.7 by the exact solver, friction set-valued at rest: Z_0 = {orbit.amplitude:.4f}, and in each "
+            f"half cycle {normal // 2} normal and {abnormal // 2} abnormal stops.",
+        )
+    yield figure("4.17", _boundaries(given), "The boundaries of equations 4.9 and of y' = -X_m Ω sin Ωτ.")
+    yield figure(
+        "4.18",
+        _portraits(given, 0),
+        "Stops are marked in (a): of A, B and C in the text two are stops, at the third z' "
+        "comes down to its least and does not reach zero.",
+    )
+    yield figure("4.19", _portraits(given, 1), "Stops are marked in (a).")
+
+
+@styled
+def _inertial_motion(given: Given, case: int) -> Any:
+    tau, motion = of_contact(given, case, cycles=2)
+    drawn, axes = panels(2, 2, height=4.4)
+    for ax, letter, (name, values), colour in zip(
+        axes.flat, "abcd", motion.items(), (BLUE, GREEN, BLUE, GREEN), strict=True
+    ):
+        ax.plot(tau, values, color=colour, linewidth=0.9)
+        ax.set_ylabel(name)
+        tag(ax, letter)
+    for ax in axes[1]:
+        ax.set_xlabel("τ")
+    return drawn
+
+
+@styled
+def _boundaries(given: Given) -> Any:
+    """Figure 4.17: the macroscopic sticking boundary and the microscopic one, case 2."""
+    told, orbit = given["inertial"], inertial_contact(given, 1)
+    tau, motion = of_contact(given, 1)
+    imposed = told["amplitude"][1] * np.cos(told["ratio"] * tau)
+    drawn, axes = panels(2, height=5.0)
+    for side in (-1, 1):
+        axes[0].plot(
+            tau,
+            side * orbit.amplitude * told["kinetic"] / told["stiffness"] + imposed,
+            color=ORANGE,
+            linestyle="--",
+            linewidth=0.9,
+            label="boundary" if side > 0 else None,
+        )
+    axes[0].plot(tau, motion["y"], color=BLUE, linewidth=1.0, label="y")
+    axes[0].set(xlabel="τ", ylabel="y")
+    slope = -told["amplitude"][1] * told["ratio"] * np.sin(told["ratio"] * tau)
+    axes[1].plot(tau, slope, color=ORANGE, linestyle="--", linewidth=0.9, label="boundary")
+    axes[1].plot(tau, motion["y'"], color=BLUE, linewidth=1.0, label="y'")
+    axes[1].set(xlabel="τ", ylabel="y'")
+    for ax, letter in zip(axes, "ab", strict=True):
+        tag(ax, letter)
+        ax.legend(loc="lower right", bbox_to_anchor=(1, 1), ncols=2)
+    return drawn
+
+
+@styled
+def _portraits(given: Given, case: int) -> Any:
+    _, motion = of_contact(given, case)
+    orbit = inertial_contact(given, case)
+    drawn, axes = panels(1, 2, height=3.2)
+    axes[0].plot(motion["z"], motion["z'"], color=BLUE, linewidth=0.9)
+    stops = [piece.state["x"] for piece in orbit.orbit.pieces if piece.mode == "stuck"]
+    axes[0].plot(stops, np.zeros(len(stops)), "o", color=ORANGE, markersize=4)
+    axes[0].set(xlabel="z", ylabel="z'")
+    axes[1].plot(motion["y"], motion["y'"], color=BLUE, linewidth=0.9)
+    axes[1].set(xlabel="y", ylabel="y'")
+    for ax, letter in zip(axes, "ab", strict=True):
+        tag(ax, letter)
+    return drawn

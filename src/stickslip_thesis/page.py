@@ -1,0 +1,167 @@
+"""Run the chapters, judge every number, and write the page."""
+
+from __future__ import annotations
+
+import importlib
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+from stickslip import __version__
+from stickslip.figures.plate import Plate
+from stickslip.story.folder import check_folder, results_folder, write_figures
+from stickslip.story.page import templates
+from stickslip_thesis.drawing import caption_of
+from stickslip_thesis.printed import CHANGED as CHANGED
+from stickslip_thesis.printed import MEANINGS, Given, Number, Ours, Table, given, judged, tables
+from stickslip_thesis.starting import starts
+
+CHAPTERS = {
+    "2": "chapter2",
+    "3": "chapter3",
+    "4": "chapter4",
+    "5": "chapter5",
+    "6": "chapter6",
+    "7": "chapter7",
+    "appendices": "appendices",
+    "beyond": "beyond",
+}  # scripts
+VERDICTS = (*MEANINGS, CHANGED)
+TEMPLATE = "thesis.html.jinja"
+
+Tell = Callable[[str, float], None]
+
+
+@dataclass(frozen=True, eq=False)
+class Chapter:
+    """One chapter, run: its tables with our numbers and verdicts, and its figures.
+
+    Attributes
+    ----------
+    name, title : str
+        "6", and what it is about.
+    tables : tuple of (Table, entries)
+        For each entry of each row our number and the verdict.
+    start : mapping of str to mapping
+        What it starts from: sections of given.toml.
+    plates : tuple of Plate
+        Its figures.
+    """
+
+    name: str
+    title: str
+    start: Given
+    tables: tuple[tuple[Table, list[list[tuple[float | None, str]]]], ...]
+    plates: tuple[Plate, ...] = ()
+
+    @property
+    def counts(self) -> Counter[str]:
+        """How many numbers have each verdict; one that is printed twice counts once."""
+        return Counter(
+            verdict
+            for table, rows in self.tables
+            for row, entries in zip(table.rows, rows, strict=True)
+            if not row.again
+            for _, verdict in entries
+        )
+
+    def entries(self) -> Iterator[dict[str, Any]]:
+        """Each number with its verdict, as plain data."""
+        for table, rows in self.tables:
+            for row, entries in zip(table.rows, rows, strict=True):
+                for number, (value, verdict) in zip(row.numbers, entries, strict=True):
+                    yield {
+                        "chapter": self.name, "place": table.name, "quantity": row.quantity, "entry": number.label,
+                        "unit": row.unit, "printed": number.printed, "ours": value, "verdict": verdict,
+                        "why": number.why, "again": row.again,
+                    }  # fmt: skip
+
+
+def run_chapter(name: str, *, start: Given | None = None, draw: bool = True, tell: Tell | None = None) -> Chapter:
+    """A chapter's numbers and verdicts and, if asked, its figures."""
+    module, start = module_of(name), given() if start is None else start
+    ours: Ours = module.numbers(start)
+    plates = []
+    for drawn in module.plates(start) if draw else ():
+        plates.append(drawn)
+        if tell:
+            tell(f"chapter {name}, {drawn.title.lower()}", len(plates))
+    verdicts = tuple((table, judged(table, ours)) for table in tables() if table.chapter == name)
+    return Chapter(name, module.TITLE, {each: start[each] for each in module.STARTS_FROM}, verdicts, tuple(plates))
+
+
+def module_of(name: str) -> ModuleType:
+    """The script of a chapter."""
+    return importlib.import_module(f"stickslip_thesis.{CHAPTERS[name]}")
+
+
+def reproduce(chapters: Sequence[str], *, folder: Path | None, tell: Tell) -> tuple[Chapter, ...]:
+    """Run chapters and, given a folder, write page, figures and results.json there, whole or not at all."""
+    if folder is not None:
+        check_folder(folder)
+    done = []
+    for place, name in enumerate(chapters):
+        tell(f"chapter {name}, numbers", place)
+        done.append(run_chapter(name, draw=folder is not None, tell=_at(tell, place)))
+    if folder is not None:
+        tell("writing the page", len(chapters))
+        with results_folder(folder, results(done)) as draft:
+            (draft / "thesis.html").write_text(render(done), encoding="utf-8")
+            (draft / "figures").mkdir()
+            for chapter in done:
+                write_figures(draft / "figures", f"{chapter.name}-", chapter.plates)
+    return tuple(done)
+
+
+def _at(tell: Tell, place: int) -> Tell:
+    """The progress of a chapter, which counts as one."""
+    return lambda words, _: tell(words, place)
+
+
+def results(chapters: Sequence[Chapter]) -> dict[str, Any]:
+    """What results.json holds: the count of each verdict, and every number."""
+    total = sum((chapter.counts for chapter in chapters), Counter())
+    return {
+        "chapters": {chapter.name: chapter.title for chapter in chapters},
+        "verdicts": {verdict: total[verdict] for verdict in VERDICTS},
+        "numbers": [entry for chapter in chapters for entry in chapter.entries()],
+    }
+
+
+def render(chapters: Sequence[Chapter]) -> str:
+    """The page as text."""
+    environment = templates(Path(__file__).parent)
+    environment.filters.update(caption_of=caption_of)
+    environment.globals.update(digits_of=digits_of, reasons=reasons, starts=starts)
+    total = sum((chapter.counts for chapter in chapters), Counter())
+    return environment.get_template(TEMPLATE).render(
+        chapters=chapters, total=total, verdicts=VERDICTS, meanings=MEANINGS, version=__version__
+    )
+
+
+def digits_of(number: Number, value: float | None) -> str:
+    """Our number with one digit more than the printed one.
+
+    Examples
+    --------
+    >>> digits_of(Number("", "0.0197", "same", None, 5e-5, ""), 0.019651)
+    '0.01965'
+    """
+    if value is None:
+        return "–"
+    mantissa, exponent, _ = number.printed.lower().partition("e")
+    digits = len(mantissa.partition(".")[2]) + 1
+    return f"{value:.{digits}e}" if exponent else f"{value:.{digits}f}"
+
+
+def reasons(numbers: Sequence[Number]) -> list[tuple[str, str]]:
+    """Why some of a row are not the same: each reason once, with the entries that it holds for."""
+    found: dict[str, list[str]] = {}
+    for number in numbers:
+        if number.why:
+            found.setdefault(number.why, []).append(number.label)
+    whole = len(found) == 1 and len(next(iter(found.values()))) == len(numbers)
+    return [("" if whole else ", ".join(labels), why) for why, labels in found.items()]

@@ -1,0 +1,185 @@
+"""Curved laws at the contacts of structures, under loads that follow the motion, and behind a compliant contact."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
+
+import stickslip as ss
+from stickslip import drives, laws
+
+Array = NDArray[np.float64]
+FREQUENCY = 0.12
+OMEGA = 2 * math.pi * FREQUENCY
+CURVE = laws.Stribeck(0.3, 0.45, speed=0.3)
+
+
+def _force(speed: float) -> float:
+    """Stribeck's curve as the literature prints it (Bo and Pavelescu), of a speed of either sign."""
+    return math.copysign(0.3 + 0.15 * math.exp(-((abs(speed) / 0.3) ** 2)), speed)
+
+
+def test_a_structure_of_one_mass_is_the_oscillator() -> None:
+    drive = drives.HarmonicForce(1.0, FREQUENCY)
+    one = ss.Oscillator(1.0, 1.0, CURVE, drive, 0.02)
+    same = ss.Structure(1.0, 0.02, 1.0, [ss.Contact(CURVE, [1.0])], drive)
+    runs = [ss.simulate(system, cycles=6) for system in (one, same)]
+    times = np.linspace(0, runs[0].duration, 400)
+    a, b = (run.sample(times, ("x", "v", "a", "friction", "slip"))[0] for run in runs)
+    np.testing.assert_array_equal(a, b)
+    assert [event[:2] for event in runs[0].events] == [event[:2] for event in runs[1].events]
+    orbits = [ss.steady_state(system) for system in (one, same)]
+    assert orbits[0].amplitude == pytest.approx(orbits[1].amplitude, rel=1e-12)
+    assert orbits[1].status == "unique"
+    np.testing.assert_allclose(abs(orbits[0].multipliers), abs(orbits[1].multipliers), atol=1e-7)
+
+
+def _slid(rates: Callable[[float, Array], list[float]], start: list[float], side: Callable[[Array], float], end: float):  # type: ignore[no-untyped-def]
+    """Radau's method through the slips of a system, to where `side` no longer has its sign."""
+
+    def stops(_: float, state: Array) -> float:
+        return side(state)
+
+    stops.terminal, stops.direction = True, -math.copysign(1.0, side(np.array(start)))  # type: ignore[attr-defined]
+    return solve_ivp(rates, (0.0, end), start, "Radau", events=stops, rtol=1e-9, atol=1e-11, dense_output=True)
+
+
+def test_stribeck_under_a_load_that_follows_the_motion() -> None:
+    """Two motions, the second presses the contact of the first: against Radau, up to the first stop."""
+    pad = ss.Contact(CURVE, [1.0, 0.0], normal=[0.0, 1.0], stiffness=2.0, preload=1.0)
+    springs = [[3.0, -1.0], [-1.0, 2.0]]
+    drive = drives.HarmonicForce(0.5, FREQUENCY)
+    system = ss.Structure(np.diag([1.0, 2.0]), 0.05 * np.eye(2), springs, [pad], drive)
+    begin = {"x1": -1.0, "v1": 0.5, "x2": 0.1, "v2": 0.0}
+    run = ss.simulate(system, duration=6.0, start=begin)
+
+    def rates(t: float, state: Array) -> list[float]:
+        x, y, v, w = state
+        load, pull = 1.0 + 2.0 * y, 0.5 * math.cos(OMEGA * t)
+        return [
+            v,
+            w,
+            pull - 3.0 * x + y - 0.05 * v - load * _force(v),
+            (pull + x - 2.0 * y - 0.05 * w - 2.0 * y) / 2.0,
+        ]
+
+    truth = _slid(rates, [-1.0, 0.1, 0.5, 0.0], lambda s: float(s[2]), 6.0)
+    event = run.events[0]
+    assert (event.kind, truth.status) == ("reversal", 1)
+    assert event.time == pytest.approx(truth.t[-1], abs=1e-7)
+    times = np.linspace(0, truth.t[-1], 50)
+    np.testing.assert_allclose(run.sample(times, ("x",))[0], truth.sol(times)[:2], atol=2e-8)
+    assert ss.solve.energy(run).residual < 1e-10
+    (load,), _ = run.sample(np.linspace(0, 6, 100), ("load",))
+    assert np.all((load > 0) == (run.sample(np.linspace(0, 6, 100), ("friction",))[0][0] != 0))  # it lifts for a while
+    assert np.min(load) == 0
+
+
+def test_stribeck_behind_a_compliant_contact() -> None:
+    """The thesis's chapter 8.2: against Radau, the slider's speed solved from the balance at every instant."""
+    stiffness, damping = 50.0, 3.0
+    drive = drives.HarmonicForce(1.0, FREQUENCY)
+    system = ss.Oscillator(1.0, 1.0, laws.InSeries(CURVE, stiffness, damping), drive, 0.02)
+    run = ss.simulate(system, cycles=2)
+    events = run.events
+    assert [event.kind for event in events[:4]] == ["slip", "microstick", "slip", "microstick"]
+
+    def slider(x: float, v: float, y: float) -> float:
+        def balance(w: float) -> float:
+            return stiffness * (x - y) + damping * (v - w) - _force(w)
+
+        return float(brentq(balance, 1e-300, 10.0, xtol=1e-15)) if balance(1e-300) > 0 else 0.0
+
+    def rates(t: float, state: Array) -> list[float]:
+        x, v, y = state
+        w = slider(x, v, y)
+        force = stiffness * (x - y) + damping * (v - w)
+        return [v, math.cos(OMEGA * (begin + t)) - x - 0.02 * v - force, w]
+
+    begin = events[0].time
+    at = run.state(begin)
+    middle = begin + 0.2  # past the corner of the balance at no speed
+    at = run.state(middle)
+    begin = middle
+    truth = _slid(rates, [at["x"], at["v"], at["slider"]], lambda s: slider(*s) - 1e-9, events[1].time - middle + 1.0)
+    assert truth.t[-1] + middle == pytest.approx(events[1].time, abs=1e-6)
+    times = np.linspace(0, truth.t[-1], 50)
+    x, y = run.sample(times + middle, ("x", "slider"))[0]
+    np.testing.assert_allclose([x, y], truth.sol(times)[[0, 2]], atol=2e-8)
+    assert ss.solve.energy(run).residual < 1e-10
+
+
+def test_a_very_stiff_contact_is_a_rigid_one() -> None:
+    drive = drives.HarmonicForce(1.0, FREQUENCY)
+    times = np.linspace(0, 10, 200)
+    rigid = ss.simulate(ss.Oscillator(1.0, 1.0, CURVE, drive, 0.02), duration=10).sample(times, ("x",))[0]
+    apart = []
+    for stiffness in (1e3, 1e5):
+        law = laws.InSeries(CURVE, stiffness, 5.0)
+        x = ss.simulate(ss.Oscillator(1.0, 1.0, law, drive, 0.02), duration=10).sample(times, ("x",))[0]
+        apart.append(float(np.max(np.abs(x - rigid))))
+    # where the mass turns, it takes sqrt(4 F / (K a)) to bend the contact over: of order one half in the compliance
+    assert apart[0] < 0.05
+    assert 7 < apart[0] / apart[1] < 14
+
+
+@pytest.mark.parametrize("damping", [3.0, 0.0])
+@pytest.mark.parametrize("law", [laws.Dahl(0.5, 100.0), laws.SmoothStateVariable(0.5, 20.0, 50.0)])
+def test_laws_that_remember_in_series_keep_their_balance(law: Any, damping: float) -> None:
+    drive = drives.HarmonicForce(1.0, FREQUENCY)
+    run = ss.simulate(ss.Oscillator(1.0, 1.0, laws.InSeries(law, 50.0, damping), drive, 0.02), cycles=2, rtol=1e-10)
+    memory = next(iter(law.memory))
+    x, v, y, w, told, force = run.sample(
+        np.linspace(0, run.duration, 300), ("x", "v", "slider", "slider_speed", memory, "friction")
+    )[0]
+    np.testing.assert_allclose(50.0 * (x - y) + damping * (v - w), force, atol=1e-12)
+    np.testing.assert_allclose(force, told, atol=1e-7)  # the slider has no mass: its friction is the spring's force
+
+
+def test_what_would_jump_is_refused() -> None:
+    steep = laws.Stribeck(0.3, 0.45, speed=0.01)
+    with pytest.raises(ss.errors.ModelError, match=r"raise damping= above 12\.\d N s/m"):
+        laws.InSeries(steep, 50.0, 3.0)
+    with pytest.raises(ss.errors.ModelError, match="break-away"):
+        laws.InSeries(laws.FrictionCurve(lambda v: 1.0 + 0.1 * v, static=1.5), 50.0, 3.0)
+    lagging = laws.TimeDelay(laws.LinearSlope(1.0, 0.1), 0.1)
+    with pytest.raises(ss.errors.ModelError, match="SmoothStateVariable"):
+        laws.InSeries(lagging, 50.0, 3.0)
+    with pytest.raises(ss.errors.ModelError, match="SmoothStateVariable"):
+        ss.Contact(lagging, [1.0])
+
+
+def test_a_file_names_a_curved_contact(tmp_path: Any) -> None:
+    text = """
+[system]
+mass = [[1.0, 0.0], [0.0, 2.0]]
+damping = [[0.05, 0.0], [0.0, 0.05]]
+stiffness = [[3.0, -1.0], [-1.0, 2.0]]
+
+[[contacts]]
+tangent = [1.0, 0.0]
+normal = [0.0, 1.0]
+stiffness = 2.0
+preload = 1.0
+law = {name = "Stribeck", kinetic = 0.3, static = 0.45, speed = 0.3}
+
+[drive]
+name = "HarmonicForce"
+amplitude = 0.5
+frequency = 0.12
+
+[run]
+duration = 1.0
+"""
+    path = tmp_path / "pad.toml"
+    path.write_text(text)
+    case = ss.systems.read_system(path)
+    assert isinstance(case.system, ss.Structure)
+    assert case.system.contacts[0].law == CURVE

@@ -1,1 +1,0 @@
-"""The thesis, reproduced: every printed number beside ours, every figure beside its caption. Needs the source tree."""
