@@ -13,8 +13,7 @@ from stickslip.answers.decays import analyze_decay
 from stickslip.answers.findings import Comparison, Findings
 from stickslip.answers.fits import fit_records
 from stickslip.answers.questions import analyze
-from stickslip.answers.squeak_comparison import compare_squeaks
-from stickslip.answers.squeaks import analyze_squeaks
+from stickslip.answers.squeaks import analyze_squeaks, compare_squeaks
 from stickslip.bench.recording import Wanted, acquire
 from stickslip.bench.runs import Proposal, Run, next_runs, run_list
 from stickslip.bench.sim import Sim
