@@ -186,7 +186,7 @@ def test_a_pendulum_is_read_with_its_sine_and_by_its_own_waveform(dataset):
         ss.analyze_decay(record, restoring="pendulum", method="thesis")
 
 
-@pytest.mark.parametrize("name", ["60.txt", "100.txt"])
+@pytest.mark.parametrize("name", ["60.txt", pytest.param("100.txt", marks=pytest.mark.soak)])
 def test_a_clock_that_can_not_be_trusted_leaves_the_extremes(dataset, name):
     path = dataset("pendulum_bad_clock") / name
     record = ss.signals.repair_clock(ss.read_record(path, channels={"theta": "Angle [deg]"}, time="Time_Elapsed"))

@@ -26,6 +26,7 @@ ROOMS = sorted(stub.parent for stub in PACKAGE.glob("*/__init__.pyi"))
 MODULES = sorted(module.name for module in pkgutil.walk_packages([str(PACKAGE)], "stickslip."))
 TREES = {str(file.relative_to(PACKAGE)): ast.parse(file.read_text("utf-8")) for file in FILES}
 HEAVY = {"scipy", "pandas", "matplotlib", "pint", "h5py", "pyarrow", "xarray", "jinja2", "pooch", "nptdms", "soundfile"}
+HEAVY |= {"concurrent", "multiprocessing"}
 EMPTY_NAMES = {"utils", "util", "core", "common", "helpers", "misc", "tools"}
 
 BY_PLACE = {

@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 import unicodedata
 from collections.abc import Iterable, Sequence
-from html import escape
 
 
 def printable(text: str, *, encoding: str = "utf-8") -> str:
@@ -53,6 +52,7 @@ def html_table(title: str, headings: Sequence[str], rows: Iterable[Sequence[str]
     >>> html_table("a < b", ("name", "value"), [("mass", "2 kg")]).splitlines()[0]
     '<p><b>a &lt; b</b></p>'
     """
+    from html import escape
 
     def cells(row: Sequence[str], tag: str) -> str:
         return "".join(f'<{tag} style="text-align: left">{escape(printable(cell))}</{tag}>' for cell in row)

@@ -5,10 +5,8 @@ from __future__ import annotations
 import os
 import signal
 from collections.abc import Callable, Iterator
-from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
 from importlib import import_module
-from multiprocessing import get_context
 from typing import Any
 
 Map = Callable[..., Iterator[Any]]
@@ -34,6 +32,9 @@ def workers(count: int, module: str) -> Iterator[Map]:
     if count < 2:
         yield map
         return
+    from concurrent.futures import ProcessPoolExecutor
+    from multiprocessing import get_context
+
     # begun afresh and not forked: a fork of a process with compiled threads may hang
     pool = ProcessPoolExecutor(count, get_context("spawn"), initializer=unheard)
     with _silent():

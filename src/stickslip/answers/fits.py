@@ -106,7 +106,7 @@ def _only_curve(record: Record, *, asked: bool) -> str | None:
             f"no motion of the mass (the record has {', '.join(record)})",
             "a law is fitted to the displacement x or the velocity v of the mass",
             'name its column, as in channels={"x": "COLUMN [mm]"}',
-        )  # fmt: skip
+        )
     return None
 
 
@@ -126,7 +126,7 @@ def _with_friction(record: Record, rig: RigSettings) -> Record:
             "a curve is fitted to friction: measured, or what the motion leaves of the forces on a known mass",
             'name its column, as in channels={"friction": "COLUMN [N]"}, or give mass= and stiffness= '
             "(0 where there is no spring)",
-        )  # fmt: skip
+        )
     told = {name: value for name in ("damping", "damper", "contact") if (value := getattr(rig, name)) is not None}
     return friction_force(record, mass=rig.mass, stiffness=rig.stiffness, **told)
 
@@ -140,9 +140,10 @@ def _oscillator(rig: RigSettings, system: object) -> Oscillator:
     constants = {name: getattr(rig, name) for name in ("mass", "stiffness")}
     if missing := [name for name, value in constants.items() if value is None]:
         raise ModelError(
-            f"no {' and no '.join(missing)}", "a law is fitted by simulating the oscillator",
+            f"no {' and no '.join(missing)}",
+            "a law is fitted by simulating the oscillator",
             f"give {' and '.join(f'{name}=' for name in missing)}",
-        )  # fmt: skip
+        )
     drive = BASE if rig.contact == "base" else Release()
     numbers = {name: float(value or 0.0) for name, value in {**constants, "damping": rig.damping}.items()}
     return Oscillator(**numbers, damper=rig.damper, law=Coulomb(1.0), drive=drive)
@@ -156,9 +157,10 @@ def with_stated(system: Oscillator, rig: RigSettings) -> Oscillator:
     if "contact" in stated and not hasattr(system.drive, "contact"):
         if stated.pop("contact") == "base" and not isinstance(system.drive, Release):
             raise ModelError(
-                f"contact = 'base' under a {type(system.drive).__name__}", "a base is what the drive moves",
+                f"contact = 'base' under a {type(system.drive).__name__}",
+                "a base is what the drive moves",
                 "leave contact= out, or give a drive of the base",
-            )  # fmt: skip
+            )
         stated |= {"drive": BASE} if rig.contact == "base" else {}
     return system.having(**stated)
 

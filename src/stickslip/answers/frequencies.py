@@ -176,9 +176,7 @@ def time_frequency(
         found, notes = _spikes_and_sticks(first, name, mass, stiffness)
         ridges = tuple(find_ridges(wavelets)[:5])
         return TimeFrequency(record_name(first), first, name, wavelets, ridges, **found, notes=tuple(notes))
-    wavelets = wavelet_overview(
-        itertools.chain([first], () if second is None else (second,), parts), name, **options
-    )  # fmt: skip
+    wavelets = wavelet_overview(itertools.chain([first], () if second is None else (second,), parts), name, **options)
     begin = first.rows(0, min(LONG, len(first)))
     found, notes = _spikes_and_sticks(begin, name, mass, stiffness)
     long = (
@@ -187,7 +185,7 @@ def time_frequency(
     )
     return TimeFrequency(
         record_name(first), first if second is None else begin, name, wavelets, **found, notes=(long, *notes)
-    )  # fmt: skip
+    )
 
 
 def _spikes_and_sticks(
@@ -237,9 +235,10 @@ def chosen_channel(record: Record, channel: str | None) -> str:
     swings = next((name for name in record if not _runs_on(record[name])), None)
     if swings is None:
         raise RecordError(
-            f"channels {', '.join(record)} only rise or only fall", "a clock or a ramp is no vibration to be mapped",
+            f"channels {', '.join(record)} only rise or only fall",
+            "a clock or a ramp is no vibration to be mapped",
             "name the channels of the file, or the one that is meant",
-        )  # fmt: skip
+        )
     return swings
 
 

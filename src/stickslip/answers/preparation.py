@@ -121,7 +121,7 @@ def without(record: Record, *names: str) -> Record:
         return record
     return replace(
         record, samples={name: record[name] for name in kept}, channels={n: record.channels[n] for n in kept}
-    )  # fmt: skip
+    )
 
 
 def _weighed(record: Record, rig: RigSettings, asked: Asked) -> RigSettings:

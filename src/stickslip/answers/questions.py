@@ -336,7 +336,7 @@ def flagged(found: Any, reason: Doubt | str) -> Any:
     numbers = {each.name: getattr(found, each.name) for each in fields(found)}
     return replace(
         found, **{name: flagged(value, reason) for name, value in numbers.items() if isinstance(value, Estimate)}
-    )  # fmt: skip
+    )
 
 
 def _contradiction(told: Consistency | None) -> str:

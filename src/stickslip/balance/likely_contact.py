@@ -340,9 +340,11 @@ class _Search:
         def highest(log_stiffness: float) -> float:
             reach = self.critical(log_stiffness)
             optimum = minimize_scalar(
-                lambda c: -self.likelihood(log_stiffness, c), bounds=(-0.1 * reach, reach), method="bounded",
+                lambda c: -self.likelihood(log_stiffness, c),
+                bounds=(-0.1 * reach, reach),
+                method="bounded",
                 options={"xatol": min(0.1 * unsure, 1e-2 * reach)},
-            )  # fmt: skip
+            )
             return max(-float(optimum.fun), self.likelihood(log_stiffness, best[1]))  # the search is of one valley
 
         top = highest(best[0])

@@ -393,10 +393,12 @@ def _lag(parts: Array, value: float, open_: float, fs: float, against: Estimate 
         low, high = against.interval
         floor = CERTAIN / fs
         return replace(
-            against, name="lag of the displacement", value=-against.value,
+            against,
+            name="lag of the displacement",
+            value=-against.value,
             interval=(min(-high, -against.value - floor), max(-low, -against.value + floor)),
             method="its phases against the accelerometer's",
-        )  # fmt: skip
+        )
     lag = mean_of_cycles("lag of the displacement", parts, unit="s", method="the friction's shape at the reversals")
     half = (lag.interval[1] - lag.interval[0]) / 2 + open_
     return replace(lag, value=value, interval=(value - half, value + half), sd=half / NORMAL_95)

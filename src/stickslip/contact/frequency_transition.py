@@ -149,9 +149,11 @@ def transition_of(ringing: Ringing, mass: Constant | None, stiffness: Constant |
     frequency, damping = pooled.possible(ringing.fs)
     wavelet = _by_wavelet([stick.wavelet_frequency for stick in sticks])
     amplitude = mean_of_cycles(
-        "transition amplitude", [stick.amplitude.value for stick in sticks], unit=unit,
+        "transition amplitude",
+        [stick.amplitude.value for stick in sticks],
+        unit=unit,
         method="of the first ring of each stick, at its begin; mean of sticks",
-    )  # fmt: skip
+    )
 
     doubt = ringing.doubt or not_one_mode(ringing)
 

@@ -222,19 +222,21 @@ def columns(observed: Mapping[str, float]) -> NDArray[np.float64]:
 
     Noise counts from where it is larger than the pieces' misfit: less leaves them as they are, and moves no verdict.
     """
-    return np.array([
-        math.log10(observed["loudness"] + 0.005),
-        math.log10(min(max(observed["excess"], 1.0), 10.0)),
-        math.log10(min(max(observed["rest"] / max(observed["excess"], 1.0), 1.0), 1e3)),
-        math.log10(min(max(observed["noise"], MISFIT), 0.3)),
-        min(observed["glides"], 6.0),
-        min(observed["glides"], 1.0),
-        min(observed["shortest"], 1.0),
-        1 / (1 + math.exp((min(observed["shortest"], 1.0) - 0.24) / 0.01)),
-        min(observed["longest"], 3.0),
-        observed["damping"],
-        observed["glided"],
-    ])  # fmt: skip
+    return np.array(
+        [
+            math.log10(observed["loudness"] + 0.005),
+            math.log10(min(max(observed["excess"], 1.0), 10.0)),
+            math.log10(min(max(observed["rest"] / max(observed["excess"], 1.0), 1.0), 1e3)),
+            math.log10(min(max(observed["noise"], MISFIT), 0.3)),
+            min(observed["glides"], 6.0),
+            min(observed["glides"], 1.0),
+            min(observed["shortest"], 1.0),
+            1 / (1 + math.exp((min(observed["shortest"], 1.0) - 0.24) / 0.01)),
+            min(observed["longest"], 3.0),
+            observed["damping"],
+            observed["glided"],
+        ]
+    )
 
 
 @functools.cache

@@ -166,9 +166,11 @@ def _compliance(strokes: Sequence[Stroke], name: str, unit: str) -> Estimate:
             "sample faster",
         )
     return mean_of_cycles(
-        name, [slope for _, slope in lines], unit=unit,
+        name,
+        [slope for _, slope in lines],
+        unit=unit,
         method=f"displacement on friction, {LOW:g} to {HIGH:g} of its level, mean of strokes",
-    )  # fmt: skip
+    )
 
 
 def _backlash(strokes: Strokes) -> Estimate | None:

@@ -198,9 +198,11 @@ def _borne(record: Record, strokes: Strokes) -> _Borne:
     )
     apart = float(np.median(peak.friction)) - float(np.median(pulled.friction))
     return replace(
-        peak, below=max(peak.below, apart + pulled.below), above=max(peak.above, pulled.above - apart),
+        peak,
+        below=max(peak.below, apart + pulled.below),
+        above=max(peak.above, pulled.above - apart),
         status=Status(sentence, peak.status),
-    )  # fmt: skip
+    )
 
 
 def _strays(rested: Sequence[Stroke], strokes: Strokes, fs: float) -> float:
@@ -381,9 +383,11 @@ def _swing(record: Record, strokes: Sequence[Stroke], side: str) -> Estimate | N
     if not squares:
         return None
     square = mean_of_cycles(
-        f"swing of the friction while sliding {side}", squares, unit="1",
+        f"swing of the friction while sliding {side}",
+        squares,
+        unit="1",
         method="median deviation from the median, less the noise",
-    )  # fmt: skip
+    )
     half = UNSURE * float(np.mean(noises))
     low, high = square.interval
     estimate = _root(replace(square, interval=(low - half, high + half), sd=float(np.hypot(square.sd, half / 2))))

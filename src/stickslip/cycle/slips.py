@@ -152,8 +152,10 @@ def slip_ringing(record: Record, *, contact: str | None = None) -> SlipRinging:
 
 def ringing_of(strokes: Sequence[Stroke], fs: float) -> SlipRinging | None:
     """How the friction of some strokes rings; None where it does not."""
-    forward, back = (_direction([stroke for stroke in strokes if stroke.way == way], side, fs)
-                     for way, side in ((1, "forward"), (-1, "back")))  # fmt: skip
+    forward, back = (
+        _direction([stroke for stroke in strokes if stroke.way == way], side, fs)
+        for way, side in ((1, "forward"), (-1, "back"))
+    )
     if forward is None and back is None:
         return None
     difference = None if forward is None or back is None else _difference(forward[0], back[0])

@@ -7,5 +7,6 @@ from stickslip.drives.kinds import Ramp as Ramp
 from stickslip.drives.kinds import Recorded as Recorded
 from stickslip.drives.kinds import Release as Release
 from stickslip.drives.kinds import SpeedProfile as SpeedProfile
+from stickslip.drives.later import Later as Later
 
 __all__: list[str]

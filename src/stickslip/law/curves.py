@@ -113,11 +113,13 @@ COULOMB = Family(
     _parameters("kinetic"), _named("kinetic", "offset"), lambda found: Coulomb(found["kinetic"]),
 )  # fmt: skip
 VISCOUS = Family(
-    "f = kinetic sign(v) + viscous v + offset", "v",
+    "f = kinetic sign(v) + viscous v + offset",
+    "v",
     lambda samples, logs: _with_offset(samples, np.sign(samples.velocity), samples.velocity),
-    _parameters("kinetic", "viscous"), _named("kinetic", "viscous", "offset"),
+    _parameters("kinetic", "viscous"),
+    _named("kinetic", "viscous", "offset"),
     lambda found: LinearSlope(found["kinetic"], slope=found["viscous"]),
-)  # fmt: skip
+)
 DRY_STRIBECK = Family(
     "f = (kinetic + (static - kinetic) exp(-(|v|/speed)^exponent)) sign(v) + offset", "v",
     _stribeck_columns, _parameters("kinetic", "static"),

@@ -186,8 +186,10 @@ def _loop(samples: Samples) -> _Loop:
     middle = _angle(mean, friction.mean(axis=0))
     phase = mean_of_cycles(
         f"phase of friction behind velocity at {1 / length:.3g} Hz",
-        middle + np.angle(np.exp(1j * (each - middle))), unit="rad", method="area of the loop, each cycle",
-    )  # fmt: skip
+        middle + np.angle(np.exp(1j * (each - middle))),
+        unit="rad",
+        method="area of the loop, each cycle",
+    )
     # a reversal lies between two samples, and its kink within the blur
     least = math.hypot(LEAST_PHASE, math.pi / points, BLURRED * math.pi * samples.blur / shortest)
     return _Loop(_at_least(phase, least), 1 / length, displacement.mean(axis=0), mean, way.mean(axis=0))

@@ -289,11 +289,13 @@ class Problem:
             if run is None:
                 return None
             told = stretch.told(run, delays)
-            columns.append([
-                # a jump that has crossed a sample has no slope
-                (near - raw) / STEP * (1.0 if here is None or there is None else here == there)
-                for (near, there), raw, here in zip(told, point.raw[j], point.pieces[j], strict=True)
-            ])  # fmt: skip
+            columns.append(
+                [
+                    # a jump that has crossed a sample has no slope
+                    (near - raw) / STEP * (1.0 if here is None or there is None else here == there)
+                    for (near, there), raw, here in zip(told, point.raw[j], point.pieces[j], strict=True)
+                ]
+            )
         return [np.column_stack(parts) for parts in zip(*columns, strict=True)]
 
 

@@ -178,13 +178,13 @@ def _start(orbit: SteadyState, parameter: str, to: float) -> float:
         raise ModelError(
             f"the orbit is '{orbit.status}'", "a branch starts at an orbit with the period of a drive", "find one"
         )
-    first = _value(orbit.orbit.system, parameter)
+    first = value_of(orbit.orbit.system, parameter)
     if not (math.isfinite(to) and to != first):
         raise ModelError(f"to = {to}", f"the far value is finite and not the first one, {first}", "give another")
     return first
 
 
-def _value(system: System, parameter: str) -> float:
+def value_of(system: System, parameter: str) -> float:
     """The parameter's value now, found where `having` would put it."""
     known = places(system)
     value, *others = [getattr(known[path], path[-1]) for path in find(system, parameter)]

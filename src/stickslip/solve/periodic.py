@@ -175,30 +175,38 @@ def _size(orbit: Trajectory) -> float:
 def _closed(system: System, table: Table, state: Array, mode: int, orders: int) -> SteadyState | None:
     """The orbit near a state, of the least order that closes; None where Newton finds none."""
     for order in range(1, orders + 1):
-        best: tuple[float, Trajectory | None, int] = (math.inf, None, 0)
-        point, where = state, mode
-        for _ in range(12):
-            try:
-                orbit = lap(system, table, point, where, order)
-            except SolveError:
-                break  # Newton's method left what moves; the motion itself goes on
-            end, after = orbit.end()
-            size = extent(orbit)
-            if point is not state and all(table.modes[held].friction is None for held in orbit.modes):
-                break  # Newton's method stepped to where the contact would rest; the motion itself does not
-            gap = (end - point)[: table.physical]
-            relative = float(np.max(np.abs(gap) / np.maximum(size, 1e-300), initial=0.0, where=size > 0))
-            if relative >= best[0]:
-                break
-            best = (relative, orbit, after)
-            jacobian, _ = derivative(orbit, after)
-            step, *_ = np.linalg.lstsq(np.eye(table.physical) - jacobian, gap, rcond=UNIT)
-            if np.any(np.abs(step) > 2 * size):
-                break
-            point, where = point.copy(), int(orbit.modes[0])
-            point[: table.physical] += step
-        if best[1] is not None and closes(best[1], best[0]):
-            return _least(system, table, best[1], best[2], order)
+        orbit = closed_orbit(system, table, state, mode, order)
+        if orbit is not None:
+            return orbit
+    return None
+
+
+def closed_orbit(system: System, table: Table, state: Array, mode: int, order: int) -> SteadyState | None:
+    """The orbit of so many periods of the drive near a state; None where Newton finds none."""
+    best: tuple[float, Trajectory | None, int] = (math.inf, None, 0)
+    point, where = state, mode
+    for _ in range(12):
+        try:
+            orbit = lap(system, table, point, where, order)
+        except SolveError:
+            break  # Newton's method left what moves; the motion itself goes on
+        end, after = orbit.end()
+        size = extent(orbit)
+        if point is not state and all(table.modes[held].friction is None for held in orbit.modes):
+            break  # Newton's method stepped to where the contact would rest; the motion itself does not
+        gap = (end - point)[: table.physical]
+        relative = float(np.max(np.abs(gap) / np.maximum(size, 1e-300), initial=0.0, where=size > 0))
+        if relative >= best[0]:
+            break
+        best = (relative, orbit, after)
+        jacobian, _ = derivative(orbit, after)
+        step, *_ = np.linalg.lstsq(np.eye(table.physical) - jacobian, gap, rcond=UNIT)
+        if np.any(np.abs(step) > 2 * size):
+            break
+        point, where = point.copy(), int(orbit.modes[0])
+        point[: table.physical] += step
+    if best[1] is not None and closes(best[1], best[0]):
+        return _least(system, table, best[1], best[2], order)
     return None
 
 

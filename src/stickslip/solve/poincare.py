@@ -126,6 +126,11 @@ def _carry(orbit: Trajectory, after: int, tangents: Array) -> float:
     return float(carry_tangents(table.linear, table.leap, Pieces(*pieces), after, tangents, work))
 
 
+def slowest_crossing(run: Trajectory) -> float:
+    """The slowest crossing of an exit of a run under linear modes, relative to the terms of its rate."""
+    return _carry(run, run.end()[1], np.empty((0, len(run.table.names))))
+
+
 def carried(orbit: Trajectory, after: int, difference: Array) -> Array:
     """A small difference of the physical state, carried along an orbit."""
     if isinstance(orbit, CurvedTrajectory):

@@ -16,6 +16,7 @@ from stickslip.oscillator import Oscillator
 from stickslip.parameters import finite
 from stickslip.solve import kernel
 from stickslip.solve.assembly import table_of
+from stickslip.solve.crossing import stopped
 from stickslip.solve.curved import degree, run_curved
 from stickslip.solve.delayed import delayed_tape, run_delayed
 from stickslip.solve.glide import Clock, Model, Pieces, blank_past, blank_pieces, until
@@ -45,6 +46,7 @@ def simulate(
     budget: int = 100_000,
     rtol: float = 1e-12,
     progress: Callable[[float], object] | None = None,
+    stop: Mapping[str, float] | None = None,
 ) -> Trajectory:
     """How does the system move?
 
@@ -69,6 +71,8 @@ def simulate(
         For curved laws: error of a step relative to the largest value each entry of the state has had.
     progress : callable, optional
         Called some ten times a second with the share of the time that is simulated, 0 to 1.
+    stop : mapping of str to float, optional
+        Outputs and levels: the run ends, "stopped", where the first of them crosses its level (``{"x": 1e-3}``).
 
     Returns
     -------
@@ -96,12 +100,25 @@ def simulate(
     """
     if not budget >= 1:
         raise ModelError(f"budget = {budget}", "a period has room for at least one event", "raise budget=")
+    if stop:
+        whole = duration if duration is not None else (cycles or 1.0) * _scale(system)
+
+        def march(time: float) -> Trajectory:
+            return simulate(system, duration=time, start=start, budget=budget, rtol=rtol, progress=progress)
+
+        return stopped(march, stop, whole, _scale(system))
     if is_curved(system):
         return _simulate_curved(system, (duration, cycles), start or {}, budget, rtol, progress)
     table = table_of(system)
     span = _end(system, table, duration, cycles)
     state, mode = opening(table, start or {})
     return run(system, table, state, mode, span=span, budget=budget, tell=paced(progress))
+
+
+def _scale(system: System) -> float:
+    """The period of the drive, without one the natural period, without either a second [s]."""
+    period = system.drive.motion().period
+    return period if math.isfinite(period) else 1 / system.frequency if system.frequency else 1.0
 
 
 def _simulate_curved(

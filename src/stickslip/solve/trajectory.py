@@ -212,6 +212,36 @@ class Trajectory:
         named = dict(zip(names, map(float, values[:, 0]), strict=True))
         return {**named, "mode": int(self.modes[piece[0]])}
 
+    def restart(self, time: float | None = None) -> dict[str, float | str]:
+        """The state at an instant as a start: with ``drive=Later(drive, time)`` another run goes on from there.
+
+        Numbers and the name of the mode, all that has to be kept of a run for it to go on, in another process as well.
+
+        Parameters
+        ----------
+        time : float, optional
+            Instant [s]; the end where left out.
+
+        Returns
+        -------
+        dict
+            What ``simulate(..., start=)`` takes.
+
+        Raises
+        ------
+        SolveError
+            The instant lies outside the simulated time, or the law's past is no state (a time lag).
+        """
+        at = self.duration if time is None else time
+        if hasattr(getattr(self.system, "law", None), "lag"):
+            raise SolveError("a law with a time lag", "its past is no state", "simulate the whole time at once")
+        values, piece = self.sample([at], ("state",))
+        names, mode = self.table.names[: self.table.physical], self.table.modes[int(self.modes[piece[0]])]
+        start: dict[str, float | str] = dict(zip(names, map(float, values[:, 0]), strict=True))
+        if mode.friction is None:  # what is held has the counter-face's velocity to the last digit
+            start.pop("v", None)
+        return {**start, "mode": mode.name}
+
     def instants(self, times: ArrayLike) -> Array:
         """Instants as an array, if the motion is known at the first and at the last."""
         times = np.ascontiguousarray(times, dtype=np.float64)

@@ -38,10 +38,11 @@ def of_comparison(comparison: Comparison) -> Story:
     """Several records side by side."""
     levels = [(each, each.level) for each in comparison.findings if each.level is not None]
     return Story(
-        f"{len(comparison.findings)} records compared", list(_together(comparison)),
+        f"{len(comparison.findings)} records compared",
+        list(_together(comparison)),
         lines=[Line.of(level, each.true_value(level), name=f"{level.name}, {each.name}") for each, level in levels],
         draw=lambda: plates_together(comparison),
-    )  # fmt: skip
+    )
 
 
 def _settings(findings: Findings) -> dict[str, str]:

@@ -80,8 +80,10 @@ def _cautions(atlas: Any) -> list[str]:
             "sel() and draw that with plot_map(), or sweep over fewer."
         )
     if counts.get("at rest") == atlas["status"].size:
-        cautions.append("Nothing moves anywhere: friction holds the mass at every point. Drive it harder, or near its "
-                        "own frequency.")  # fmt: skip
+        cautions.append(
+            "Nothing moves anywhere: friction holds the mass at every point. Drive it harder, or near its "
+            "own frequency."
+        )
     return cautions
 
 
@@ -104,36 +106,44 @@ def _settings(attributes: Mapping[str, Any]) -> dict[str, str]:
 def of_bifurcation(found: Bifurcation) -> Story:
     """Attractors along a parameter."""
     return _story(
-        "Motion along a parameter", "bifurcation", partial(plot_bifurcation, found),
+        "Motion along a parameter",
+        "bifurcation",
+        partial(plot_bifurcation, found),
         "Where the mass is once in each period of the drive: blue followed upwards, orange downwards; lines mark "
         "where the kind of motion changes. Below, the largest multiplier: at 1 the motion ceases to attract.",
-    )  # fmt: skip
+    )
 
 
 def of_basins(found: Basins) -> Story:
     """Attractors over starts."""
     return _story(
-        "Which start leads where", "basins", partial(plot_basins, found),
+        "Which start leads where",
+        "basins",
+        partial(plot_basins, found),
         "Each start in the colour of the motion it leads to; crosses: where that motion is at phase zero.",
-    )  # fmt: skip
+    )
 
 
 def of_boundary(found: Boundary) -> Story:
     """Where the kind of motion changes."""
     return _story(
-        "Where the kind of motion changes", "boundary", partial(plot_boundary, found),
+        "Where the kind of motion changes",
+        "boundary",
+        partial(plot_boundary, found),
         "Points: found by bisection of exact runs. Line: the closed form.",
-    )  # fmt: skip
+    )
 
 
 def of_dither(found: Dither) -> Story:
     """What dither leaves of the sticks and of the friction."""
     return _story(
-        "What dither does", "dither", partial(plot_dither, found),
+        "What dither does",
+        "dither",
+        partial(plot_dither, found),
         "Top: the longest stick left; below the line none outlasts a period of the dither. Bottom: the friction "
         "left on average, and what the averaged law says; where they part, friction moves the mass in a period, "
         "or the contact gives way.",
-    )  # fmt: skip
+    )
 
 
 def _story(title: str, name: str, draw: Callable[[], Any], caption: str) -> Story:

@@ -25,7 +25,7 @@ from stickslip.figures.trajectory import (
     pressed,
     sampled,
     stretches,
-)  # fmt: skip
+)
 from stickslip.files.write import require_form, write_record
 from stickslip.laws.formula import Formula
 from stickslip.parameters import PARTS

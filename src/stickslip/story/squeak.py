@@ -37,10 +37,12 @@ def of_findings(findings: Findings) -> Story:
 def of_comparison(comparison: Comparison) -> Story:
     """Several conditions; each by itself on the page, and in a line of the terminal."""
     return Story(
-        f"{len(comparison.conditions)} conditions compared", comparison.verdicts,
+        f"{len(comparison.conditions)} conditions compared",
+        comparison.verdicts,
         tables=[Table("Conditions", *_condition_table(comparison))],
-        draw=lambda: plates_together(comparison), data=lambda: _together(comparison),
-    )  # fmt: skip
+        draw=lambda: plates_together(comparison),
+        data=lambda: _together(comparison),
+    )
 
 
 def _data(found: Findings) -> dict[str, Any]:

@@ -1,0 +1,127 @@
+"""Where a branch of orbits changes, in the plane of two parameters: curves of folds, of grazing, of period doubling."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from stickslip.errors import ModelError
+from stickslip.solve.continuation import Branch, continue_orbit, value_of
+from stickslip.solve.doubling import period_doublings
+from stickslip.solve.orbit import SteadyState, cycle_of
+from stickslip.solve.tables import Array
+
+KINDS = ("fold", "grazing", "doubling")
+SHARPEST = 1e-9  # of the way of the branch: so near is a change known
+ROUNDS = 60
+
+
+@dataclass(frozen=True, eq=False)
+class Locus:
+    """A curve on which a branch of orbits changes.
+
+    Attributes
+    ----------
+    kind : str
+        "fold", "grazing" (the cycle of modes changes) or "doubling".
+    parameters : tuple of str
+        The one along the branch, and the second one.
+    points : ndarray (K, 2)
+        Values of both, in the order of the second; the first is nan where the change was not met.
+    orbits : tuple of SteadyState or None
+        The orbit at, or just before, each change.
+    """
+
+    kind: str
+    parameters: tuple[str, str]
+    points: Array
+    orbits: tuple[SteadyState | None, ...]
+
+
+def locus(branch: Branch, kind: str, parameter: str, values: Sequence[float], *, number: int = 0) -> Locus:
+    """How does a change of a branch move with a second parameter?
+
+    The branch's first orbit is carried to each value of the second parameter in turn, and continued along the first
+    parameter over the same range; the change there is closed in on to 1e-9 of the way.
+
+    Parameters
+    ----------
+    branch : Branch
+        From :func:`continue_orbit`, with a change of that kind.
+    kind : str
+        "fold", "grazing" or "doubling".
+    parameter : str
+        The second parameter, a name that ``having`` takes.
+    values : sequence of float
+        Its values, each near the one before.
+    number : int
+        Which change of that kind along the branch, from 0.
+
+    Returns
+    -------
+    Locus
+
+    Raises
+    ------
+    ModelError
+        The kind is none of the three, or the branch has no such change.
+
+    Examples
+    --------
+    The boundary beyond which Den Hartog's motion has stops:
+
+    >>> import stickslip as ss
+    >>> branch = ss.solve.continue_orbit(ss.steady_state(ss.scenarios.forced(0.8, 0.7)), "kinetic", to=0.9)
+    >>> curve = locus(branch, "grazing", "drive.frequency", [0.8 / 6.283185307179586])
+    >>> curve.points.round(6).tolist()
+    [[0.817406, 0.127324]]
+    """
+    if kind not in KINDS:
+        raise ModelError(f"kind = '{kind}'", f"a change is one of {', '.join(KINDS)}", "choose one of them")
+    if _change(branch, kind, number) is None:
+        raise ModelError(
+            f"{branch!r} without a {kind}", "a curve begins at a change that is known", "continue it farther"
+        )
+    low, high = float(branch.values[0]), float(branch.values[-1])
+    orbit = branch.orbits[0]
+    points, orbits = [], list[SteadyState | None]()
+    for value in map(float, values):
+        if value != value_of(orbit.orbit.system, parameter):
+            orbit = continue_orbit(orbit, parameter, to=value, step=0.5).orbits[-1]
+        own = continue_orbit(orbit, branch.parameter, to=high)
+        found = _change(own, kind, number)
+        place, at = (np.nan, None) if found is None else _sharpened(own, kind, found, high - low)
+        points.append((place, value))
+        orbits.append(at)
+    return Locus(kind, (branch.parameter, parameter), np.array(points).reshape(-1, 2), tuple(orbits))
+
+
+def _change(branch: Branch, kind: str, number: int) -> int | None:
+    """Which orbit of a branch is the first behind a change, or at it."""
+    found = {"fold": branch.folds, "grazing": branch.changes, "doubling": period_doublings(branch)}[kind]
+    return found[number] if number < len(found) else None
+
+
+def _sharpened(branch: Branch, kind: str, j: int, way: float) -> tuple[float, SteadyState]:
+    """The value of the parameter at a change, and the orbit there or just before; a fold is there already."""
+    if kind == "fold":
+        return float(branch.values[j]), branch.orbits[j]
+    before, low, high = branch.orbits[j - 1], float(branch.values[j - 1]), float(branch.values[j])
+    for _ in range(ROUNDS):
+        if abs(high - low) <= SHARPEST * abs(way):
+            break
+        middle = (low + high) / 2
+        there = continue_orbit(before, branch.parameter, to=middle, step=1.0).orbits[-1]
+        if _changed(kind, before, there):
+            high = middle
+        else:
+            low, before = middle, there
+    return (low + high) / 2, before
+
+
+def _changed(kind: str, before: SteadyState, there: SteadyState) -> bool:
+    if kind == "grazing":
+        return cycle_of(before) != cycle_of(there)
+    return bool(np.min(there.multipliers.real) < -1.0)
