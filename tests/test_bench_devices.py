@@ -88,6 +88,8 @@ def test_a_shaker_is_asked_for_no_more_than_it_can() -> None:
         for tone, said in ((Tone(6e-3, 1.0), "stroke"), (Tone(1e-3, 60.0), "60 Hz"), (Tone(1e-3, 40.0), "force")):
             with pytest.raises(ss.errors.ModelError, match=said):
                 stream.drive("base", tone)
+        with pytest.raises(ss.errors.ModelError, match="from 0 to 2000 Hz"):
+            Sim(fast=True).open().drive("base", Tone(1e-3, 1e9))
         with pytest.raises(ss.errors.ModelError, match="its outputs: base"):
             stream.drive("table", Tone(1e-3, 1.0))
 

@@ -39,7 +39,8 @@ def test_nothing_else_is_said_to_rub(benchmark: ModuleType, kind: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("kind", "seed"), [("flutes", 1), ("flutes", 10), ("whines", 8), ("whines", 20), ("kettles", 12), ("sirens", 18)]
+    ("kind", "seed"),
+    [("flutes", 1), ("flutes", 10), ("whines", 8), ("whines", 20), ("kettles", 12), ("sirens", 18), ("birds", 910_018)],
 )
 def test_what_sounds_like_a_squeak_without_any_friction_is_not_said_to_rub(kind: str, seed: int) -> None:
     sound = sound_strangers.draw(kind, seed)  # each was called a squeal by its overtones alone

@@ -24,6 +24,10 @@ from stickslip.bench.free import best_constants as best_constants
 from stickslip.bench.free import free_vibration as free_vibration
 from stickslip.bench.free import onto_stick as onto_stick
 from stickslip.bench.known import Known as Known
+from stickslip.bench.monitor import Cycle as Cycle
+from stickslip.bench.monitor import Flaw as Flaw
+from stickslip.bench.monitor import Monitor as Monitor
+from stickslip.bench.monitor import answers as answers
 from stickslip.bench.recording import Acquired as Acquired
 from stickslip.bench.recording import Tape as Tape
 from stickslip.bench.recording import Trigger as Trigger

@@ -24,7 +24,11 @@ from stickslip.parameters import finite
 from stickslip.record.channels import Channel, checked_name, described
 from stickslip.settings import nearest
 
-DRIVERS = ("sim",)  # modules beside this one
+# the kinds of device, each with its module beside this one
+DRIVERS = {"sim": "sim", "file": "replay", "sound": "sound", "ni": "ni", "ldaq": "ldaq", "serial": "serial"}
+
+# what to install for a package; LDAQ brings a web server and more, and is no part of an extra
+INSTALLED = {"serial": "pyserial", "sounddevice": "sounddevice", "nidaqmx": "nidaqmx", "LDAQ": "LDAQ"}
 
 Array = NDArray[np.float64]
 
@@ -336,10 +340,10 @@ def driver(kind: str) -> ModuleType:
         raise ModelError(
             f"no device is of the kind '{kind}'", f"there are {', '.join(DRIVERS)}", nearest(kind, DRIVERS)
         )
-    return importlib.import_module(f"stickslip.bench.{kind}")
+    return importlib.import_module(f"stickslip.bench.{DRIVERS[kind]}")
 
 
-def vendors(package: str, *, extra: str = "bench") -> ModuleType:
+def vendors(package: str) -> ModuleType:
     """A vendor's package, or a sentence that says how to install it."""
     try:
         return importlib.import_module(package)
@@ -347,7 +351,7 @@ def vendors(package: str, *, extra: str = "bench") -> ModuleType:
         raise ModelError(
             f"the package {package} can not be imported ({error})",
             "this device is reached through it",
-            f'install it with: pip install "stickslip[{extra}]", and the vendor\'s library if it asks for one',
+            f"install it with: pip install {INSTALLED[package.partition('.')[0]]}, and the vendor's driver if need be",
         ) from error
 
 
@@ -407,11 +411,19 @@ def devices() -> tuple[Found, ...]:
     return tuple(map(_found, DRIVERS))
 
 
+def _there(package: str) -> bool:
+    """Whether a package can be imported, without importing it."""
+    try:
+        return importlib.util.find_spec(package) is not None
+    except ValueError:  # it was looked for already, in vain
+        return False
+
+
 def _found(kind: str) -> Found:
     module = driver(kind)
     about = str(module.__doc__).partition("\n")[0]
-    if module.NEEDS and importlib.util.find_spec(module.NEEDS) is None:
-        return Found(kind, about, (), f'{module.NEEDS}: pip install "stickslip[bench]"')
+    if module.NEEDS and not _there(module.NEEDS):
+        return Found(kind, about, (), f"{module.NEEDS}: pip install {INSTALLED[module.NEEDS]}")
     listed: Callable[[], Sequence[str]] = module.listed
     try:
         return Found(kind, about, tuple(listed()), "")

@@ -175,7 +175,8 @@ class Sim:
     @cached_property
     def outputs(self) -> tuple[Output, ...]:
         """The base, or a force on the mass; none where the counter-face alone moves."""
-        motion, limits = self.system.drive.motion(), self.shaker
+        motion = self.system.drive.motion()
+        limits = replace(self.shaker, highest=min(self.shaker.highest, self.fs / 2))  # what samples could say
         base, force = replace(limits, name="base", unit="m"), replace(limits, name="force", unit="N")
         if isinstance(self.system.drive, Release):
             return (base, replace(force, stroke=math.inf))

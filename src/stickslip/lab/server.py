@@ -22,7 +22,7 @@ from starlette.staticfiles import StaticFiles
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
 import stickslip as ss
-from stickslip.lab import data, maps, play
+from stickslip.lab import data, live, maps, play
 from stickslip.lab.openapi import described, document
 from stickslip.lab.security import Guard
 from stickslip.lab.workers import Workers
@@ -36,7 +36,7 @@ HURRY = 3.0  # s for those that come when there are more: an honest one sends it
 # but on a busy machine even that was seen to take more than a second
 
 
-def lab_app(*, token: str, port: int) -> Starlette:
+def lab_app(*, token: str, port: int, place: live.Place | None = None) -> Starlette:
     """The application: guarded, with its page and all that the page asks for.
 
     Parameters
@@ -45,12 +45,14 @@ def lab_app(*, token: str, port: int) -> Starlette:
         The secret that every request states, in its cookie or as a bearer.
     port : int
         Where it will listen: requests for another host or port are refused.
+    place : live.Place, optional
+        The devices that may be watched, and where recordings go; the virtual rig and the current folder where left out.
 
     Returns
     -------
     Starlette
     """
-    return Starlette(
+    app = Starlette(
         routes=[*_routes(), Mount("/", StaticFiles(directory=PAGE, html=True))],
         middleware=[Middleware(Guard, token=token, port=port)],
         exception_handlers={
@@ -61,6 +63,8 @@ def lab_app(*, token: str, port: int) -> Starlette:
         },
         lifespan=_lifespan,
     )
+    app.state.place = place or live.Place()
+    return app
 
 
 def _routes() -> list[BaseRoute]:
@@ -68,6 +72,7 @@ def _routes() -> list[BaseRoute]:
         *play.routes,
         *maps.routes,
         *data.routes,
+        *live.routes,
         Route("/openapi.json", _openapi),
         Route("/alive", _alive),
     ]
@@ -79,6 +84,7 @@ async def _lifespan(app: Starlette) -> AsyncIterator[None]:
         app.state.workers = await stack.enter_async_context(Workers(WORKERS))
         app.state.opened = asyncio.Event()
         await stack.enter_async_context(data.lifespan(app))
+        await stack.enter_async_context(live.lifespan(app, app.state.place))
         beside = [
             asyncio.create_task(play.warmed(app.state.workers, app.state.opened)),
             asyncio.create_task(_shut(app.state.data.folder / DOORWAY, app.state.opened)),

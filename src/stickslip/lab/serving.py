@@ -41,9 +41,17 @@ def listening(port: int) -> socket.socket:
     return door
 
 
-def serve(door: socket.socket, *, token: str, opened: Callable[[Callable[[str], Path]], None]) -> None:
+def serve(
+    door: socket.socket,
+    *,
+    token: str,
+    opened: Callable[[Callable[[str], Path]], None],
+    rig: Path | None = None,
+    records: Path | None = None,
+) -> None:
     """Answer at the door until Ctrl-C; `opened` is called when it does, with
-    what writes a page that leads a browser to an address.
+    what writes a page that leads a browser to an address. `rig` is the file of the rig whose devices may be watched,
+    and `records` the folder of recordings.
 
     Raises
     ------
@@ -53,7 +61,7 @@ def serve(door: socket.socket, *, token: str, opened: Callable[[Callable[[str], 
     try:
         import uvicorn
 
-        from stickslip.lab import server
+        from stickslip.lab import live, server
     except ImportError as error:
         raise ss.errors.ModelError(
             f"the lab needs the package {error.name}",
@@ -67,7 +75,7 @@ def serve(door: socket.socket, *, token: str, opened: Callable[[Callable[[str], 
             if self.started:
                 opened(partial(server.doorway, app.state.data.folder))
 
-    app = server.lab_app(token=token, port=door.getsockname()[1])
+    app = server.lab_app(token=token, port=door.getsockname()[1], place=live.place_of(rig, records))
     settings = uvicorn.Config(
         app,
         http=server.PatientProtocol,

@@ -4,11 +4,12 @@ import { start as startPlay } from "./play.js";
 
 if (location.pathname !== "/") localStorage.setItem("inside", location.pathname); // for enter.js; other ports do not see it
 const $ = (id) => document.getElementById(id);
-const TABS = ["play", "map", "data"];
+const TABS = ["play", "map", "data", "live"];
 const LEADS = {
   play: "Move a slider: the motion is computed anew, exactly, while you drag.",
   map: "Which motion is where: choose two parameters, then click a point to play it.",
   data: "Drop a record: get its friction.",
+  live: "Watch a rig as it is measured, and record it.",
 };
 const onTheme = [];
 
@@ -73,6 +74,10 @@ const opened = {
   data: () => {
     opened.data = null;
     import("./data.js").then((page) => page.start($("data"), lab));
+  },
+  live: () => {
+    opened.live = null;
+    import("./live.js").then((page) => page.start($("live"), lab));
   },
 };
 

@@ -1,0 +1,377 @@
+"""A rig as it is watched: cycle after cycle its loop, and which sensor is flat, noisy, clipped or late."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stickslip.balance.force import friction_force
+from stickslip.bench.device import Block, Device, Input, in_si
+from stickslip.cycle.loops import friction_loops
+from stickslip.cycle.sticks import find_sticks
+from stickslip.errors import StickslipError
+from stickslip.estimate import Estimate
+from stickslip.record.record import Record
+from stickslip.squeak.bursts import find_squeaks
+
+Array = NDArray[np.float64]
+
+NONE: Array = np.empty(0)
+SHORTEST = 16  # samples of a cycle
+MOVES = 8.0  # times its noise is the least span of what tells cycles
+
+POINTS = 240  # of a loop: more is not seen
+KEPT = 20.0  # s of samples that are looked back to, at the most
+CYCLES = 2  # that a check of the sensors looks at
+TOLD = 8  # that the numbers are of, where there are so many; three at the least
+HIGH = 0.2  # of the span of the motion, on either side of its middle: where a cycle is said to begin
+SLOWEST = 15.0  # s that a cycle may last
+# Set on the virtual rig's two presets with each fault, at 2.5, 5.6 and 11.1 Hz, and on none:
+ONLY_NOISE = 1.7  # times its noise: a channel whose deviation is less holds nothing else
+NOISIER = 3.0  # times the noise that it had in its first cycles
+NOISY = 0.5  # of its deviation: so much noise is said from the beginning
+STALLED = 1.6  # periods without a new cycle: then the channel that tells cycles is another one
+ALIKE = 0.05  # by how much two cycles may differ whose phase is looked at
+LATE = 4.0  # standard deviations
+LEAST_LATE = 1.5  # samples
+CLEAR = 0.2  # of the spring's force: a balance that leaves less tells no phase
+
+
+class Flaw(NamedTuple):
+    """What is wrong with a channel: "flat", "noisy", "clipped", "late" or "lost", and in words."""
+
+    channel: str
+    kind: str
+    words: str
+
+
+class Cycle(NamedTuple):
+    """One cycle: counter of its first sample, its length [s], its loop, and what is wrong with the sensors."""
+
+    first: int
+    period: float
+    x: Array
+    v: Array
+    friction: Array
+    flaws: tuple[Flaw, ...]
+
+
+@dataclass
+class Monitor:
+    """Watches the blocks of one device. Lives as long as it is open.
+
+    Parameters
+    ----------
+    device : Device
+        What measures.
+    constants : mapping of str to float
+        mass [kg], stiffness [N/m] and damping [N s/m] of the rig, where known.
+    """
+
+    device: Device
+    constants: Mapping[str, float] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        self.names = [one.name for one in self.device.inputs]
+        self.held: deque[tuple[int, Array]] = deque()
+        self.begins: deque[int] = deque(maxlen=TOLD + 1)  # counters at which cycles began
+        self.quiet: dict[str, list[float]] = {name: [] for name in self.names}
+        order = [name for name in ("z", "x", "v", "a") if name in self.names] or self.names[:1]
+        self.order = deque(self.names.index(name) for name in order)  # the base tells cycles if it moves, else the mass
+        self._afresh()
+        self.after, self.lost = 0, 0
+
+    def feed(self, block: Block) -> list[Cycle]:
+        """Look at a block; the cycles that end in it."""
+        if self.held and block.first != self.after:
+            self.lost += block.first - self.after
+            self.held.clear()  # nothing is looked at across a gap
+            self.begins.clear()
+        values = in_si(self.device, block)
+        self.held.append((block.first, values))
+        self.after = block.after
+        while self.after - self.held[0][0] > KEPT * self.device.fs:
+            self.held.popleft()
+        begun = self._beginnings(block.first, values)
+        if not begun and self._stalled():
+            return self._stall()
+        return [cycle for at in begun if (cycle := self._cycle(at)) is not None]
+
+    def _stall(self) -> list[Cycle]:
+        """What told cycles tells none any more: what is wrong since, and another channel's turn."""
+        period, first = self.begins[-1] - self.begins[-2], self.begins[-1]
+        rows = self._rows(self.after - period // 2, self.after)  # before that it still told cycles
+        self.order.rotate(-1)
+        self._afresh()
+        self.begins.clear()
+        if rows is None or rows.shape[1] < SHORTEST:
+            return []
+        flaws = self._flaws({}, rows, period / self.device.fs)
+        return [Cycle(first, period / self.device.fs, NONE, NONE, NONE, tuple(flaws))]
+
+    def _afresh(self) -> None:
+        """Nothing is known yet of the motion that tells cycles."""
+        self.low, self.top = math.inf, -math.inf
+        self.above: bool | None = None
+
+    def _stalled(self) -> bool:
+        """Whether cycles went on, and do no more."""
+        if len(self.begins) < 2:
+            return False
+        return self.after - self.begins[-1] > STALLED * (self.begins[-1] - self.begins[-2])
+
+    def window(self) -> Record | None:
+        """The last whole cycles; None before there are three."""
+        if len(self.begins) < 4:
+            return None
+        first, last = self.begins[max(0, len(self.begins) - 1 - TOLD)], self.begins[-1]
+        rows = self._rows(first, last)
+        if rows is None or not np.all(np.isfinite(rows)):
+            return None
+        channels = {one.name: one.channel for one in self.device.inputs}
+        samples = dict(zip(self.names, rows, strict=True))
+        return Record(samples, channels, self.device.fs, first / self.device.fs)
+
+    def _beginnings(self, first: int, values: Array) -> list[int]:
+        """Counters at which the base, or where it stands the mass, passes its middle upwards."""
+        row = values[self.order[0]]
+        row = row[np.isfinite(row)]
+        if not len(row):
+            return []
+        share = min(1.0, len(row) / (SLOWEST * self.device.fs))  # the extremes are forgotten slowly
+        middle = (self.low + self.top) / 2 if self.low < self.top else float(row[0])
+        self.low = min(self.low + share * (middle - self.low) if self.low < self.top else math.inf, float(row.min()))
+        self.top = max(self.top + share * (middle - self.top) if self.top > self.low else -math.inf, float(row.max()))
+        span, middle = self.top - self.low, (self.low + self.top) / 2
+        if span < MOVES * noise_of(row):
+            return []
+        marks = (row > middle + HIGH * span).astype(np.int8) - (row < middle - HIGH * span)
+        known = np.flatnonzero(marks)
+        found = []
+        for at in known[np.append(True, np.diff(marks[known]) != 0)[: len(known)]].tolist():
+            if marks[at] > 0 and self.above is False:
+                found.append(first + at)
+            self.above = bool(marks[at] > 0)
+        return found
+
+    def _rows(self, first: int, last: int) -> Array | None:
+        """Samples of all channels from one counter to another."""
+        if not self.held or self.held[0][0] > first:
+            return None
+        parts = [values[:, max(0, first - at) : last - at] for at, values in self.held if at < last]
+        return np.concatenate([part for part in parts if part.shape[1]], axis=1)
+
+    def _cycle(self, at: int) -> Cycle | None:
+        """The cycle that ends here."""
+        self.begins.append(at)
+        if len(self.begins) < 2:
+            return None
+        first, fs = self.begins[-2], self.device.fs
+        rows = self._rows(first, at)
+        if rows is None or rows.shape[1] < SHORTEST:
+            return None
+        channels = dict(zip(self.names, rows, strict=True))
+        x, v, friction = _loop(channels, self.constants, fs)
+        since = self.begins[max(0, len(self.begins) - 1 - CYCLES)]
+        last = self._rows(since, at)
+        several = dict(zip(self.names, rows if last is None else last, strict=True))
+        count = 1 if last is None else len(self.begins) - 1 - max(0, len(self.begins) - 1 - CYCLES)
+        flaws = self._flaws(several, rows, len(several[self.names[0]]) / count / fs)
+        return Cycle(first, (at - first) / fs, x, v, friction, tuple(flaws))
+
+    def _flaws(self, channels: Mapping[str, Array], last: Array, period: float) -> list[Flaw]:
+        """What is wrong with each sensor in the last cycles."""
+        found = []
+        for one, cycle in zip(self.device.inputs, last, strict=True):
+            noise = noise_of(cycle)
+            known = self.quiet[one.name]
+            flaw = _flaw(one, cycle, noise, float(np.median(known)) if known else math.nan)
+            if flaw is None and len(known) < 3:
+                known.append(noise)
+            found += [flaw] if flaw else []
+        broken = {flaw.channel for flaw in found}
+        sound = {name: values for name, values in channels.items() if name not in broken}
+        return found + _late(sound, self.device.inputs, self.constants, (period, self.device.fs))
+
+
+def noise_of(values: Array) -> float:
+    """Standard deviation of white noise, by third differences without their largest tenth: jumps do not count."""
+    steps = np.sort(np.abs(np.diff(values[np.isfinite(values)], 3)))
+    least = steps[: math.ceil(0.9 * len(steps))]
+    # the third difference of unit noise deviates by sqrt(20); the lower nine tenths of |normal| have the mean 0.657
+    return float(np.mean(least) / 0.657 / math.sqrt(20)) if len(least) else math.nan
+
+
+def _flaw(one: Input, values: Array, noise: float, before: float) -> Flaw | None:
+    """What is wrong with one channel in a cycle, the worst first."""
+    finite = values[np.isfinite(values)]
+    if len(finite) < 0.5 * len(values):
+        return Flaw(one.name, "lost", f"{one.name} gives no numbers")
+    clipped = int(np.sum(np.abs(finite) >= one.limit * (1 - 1e-9)))
+    if clipped:
+        return Flaw(one.name, "clipped", f"{one.name} stands at the end of its range in {clipped} samples of the cycle")
+    deviation = float(np.std(finite))
+    if deviation == 0 or deviation < ONLY_NOISE * noise:
+        return Flaw(one.name, "flat", f"{one.name} is flat: nothing but noise of {deviation:.2g} {one.unit}")
+    usual = f", {noise / before:.1f} times its usual one" if before > 0 else ""
+    if noise > NOISY * deviation or (noise > NOISIER * before > 0 and noise > 0.02 * deviation):
+        return Flaw(one.name, "noisy", f"{one.name} is noisy: {noise:.2g} {one.unit}{usual}")
+    return None
+
+
+def _late(
+    channels: Mapping[str, Array], inputs: Sequence[Input], constants: Mapping[str, float], times: tuple[float, float]
+) -> list[Flaw]:
+    """Channels that come after the acceleration, by the phase of the cycle's first harmonic.
+
+    a = -w^2 x, and the load is what m a + k (x - z) leaves. Stated delays are expected.
+    """
+    if not {"x", "a"} <= set(channels):
+        return []
+    period, fs = times
+    omega = 2 * math.pi / period
+    expected = {one.name: _expected(one) for one in inputs}
+    if not all(_settled(values, omega, fs) for values in channels.values()):
+        return []
+    lines = {name: _line(values, omega, fs) for name, values in channels.items()}
+    a, sd = lines["a"]
+    x, noise = lines["x"]
+    lag, error = -float(np.angle(-(omega**2) * x / a)) / omega, math.hypot(noise / abs(x), sd / abs(a)) / omega
+    lag += expected["a"]
+    found = _judged("x", lag - expected["x"], error, fs)
+    lag = lag if found else expected["x"]
+    whole = "z" in channels or not any(one.name == "z" for one in inputs)
+    if whole and "load" in channels and {"mass", "stiffness"} <= set(constants):
+        mass, stiffness, turn = constants["mass"], constants["stiffness"], 1j * omega
+        z = lines["z"][0] if "z" in lines else 0j
+        stated = any(one.name == "z" and "delay" in one.details for one in inputs)
+        late = expected["z"] if stated else lag  # of the same make as x, where nothing is stated
+        spring = stiffness * (x * np.exp(turn * lag) - z * np.exp(turn * late))
+        due = -(mass * a * np.exp(turn * expected["a"]) + spring)
+        if abs(due) > CLEAR * abs(spring):
+            own = math.hypot(mass * sd, stiffness * noise) / abs(due) / omega
+            error = math.hypot(own, error * abs(spring) / abs(due), lines["load"][1] / abs(lines["load"][0]) / omega)
+            found += _judged("load", -float(np.angle(lines["load"][0] / due)) / omega - expected["load"], error, fs)
+    return found
+
+
+def _judged(name: str, lag: float, error: float, fs: float) -> list[Flaw]:
+    """Whether a channel is late by more than chance and a sample; told with twice its deviation."""
+    if lag <= LATE * error or lag <= LEAST_LATE / fs:
+        return []
+    return [Flaw(name, "late", f"{name} comes {1e3 * lag:.2f} ± {2e3 * error:.2f} ms late")]
+
+
+def _settled(values: Array, omega: float, fs: float) -> bool:
+    """Whether the first half, a cycle or more, is like the second: else its harmonics are no steady ones."""
+    half = len(values) // 2
+    (first, noise), (second, _) = (_line(part, omega, fs) for part in (values[:half], values[half : 2 * half]))
+    return abs(first - second) <= ALIKE * abs(second) + 2 * LATE * noise
+
+
+def _expected(one: Input) -> float:
+    """How late [s] a channel is known to be: its delay, and its mount's well below the resonance."""
+    frequency, damping = one.details.get("mount") or (math.inf, 0.0)
+    return float(one.details.get("delay", 0.0)) + 2 * damping / (2 * math.pi * frequency)
+
+
+def _line(values: Array, omega: float, fs: float) -> tuple[complex, float]:
+    """The amplitude of a frequency [rad/s] in whole cycles of it, and its standard deviation by the noise."""
+    turn = np.exp(-1j * omega * np.arange(len(values)) / fs)
+    known = np.isfinite(values)
+    amplitude = complex(2 * np.mean((values[known] - np.mean(values[known])) * turn[known]))
+    return amplitude or 1e-300 + 0j, noise_of(values) * math.sqrt(2 / len(values))
+
+
+def _loop(channels: Mapping[str, Array], constants: Mapping[str, float], fs: float) -> tuple[Array, Array, Array]:
+    """Displacement, velocity and friction of a cycle, averaged in `POINTS` parts of it; empty where not measured."""
+    count = len(next(iter(channels.values())))
+    points = min(POINTS, count // 4)
+    edges = np.linspace(0, count, points + 1).astype(int)[:-1]
+    means = {name: np.add.reduceat(v, edges) / np.diff(np.append(edges, count)) for name, v in channels.items()}
+    step = count / points / fs
+    x = means.get("x", np.empty(0))
+    v = means["v"] if "v" in means else _slope(x, step) if len(x) else x
+    if "load" in means:
+        return x, v, means["load"]
+    if not len(x) or not {"mass", "stiffness"} <= set(constants):
+        return x, v, np.empty(0)
+    a = means["a"] if "a" in means else _slope(v, step)
+    spring = constants["stiffness"] * (x - means.get("z", np.zeros(points)))
+    return x, v, -constants["mass"] * a - constants.get("damping", 0.0) * v - spring
+
+
+def _slope(values: Array, step: float) -> Array:
+    """Derivative of something that repeats."""
+    return (np.roll(values, -1) - np.roll(values, 1)) / (2 * step)
+
+
+class Row(NamedTuple):
+    """A number of the last cycles: name, value, 95 % interval, unit; NaN where no interval is known."""
+
+    name: str
+    value: float
+    low: float
+    high: float
+    unit: str
+
+
+def answers(record: Record, constants: Mapping[str, float]) -> tuple[list[Row], list[str]]:
+    """What do a few cycles tell, by the questions that any record is asked?
+
+    Parameters
+    ----------
+    record : Record
+        Some whole cycles.
+    constants : mapping
+        mass, stiffness, damping.
+
+    Returns
+    -------
+    rows : list of Row
+        Friction level, stops per cycle, stuck share, and the pitch of the loudest squeak.
+    untold : list of str
+        A sentence for each question that could not be answered.
+    """
+    rows: list[Row] = []
+    untold: list[str] = []
+    questions: list[Callable[[], list[Row]]] = [lambda: _friction(record, constants)]
+    questions += [lambda name=name: _squeaks(record, name) for name in ("sound", "ay") if name in record]  # type: ignore[misc]
+    for question in questions:
+        try:
+            rows += question()
+        except StickslipError as error:
+            untold.append(str(error))
+    return rows, untold
+
+
+def _friction(record: Record, constants: Mapping[str, float]) -> list[Row]:
+    forced = _forced(record, constants)
+    rows = [_row("friction level", friction_loops(forced).level)]
+    sticks = find_sticks(forced)
+    return [*rows, _row("stops per cycle", sticks.per_cycle), _row("stuck share", sticks.share)]
+
+
+def _row(name: str, estimate: Estimate) -> Row:
+    return Row(name, estimate.value, *estimate.interval, estimate.unit)
+
+
+def _forced(record: Record, constants: Mapping[str, float]) -> Record:
+    if {"mass", "stiffness"} <= set(constants) and "x" in record:
+        known = {name: constants.get(name, 0.0) for name in ("mass", "stiffness", "damping")}
+        return friction_force(record, **known)  # type: ignore[arg-type]
+    return record.with_channel("friction", record["load"], unit="N", source="load")
+
+
+def _squeaks(record: Record, channel: str) -> list[Row]:
+    bursts = find_squeaks(record, channel=channel).bursts
+    if not bursts:
+        return []
+    loudest = max(bursts, key=lambda burst: burst.level)
+    return [Row(f"{loudest.kind} in {channel}", loudest.frequency, math.nan, math.nan, "Hz")]

@@ -1,0 +1,85 @@
+"""The rig as it is watched: each fault of a sensor is named within two cycles or so, and none where there is none."""
+
+from __future__ import annotations
+
+import pytest
+
+import stickslip as ss
+from stickslip.bench import Cycle, Fault, Monitor, Sim, Tone, answers, blocks
+from stickslip.bench.sim import air_track
+
+RIG = {"mass": 2.42, "stiffness": 2310.0}
+PULLED = 3.0  # s
+
+
+def watched(device: Sim, seconds: float) -> tuple[Monitor, list[Cycle]]:
+    monitor, cycles = Monitor(device, RIG), []
+    with device.open() as stream:
+        for block in blocks(stream, count=int(seconds * device.fs)):
+            cycles += monitor.feed(block)
+    return monitor, cycles
+
+
+@pytest.mark.parametrize("frequency", [2.5, 5.61, 11.1])
+def test_nothing_is_wrong_with_sensors_that_are_stated(frequency: float) -> None:
+    monitor, cycles = watched(Sim(air_track().having(frequency=frequency), fast=True, stated=True, seed=7), 4.0)
+    assert abs(len(cycles) - 4.0 * frequency) < 3
+    assert not [flaw for cycle in cycles for flaw in cycle.flaws]
+    window = monitor.window()
+    assert window is not None
+    rows, untold = answers(window, RIG)
+    assert not untold
+    assert rows[0].name == "friction level"
+    assert abs(rows[0].value - 1.1) < 0.05
+
+
+@pytest.mark.parametrize("channel", ["x", "z", "a", "load"])
+def test_a_cable_that_is_pulled_is_named(channel: str) -> None:
+    device = Sim(fast=True, stated=True, faults=(Fault("cable", PULLED, channel=channel),), seed=5)
+    _, cycles = watched(device, PULLED + 1.0)
+    flaws = [(cycle.first / device.fs + cycle.period, flaw) for cycle in cycles for flaw in cycle.flaws]
+    assert {(flaw.channel, flaw.kind) for _, flaw in flaws} == {(channel, "flat")}
+    assert flaws[0][0] < PULLED + 2 / 2.5
+
+
+def test_a_range_that_is_passed_is_named() -> None:
+    _, cycles = watched(
+        Sim(fast=True, stated=True, faults=(Fault("saturation", PULLED, channel="load"),)), PULLED + 0.5
+    )
+    assert {(flaw.channel, flaw.kind) for cycle in cycles for flaw in cycle.flaws} == {("load", "clipped")}
+
+
+@pytest.mark.parametrize(("channel", "late"), [("x", ("x", "z")), ("load", ("load",))])
+def test_a_sensor_that_is_late_is_named(channel: str, late: tuple[str, ...]) -> None:
+    rig = ss.Rig.perfect()
+    for name in late:
+        rig = rig.having(name, lag=3e-3)
+    _, cycles = watched(Sim(rig=rig, fast=True), 3.0)
+    assert {flaw.channel for cycle in cycles for flaw in cycle.flaws} == {channel}
+    assert cycles[-1].flaws[0].words.startswith(f"{channel} comes 3.00 ")
+
+
+def test_a_loop_is_that_of_the_motion() -> None:
+    _, cycles = watched(Sim(rig=ss.Rig.perfect(), fast=True), 3.0)
+    last = cycles[-1]
+    assert abs(last.period - 0.4) < 1e-3
+    assert abs(last.friction.max() - 1.1) < 0.06
+    assert abs(abs(last.x).max() - 0.714e-3) < 0.02e-3
+
+
+def test_lost_samples_begin_it_anew() -> None:
+    monitor, cycles = watched(Sim(fast=True, stated=True, faults=(Fault("drop", 1.0, 0.1),)), 4.0)
+    assert monitor.lost == 400
+    assert not [flaw for cycle in cycles for flaw in cycle.flaws]
+
+
+def test_a_base_that_is_moved_otherwise_is_followed() -> None:
+    device = Sim(fast=True, stated=True)
+    monitor, cycles = Monitor(device, RIG), []
+    with device.open() as stream:
+        for block in blocks(stream, count=8000):
+            monitor.feed(block)
+        stream.drive("base", Tone(0.65e-3, 6.0))
+        for block in blocks(stream, count=20_000):
+            cycles += monitor.feed(block)
+    assert abs(cycles[-1].period - 1 / 6) < 1e-3
