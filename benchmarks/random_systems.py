@@ -54,6 +54,12 @@ def _rock(draw: Draw, force: float, spring: float, mass: float) -> laws.RateStat
     )
 
 
+def _behind(draw: Draw, force: float, spring: float, mass: float) -> laws.InSeries:
+    curve = laws.Stribeck(force, force * 1.4, speed=force / math.sqrt(spring * mass) * _log(draw, -2, 0))
+    steepest = math.sqrt(2 / math.e) * 0.4 * force / curve.speed  # of Gauss's curve: it is the least damping
+    return laws.InSeries(curve, spring * _log(draw, 0.5, 3), steepest * (1.1 + _log(draw, -1, 1)))
+
+
 def _line(draw: Draw, force: float, spring: float, mass: float) -> laws.LinearSlope:
     return laws.LinearSlope(force, slope=math.sqrt(spring * mass) * float(draw.uniform(-0.05, 0.5)))
 
@@ -106,6 +112,15 @@ LAWS: dict[str, Callable[[Draw, float, float, float], object]] = {
     ),
     "RoughSurface": _rough,
     "InSeries": lambda d, f, k, m: laws.InSeries(_line(d, f, k, m), k * _log(d, 0.5, 3), math.sqrt(k * m)),
+    "InSeries Stribeck": _behind,
+    "InSeries Dahl": lambda d, f, k, m: laws.InSeries(
+        laws.Dahl(f, k * _log(d, 0.5, 3)), k * _log(d, 0.5, 3), math.sqrt(k * m) * float(d.choice([0.0, 1.0]))
+    ),
+    "InSeries state variable": lambda d, f, k, m: laws.InSeries(
+        laws.SmoothStateVariable(f, _log(d, 0, 2) * math.sqrt(k / m) / f, _log(d, 1, 3) * math.sqrt(k * m) / f),
+        k * _log(d, 0.5, 3),
+        math.sqrt(k * m),
+    ),
 }
 
 

@@ -1,6 +1,6 @@
 """What an analysis says of rigs by another integrator, quick and tried on its twins: how often it holds, and is true.
 
-    python benchmarks/twins.py [--draws 20] [--twins 20] [--seed 1] [--off 0.005]
+    python benchmarks/twins.py [--draws 20] [--twins 20] [--seed 1] [--off 0.005] [--minutes 10]
 
 Each kind of contact is drawn with fresh masses, springs, dampers, motions and noise. An interval counts where its
 status carries no grave doubt; a claim of static friction counts where its interval lies above 1, of a stick where it
@@ -10,6 +10,7 @@ lies above 0.
 from __future__ import annotations
 
 import argparse
+import itertools
 import sys
 import time
 import warnings
@@ -23,81 +24,152 @@ import stepped
 import stickslip as ss
 from stickslip.estimate import stands
 
-NAMES = ("sliding friction", "slope of friction against speed", "stuck share of the time", "stops per cycle")
-CLAIMS = ("dry friction", "static", "sticks", "gives way")
-RATIO, GIVES = "static over sliding friction", "presliding stiffness"
-COMPARED = {  # what has a true value of its own
-    "Stribeck": (NAMES[0], *NAMES[2:], RATIO),
-    "compliant": (NAMES[0], NAMES[1], RATIO),
-    "LuGre": (NAMES[0], RATIO),
-    "state variable": (NAMES[0],),
+LEVEL, FALL, SHARE, STOPS = (
+    "sliding friction", "slope of friction against speed", "stuck share of the time", "stops per cycle"
+)  # fmt: skip
+RATIO, GIVES, OFFSET, ENERGY = (
+    "static over sliding friction", "presliding stiffness", "friction offset", "energy per cycle"
+)  # fmt: skip
+SIDES = ("sliding friction forward", "sliding friction back", "static friction forward", "static friction back")
+NAMES = (LEVEL, FALL, SHARE, STOPS, RATIO, *SIDES, OFFSET, ENERGY, GIVES)
+CLAIMS = ("dry friction", "static", "sticks", "gives way", "falls or rises with speed")
+UNTOLD = {  # what has no true value of its own
+    "Stribeck": (FALL,),
+    "compliant": (SHARE, STOPS, ENERGY),
+    "LuGre": (FALL, SHARE, STOPS, ENERGY),
+    "state variable": (FALL, SHARE, STOPS, RATIO, *SIDES[2:], ENERGY),
 }
+ROWS = (*NAMES, *(f"claim: {what}" for what in CLAIMS))
+BROKEN = "broken sensors"
+KINDS = (*stepped.KINDS, BROKEN)
 
 
-def counted(findings: ss.answers.Findings, rig: stepped.Rig, tally: dict[str, list[bool]]) -> None:
-    """Whether intervals without a doubt hold, and claims are true."""
-    truth = findings.record.truth
+def truths(findings: ss.answers.Findings, rig: stepped.Rig) -> dict[str, float]:
+    """What is true of a rig, by the name of the answer; what has no true value is left out."""
+    truth = dict(findings.record.truth)
+    level, static = truth[LEVEL], max(rig.static, truth[LEVEL])
+    truth |= dict.fromkeys(SIDES[:2], level) | dict.fromkeys(SIDES[2:], static) | {OFFSET: 0.0}
+    if rig.contact:
+        truth[GIVES] = rig.contact
+    left_out = UNTOLD.get(rig.kind, ())
+    return {name: truth[name] for name in NAMES if name in truth and name not in left_out and np.isfinite(truth[name])}
+
+
+def counted(findings: ss.answers.Findings, rig: stepped.Rig, tally: dict[str, list[bool]]) -> list[str]:
+    """Whether intervals without a doubt hold, and claims are true; those that are not, in words."""
+    truth, wrong = truths(findings, rig), []
+
+    def note(name: str, right: bool, estimate: ss.Estimate) -> None:
+        tally[name].append(right)
+        if not right:
+            wrong.append(f"{name}: {estimate}, in truth {truth.get(estimate.name)}")
+
     for estimate in findings.estimates:
         if not estimate.known or not stands(estimate.status):
             continue
-        if estimate.name in COMPARED.get(rig.kind, (*NAMES, RATIO)) and np.isfinite(truth[estimate.name]):
-            tally[estimate.name].append(estimate.includes(truth[estimate.name]))
+        low, high = estimate.interval
+        if estimate.name in truth:
+            note(estimate.name, estimate.includes(truth[estimate.name]), estimate)
         if estimate.name == GIVES:
-            tally["claim: gives way"].append(rig.kind in stepped.SOFT)
-            if rig.contact:
-                tally[GIVES].append(estimate.includes(rig.contact))
-        if estimate.name == RATIO and estimate.interval[0] > 1:
-            tally["claim: static"].append(truth[RATIO] > 1)
-        if estimate.name == NAMES[2] and estimate.interval[0] > 0 and rig.kind not in stepped.SOFT:
-            tally["claim: sticks"].append(truth[NAMES[2]] > 0)
-        if estimate.name == NAMES[0] and estimate.interval[0] > 0:
-            tally["claim: dry friction"].append(rig.kinetic > 0)
+            note("claim: gives way", rig.kind in stepped.SOFT, estimate)
+        if estimate.name == RATIO and low > 1:
+            note("claim: static", truth.get(RATIO, 1.0) > 1, estimate)
+        if estimate.name == SHARE and low > 0 and rig.kind not in stepped.SOFT:
+            note("claim: sticks", truth[SHARE] > 0, estimate)
+        if estimate.name == LEVEL and low > 0:
+            note("claim: dry friction", rig.kinetic > 0, estimate)
+        if estimate.name == FALL and not low <= 0 <= high:
+            note("claim: falls or rises with speed", rig.slope > 0 or rig.speed > 0, estimate)
+    return wrong
+
+
+def asked(kind: str, seed: np.random.SeedSequence, off: float, twins: int) -> tuple[stepped.Rig, list, list[float]]:
+    """A rig, its answers quick and tried, and the processor time of each [s]."""
+    rng = np.random.default_rng(seed)
+    rig = stepped.drawn("Coulomb" if kind == BROKEN else kind, rng)
+    record = stepped.record(rig, rng, noise=10 ** rng.uniform(-4, -2.3), off=off)
+    stated: dict[str, float | tuple[float, float]] = dict(rig.stated)
+    if off:
+        record = record.with_details("x", gain_sd=off).with_details("z", gain_sd=off)
+        for name, value in rig.stated.items():
+            written = value * (1 + off * rng.standard_normal())
+            stated[name] = (written, off * written)
+    if kind == BROKEN:
+        record, stated = broken(record, stated, rng)
+    begun = time.process_time()
+    quick = ss.analyze(record, **stated)
+    between = time.process_time()
+    tried = ss.tried(quick, twins=twins)
+    return rig, [quick, tried], [between - begun, time.process_time() - between]
+
+
+def broken(record: ss.Record, stated: dict, rng: np.random.Generator) -> tuple[ss.Record, dict]:
+    """A record with one thing wrong that nobody states: a range, a gain, a delay, a spring, a damper, or spikes."""
+    x, what = record["x"], rng.integers(6)
+    if what == 0:
+        middle, most = float(np.mean(x)), rng.uniform(0.5, 0.95) * float(np.ptp(x)) / 2
+        record = record.with_channel("x", np.clip(x, middle - most, middle + most), unit="m")
+    elif what == 1:
+        record = record.with_channel("x", rng.choice([0.8, 0.9, 1.1, 1.2, 1000.0]) * x, unit="m")
+    elif what == 2:
+        record = record.with_channel("x", np.roll(x, rng.integers(1, 6)), unit="m")
+    elif what == 3:
+        spring, factor = np.array(stated["stiffness"]), rng.choice([0.5, 0.9, 1.1, 2.0])
+        stated = {**stated, "stiffness": tuple(factor * spring) if spring.ndim else float(factor * spring)}
+    elif what == 4:
+        stated = {name: value for name, value in stated.items() if name != "damping"}
+        stated["damping"] = 0.0
+    else:
+        x = x.copy()
+        x[rng.integers(0, len(x), 10)] += rng.standard_normal(10) * float(np.ptp(x))
+        record = record.with_channel("x", x, unit="m")
+    return record, stated
 
 
 def main() -> None:
-    """Draw, ask, and print."""
+    """Draw, ask, and print: of each draw one rig a kind, so that what there was time for is told of all alike."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--draws", type=int, default=20, help="of each kind")
     parser.add_argument("--twins", type=int, default=20)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--off", type=float, default=0.0, help="by which gains and constants are off, as is stated")
-    parser.add_argument("--kinds", default=",".join(stepped.KINDS))
+    parser.add_argument("--kinds", default=",".join(KINDS))
+    parser.add_argument("--minutes", type=float, default=np.inf, help="after which no rig is begun")
     options = parser.parse_args()
-    for kind in options.kinds.split(","):
-        tallies: dict[str, dict[str, list[bool]]] = {"quick": defaultdict(list), "tried": defaultdict(list)}
-        lost, unlike, spent = 0, 0, [0.0, 0.0]
-        for seed in np.random.SeedSequence([options.seed, stepped.KINDS.index(kind)]).spawn(options.draws):
-            rng = np.random.default_rng(seed)
-            rig = stepped.drawn(kind, rng)
-            record = stepped.record(rig, rng, noise=10 ** rng.uniform(-4, -2.3), off=options.off)
-            stated: dict[str, float | tuple[float, float]] = dict(rig.stated)
-            if options.off:
-                record = record.with_details("x", gain_sd=options.off).with_details("z", gain_sd=options.off)
-                for name, value in rig.stated.items():
-                    written = value * (1 + options.off * rng.standard_normal())
-                    stated[name] = (written, options.off * written)
-            begun = time.process_time()
-            try:
-                with warnings.catch_warnings():
-                    warnings.simplefilter("error")
-                    quick = ss.analyze(record, **stated)
-                    spent[0] += time.process_time() - begun
-                    begun = time.process_time()
-                    tried = ss.tried(quick, twins=options.twins)
-                    spent[1] += time.process_time() - begun
-            except ss.errors.StickslipError as error:
-                print(f"  {kind}: {error}")
-                lost += 1
-                continue
-            unlike += tried.trial.unlike
-            counted(quick, rig, tallies["quick"])
-            counted(tried, rig, tallies["tried"])
-        asked = max(1, options.draws - lost)
-        print(f"{kind}: {options.draws} rigs, {lost} refused, {unlike} unlike their twins; "
-              f"{spent[0] / asked:.2f} s quick, {spent[1] / asked:.2f} s on twins")  # fmt: skip
-        for name in (*NAMES, RATIO, GIVES, *(f"claim: {what}" for what in CLAIMS)):
-            row = [f"{sum(held):3d} of {len(held):3d}" for held in (tallies[way][name] for way in ("quick", "tried"))]
-            print(f"    {name:34s} quick {row[0]}   tried {row[1]}", flush=True)
+    kinds, ends = options.kinds.split(","), time.monotonic() + 60 * options.minutes
+    tallies = {kind: (defaultdict(list), defaultdict(list)) for kind in kinds}
+    lost, unlike, spent = defaultdict(int), defaultdict(int), defaultdict(list)
+    seeds = {kind: np.random.SeedSequence([options.seed, KINDS.index(kind)]).spawn(options.draws) for kind in kinds}
+    for draw, kind in itertools.product(range(options.draws), kinds):
+        if time.monotonic() > ends:
+            break
+        try:
+            with warnings.catch_warnings():
+                warnings.simplefilter("error")
+                rig, answers, times = asked(kind, seeds[kind][draw], options.off, options.twins)
+        except ss.errors.StickslipError as error:
+            print(f"  {kind} {draw}: {error}", flush=True)
+            lost[kind] += 1
+            continue
+        spent[kind].append(times)
+        unlike[kind] += answers[1].trial.unlike
+        counted(answers[0], rig, tallies[kind][0])
+        for words in counted(answers[1], rig, tallies[kind][1]):
+            print(f"  {kind} {draw}: {words}", flush=True)
+    for kind in kinds:
+        told = f"{len(spent[kind])} rigs, {lost[kind]} refused, {unlike[kind]} unlike their twins"
+        print(f"{kind}: {told}; {np.round(np.mean(spent[kind] or [[0.0, 0.0]], axis=0), 2)} s quick and on twins")
+        table(*tallies[kind])
+    print("all kinds")
+    table(*({name: [held for kind in kinds for held in tallies[kind][way][name]] for name in ROWS} for way in (0, 1)))
+
+
+def table(quick: dict[str, list[bool]], tried: dict[str, list[bool]]) -> None:
+    """How many there were, and how many held."""
+    for name in ROWS:
+        if quick[name] or tried[name]:
+            rows = [f"{sum(way[name]):3d} of {len(way[name]):3d}" for way in (quick, tried)]
+            print(f"    {name:34s} quick {rows[0]}   tried {rows[1]}", flush=True)
 
 
 if __name__ == "__main__":

@@ -13,10 +13,12 @@ import pytest
 from click.testing import CliRunner
 
 import stickslip as ss
+from printed import alike
 from stickslip.cli.program import main
 
 ROOT = Path(__file__).resolve().parents[1]
 DOCS = ROOT / "docs"
+LISTED_ELSEWHERE = {"`convert`", "`datasets`", "`demo`", "`thesis`"}  # commands that answer no question
 EXAMPLES = sorted((DOCS / "examples").glob("*.py"))
 sys.path.insert(0, str(DOCS))
 
@@ -108,6 +110,27 @@ def test_the_tutorial_on_a_real_record(dataset: Callable[[str], Path]) -> None:
     levels = [found.level.value for found in names["found"].values()]  # type: ignore[attr-defined]
     assert levels == pytest.approx([0.69, 1.31], abs=0.02)
     assert "not the whole of it" in names["law"].status  # type: ignore[attr-defined]
+
+
+@pytest.mark.parametrize(
+    ("number", "name"),
+    [*enumerate(["frame_base_excited", "paper_stick_slip", "band_brake_damper", "pendulum_decay", "audio"])],
+)
+def test_the_real_records_are_answered_as_their_page_shows(
+    number: int, name: str, dataset: Callable[[str], Path], capsys: pytest.CaptureFixture[str]
+) -> None:
+    dataset(name)
+    page = (DOCS / "real.md").read_text("utf-8")
+    form = r"^```{code-block} python\n(.*?)^```\n\n<!-- prints -->\n\n```text\n(.*?)^```"
+    code, shown = re.findall(form, page, flags=re.MULTILINE | re.DOTALL)[number]
+    assert f'fetch("{name}")' in code
+    exec(compile(code, "real.md", "exec", dont_inherit=True), {"ss": ss})
+    assert alike(shown, capsys.readouterr().out), "python tools/fill_outputs.py docs/real.md writes it again"
+
+
+def test_every_command_stands_on_the_page_of_questions() -> None:
+    page = (DOCS / "commands.md").read_text("utf-8")
+    assert {f"`{name}`" for name in main.commands} - set(re.findall(r"`\w+`", page)) == LISTED_ELSEWHERE
 
 
 def test_the_tutorial_on_the_command_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

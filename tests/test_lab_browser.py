@@ -433,14 +433,14 @@ def test_nothing_that_axe_knows_keeps_anybody_out_and_it_fits_a_phone(page: Page
     drop(page, rubbing)
     page.locator("#data-run").wait_for(timeout=PATIENCE)
     for theme in ("light", "dark"):
-        for tab in ("Play", "Map", "Data"):
+        for tab in ("Play", "Map", "Data", "Live"):
             page.get_by_role("tab", name=tab).click()
             found = Axe().run(page)
             assert found.violations_count == 0, f"{tab}, {theme}: {found.generate_report()}"
         page.get_by_role("button", name="Dark or light").click()
     for width in (360, 768):
         page.set_viewport_size({"width": width, "height": 800})
-        for tab in ("Play", "Map", "Data"):
+        for tab in ("Play", "Map", "Data", "Live"):
             page.get_by_role("tab", name=tab).click()
             assert page.evaluate("document.documentElement.scrollWidth") <= width, f"{tab} at {width} pixels"
 

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+import contextlib
+import io
 import re
 import shlex
+import shutil
 import sys
 from pathlib import Path
 
-import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from stickslip import datasets
+from printed import alike
 from stickslip.cli.program import main
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -29,25 +31,17 @@ def typed(page: Path) -> list[str]:
     return [line for block in blocks(page.read_text("utf-8"), "sh") for line in block.splitlines() if line.strip()]
 
 
+BLOCK = re.MULTILINE | re.DOTALL
 PYTHON = blocks(README, "python")
 TARGETS = set(re.findall(r"^(\w+):", (ROOT / "Makefile").read_text("utf-8"), flags=re.MULTILINE))
 
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Where a reader sits: a folder with a rig's file in it, written by the project from its own record."""
+    """Where a reader sits: a folder with a rig's file in it and the examples of the checkout."""
     folder = tmp_path_factory.mktemp("reader")
-    record = datasets.demo()
-    units = {"plate [mm]": record["x"] * 1e3, "base [mm]": record["z"] * 1e3, "acc [g]": record["a"] / 9.80665}
-    columns = {"t [s]": record.time, **units, "cell [N]": record["load"]}
-    np.savetxt(
-        folder / "rig.csv",
-        np.column_stack(list(columns.values())),
-        delimiter=",",
-        header=",".join(columns),
-        comments="",
-        fmt="%.7f",
-    )
+    shutil.copy(ROOT / "examples" / "rig.csv", folder)
+    shutil.copytree(ROOT / "examples", folder / "examples")
     for page in PAGES:
         for block in blocks(page.read_text("utf-8"), "toml"):
             if named := re.match(r"# (\w+\.toml)\n", block):
@@ -69,8 +63,12 @@ def test_the_python_blocks_run(folder: Path, page: Path, monkeypatch: pytest.Mon
     monkeypatch.chdir(folder)
     monkeypatch.setitem(sys.modules, "mosqito", None)
     names: dict[str, object] = {"__name__": "__main__"}
-    for code in blocks(page.read_text("utf-8"), "python"):
-        exec(compile(code, page.name, "exec", dont_inherit=True), names)
+    text = page.read_text("utf-8")
+    for block in re.finditer(r"^```python\n(.*?)^```\n(?:\n<!-- prints -->\n\n```text\n(.*?)^```\n)?", text, BLOCK):
+        with contextlib.redirect_stdout(io.StringIO()) as said:
+            exec(compile(block[1], page.name, "exec", dont_inherit=True), names)
+        if block[2] is not None:
+            assert alike(block[2], said.getvalue()), "python tools/fill_outputs.py writes it again"
 
 
 def test_the_first_use_leaves_a_report(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -88,6 +86,14 @@ def test_the_commands_run(folder: Path, page: Path, monkeypatch: pytest.MonkeyPa
     monkeypatch.setitem(sys.modules, "mosqito", None)
     for line in typed(page):
         run(line)
+
+
+def test_the_readme_shows_what_the_command_prints(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(folder)
+    ((commands, shown),) = re.findall(r"^```sh\n([^`]*?)```\n\n<!-- prints -->\n\n```text\n(.*?)^```", README, BLOCK)
+    (line,) = [each for each in commands.splitlines() if each.startswith("stickslip analyze")]
+    assert alike(shown, CliRunner().invoke(main, shlex.split(line)[1:]).stdout)
+    assert len(README.splitlines()) <= 120
 
 
 def run(line: str) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
@@ -12,8 +13,9 @@ from click.testing import CliRunner
 
 import stepped
 import stickslip as ss
+from stickslip.answers.on_twins import _yields
 from stickslip.cli.program import main
-from stickslip.estimate import kinds
+from stickslip.estimate import UNTRIED, kinds, stands
 from stickslip.twin.search import believe
 from stickslip.twin.trial import ASTRAY
 
@@ -77,9 +79,53 @@ def test_static_friction_that_is_not_there_is_not_claimed(rig: stepped.Rig) -> N
 
 def test_static_friction_that_is_there_is_found() -> None:
     _, tried = asked(BEARS)
-    assert tried.trial.static.claimed
+    assert tried.trial.felt[RATIO].claimed
     ratio = tried.breakaway.ratio
     assert ratio.value == pytest.approx(1.5, abs=0.04)
+
+
+def test_quick_answers_say_that_they_are_untried() -> None:
+    quick, tried = asked(SLIDES)
+    sure = [e for answer in (quick.sticks, quick.breakaway, quick.presliding) for e in answer.estimates]
+    assert all(UNTRIED in kinds(e.status) for e in sure if e.name != "forcing frequency")
+    assert not tried.untried
+    headline = " ".join(ss.summary(quick).headline)
+    assert headline.count("not tried on twins") == 1
+    assert "more than while it slides" not in headline
+
+
+def test_a_zero_offset_is_no_friction_of_one_direction() -> None:
+    record = stepped.record(STOPS, np.random.default_rng(11))
+    shifted = record.with_channel("x", record["x"] + 0.1 * STOPS.amplitude, unit="m")
+    tried = ss.tried(ss.analyze(shifted, **STOPS.stated), twins=8)
+    for name in ("sliding friction forward", "sliding friction back", "static friction forward"):
+        assert estimate(tried, name).includes(STOPS.kinetic)
+    assert estimate(tried, "friction offset").includes(0.0)
+
+
+@pytest.mark.parametrize("rig", [STOPS, BEARS], ids=lambda rig: rig.kind)
+def test_the_work_of_friction_is_that_of_the_rig(rig: stepped.Rig) -> None:
+    _, tried = asked(rig)
+    energy = tried.loops.energy_per_cycle
+    assert energy.value == pytest.approx(tried.record.truth["energy per cycle"], rel=2e-3)
+
+
+def test_a_slope_three_times_as_large_as_would_be_felt_is_found() -> None:
+    name = "slope of friction against speed"
+    _, without = asked(STOPS)
+    felt = without.trial.felt[name]
+    assert not felt.claimed
+    rig = replace(STOPS, slope=3 * felt.felt)
+    tried = ss.tried(ss.analyze(stepped.record(rig, np.random.default_rng(12)), **rig.stated), twins=8)
+    assert tried.trial.felt[name].claimed
+    assert estimate(tried, name).interval[0] > 0
+
+
+def test_what_x_tells_of_a_contact_needs_no_line_before_slip() -> None:
+    for rig, verdict in ((YIELDS, "gives way"), (STOPS, "rigid")):
+        told = _yields(None, asked(rig)[1].trial)
+        assert told is not None
+        assert told.verdict == verdict
 
 
 def test_stuck_time_is_counted_without_the_bias_of_a_threshold() -> None:
@@ -173,7 +219,7 @@ def test_bristles_whose_static_friction_x_does_not_show_leave_it_open() -> None:
 def test_a_rigid_contact_is_rigid_up_to_what_would_have_been_seen() -> None:
     _, tried = asked(STOPS)
     assert tried.presliding.verdict == "rigid"
-    assert 0 < tried.trial.yields.felt < 1e-3 * STOPS.amplitude / STOPS.kinetic
+    assert 0 < tried.trial.felt["compliance"].felt < 1e-3 * STOPS.amplitude / STOPS.kinetic
 
 
 def test_a_contact_of_another_kind_is_unlike_its_twins() -> None:
@@ -182,6 +228,7 @@ def test_a_contact_of_another_kind_is_unlike_its_twins() -> None:
     tried = ss.tried(ss.analyze(record.with_channel("z", record["z"] * swell, unit="m"), **STOPS.stated), twins=8)
     assert tried.trial.unlike
     assert ASTRAY in kinds(tried.loops.level.status)
+    assert not any(stands(e.status) for e in tried.loops.estimates if e.name != "forcing frequency")
 
 
 def test_the_same_seed_gives_the_same_answers() -> None:

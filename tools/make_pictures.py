@@ -1,10 +1,11 @@
 """Draw the pictures of the README and of the pages, with the project's own figures.
 
-python tools/make_pictures.py          writes docs/images/loops.png, decay.png, stability.png and limit_cycles.png
+python tools/make_pictures.py          writes docs/images/loops.png, decay.png, stability.png, limit_cycles.png, HOWTO
 """
 
 from __future__ import annotations
 
+import runpy
 from pathlib import Path
 
 import matplotlib as mpl
@@ -20,6 +21,40 @@ from stickslip.figures.contact import plot_displacement_loop, plot_velocity_loop
 from stickslip.figures.decay import plot_decay, plot_differences
 
 IMAGES = Path(__file__).resolve().parents[1] / "docs" / "images"
+
+
+EXAMPLES = IMAGES.parent / "examples"
+HOWTO = {  # of pages, by the gallery's example that draws it
+    "sticks": "plot_03_microslips", "rig": "plot_05_sensors", "simulate": "plot_02_laws",
+    "wavelets": "plot_07_wavelets", "sweep": "plot_08_map", "attractors": "plot_09_bifurcation",
+}  # fmt: skip
+
+
+def howto() -> None:
+    """The pictures of pages that a gallery's example draws too."""
+    for page, example in HOWTO.items():
+        names = runpy.run_path(str(EXAMPLES / f"{example}.py"))
+        drawn = [getattr(value, "figure", value) for value in names.values()]
+        saved([figure for figure in drawn if isinstance(figure, Figure)][-1], f"{page}.png")
+
+
+def records() -> None:
+    """A record as it is read, its mended clipping, and the curve of its friction."""
+    record = ss.datasets.demo().rows(2000, 6000)
+    saved(ss.plot(record).figure, "reading.png")
+    rig = {name: record.truth[name] for name in ("mass", "stiffness", "damping")}
+    found = ss.analyze(record, **rig)
+    saved(ss.plot(found).figure, "forced.png")
+    saved(ss.plot(ss.tried(found, twins=8).trial).figure, "twins.png")
+    saved(ss.plot(ss.fit_curve(found.record, curve="coulomb")).figure, "curves.png")
+    x = np.clip(record["x"], -6.5e-4, 6.5e-4)
+    clipped = ss.Record.of({"x": x}, fs=record.fs)
+    figure, ax = plt.subplots(figsize=(6.2, 2.8), layout="constrained")
+    ax.plot(clipped.time[:1200], 1e3 * ss.signals.restore_clipped(clipped, "x")["x"][:1200], label="restored")
+    ax.plot(clipped.time[:1200], 1e3 * x[:1200], label="clipped, as recorded")
+    ax.set(xlabel="time [s]", ylabel="displacement [mm]")
+    ax.legend(loc="upper right")
+    saved(figure, "repairs.png")
 
 
 def loops() -> None:
@@ -46,9 +81,9 @@ def squeak() -> None:
 
     grid = {"slope": np.linspace(-4, 4, 121), "load": np.linspace(0.5, 8, 151)}
     stable = ss.squeak.stability_map(rig, grid=grid, speed=-0.1)
-    saved(ss.figures.plot_stability(stable, labels=("slope of friction over speed [s/m]", "load [N]")), "stability.png")
+    saved(ss.plot(stable, labels=("slope of friction over speed [s/m]", "load [N]")).figure, "stability.png")
     branches = ss.squeak.limit_cycles(rig(2.0), rig, values=np.linspace(1.3, 6.5, 27), speed=-0.1)
-    saved(ss.figures.plot_limit_cycles(branches, label="load [N]"), "limit_cycles.png")
+    saved(ss.plot(branches, label="load [N]").figure, "limit_cycles.png")
 
 
 def decay() -> None:
@@ -75,3 +110,5 @@ if __name__ == "__main__":
     loops()
     decay()
     squeak()
+    howto()
+    records()

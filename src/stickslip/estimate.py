@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 NORMAL_95 = 1.959963984540054  # two-sided 95 % quantile of the normal distribution
 MOST_DECIMALS = 6  # printed in the plain unit
 UNKNOWN, FEW = "unknown", "few"
+UNTRIED = "untried"  # the kind of doubt of an answer that rigs without what it claims would give too
 UNSTATED = "unstated"  # the kind of doubt where nobody said what a sensor makes of the motion
 ROUNDING = 1e-12  # of the largest number, by which arithmetic alone may put a value beside its interval
 

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, fields, replace
 from typing import TYPE_CHECKING, Any, Self
 
 from stickslip.errors import EstimateError
-from stickslip.estimate import Estimate, Result
+from stickslip.estimate import UNTRIED, Doubt, Estimate, Result, Status, doubts_of, kinds, stands
 from stickslip.printing import html_table
 from stickslip.record.record import Record
 
@@ -21,6 +21,13 @@ WHOLES = {
     "delay": "sensor delay",
     "comparison": "comparison of the forces",
 }
+BY_FORCE = (
+    "loops", "breakaway", "stiffness", "contact_damping", "transition", "coupled", "cause", "presliding",
+)  # fmt: skip
+DRIVEN = "forcing frequency"  # no matter of friction
+NOT_TRIED = Doubt("not tried on twins: rigs that never stick, that slide at one level or on a rigid contact may seem "
+                  "to do so as well", UNTRIED)  # fmt: skip
+ONSETS = ("sticks", "breakaway", "presliding")  # when it sticks, and what it does until it slips
 BY_DECREMENTS = ", by decrements"  # behind the name of a number that another method gave already
 
 
@@ -130,6 +137,11 @@ class Findings(Answers):
         return tuple((name, status) for name, status in told if status != "ok")
 
     @property
+    def untried(self) -> bool:
+        """Whether it has twins that were not asked."""
+        return any(UNTRIED in kinds(estimate.status) for estimate in self.estimates)
+
+    @property
     def contradiction(self) -> str:
         """What slip of the hand in the channels forbids to trust any force, in words; else empty."""
         consistency = self.results.get("consistency")
@@ -198,3 +210,42 @@ def record_name(record: Record) -> str:
     if reads:
         return " + ".join(file["name"] for file in reads[-1])
     return "simulated record" if record.truth else "record"
+
+
+def without(found: Any, kind: str) -> Any:
+    """An answer without doubts of a kind."""
+
+    def left(number: Estimate) -> Estimate:
+        return replace(number, status=Status(*(each for each in doubts_of(number.status) if each.kind != kind)))
+
+    return _each(found, left)
+
+
+def with_doubt(found: Any, doubt: Doubt) -> Any:
+    """An answer with a doubt more at each of its numbers."""
+    return _each(found, lambda number: replace(number, status=Status(number.status, doubt)))
+
+
+def _each(found: Any, change: Callable[[Estimate], Estimate]) -> Any:
+    """An answer with each of its numbers changed, but for that of the drive."""
+    if found is None:
+        return None
+    numbers = {each.name: getattr(found, each.name) for each in fields(found)}
+    return replace(
+        found,
+        **{
+            name: change(value)
+            for name, value in numbers.items()
+            if isinstance(value, Estimate) and value.name != DRIVEN
+        },
+    )
+
+
+def flagged(found: Any, reason: Doubt | str) -> Any:
+    """An answer with each of its numbers flagged that was thought to be sure; that of the drive stays sure."""
+    if isinstance(found, Estimate):
+        lesser = stands(found.status)
+        if found.name == DRIVEN or not (lesser or not found.known):
+            return found
+        return replace(found, status=Status(reason) if lesser else Status(reason, found.status))
+    return _each(found, lambda number: flagged(number, reason))

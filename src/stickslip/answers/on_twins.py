@@ -8,20 +8,21 @@ from dataclasses import replace
 from functools import partial
 from typing import Any, TypeVar
 
-from stickslip.answers.findings import Findings
+from stickslip.answers.findings import BY_FORCE, ONSETS, Findings, flagged, without
 from stickslip.balance.force import friction_force
 from stickslip.cycle.before_slip import Presliding, presliding
 from stickslip.cycle.loops import Loops, friction_loops
 from stickslip.cycle.onset import Breakaway, breakaway
 from stickslip.cycle.sticks import Sticks, find_sticks
 from stickslip.errors import StickslipError
-from stickslip.estimate import Estimate, Result
+from stickslip.estimate import UNTRIED, Estimate, Result, Status
 from stickslip.record.record import Record, StatedRig
 from stickslip.twin.search import believe
-from stickslip.twin.trial import GIVES, Trial, try_on_twins
+from stickslip.twin.trial import COMPLIANCE, GIVES, Trial, try_on_twins
 from stickslip.workers import workers
 
 Answer = TypeVar("Answer", Loops | None, Sticks | None, Breakaway | None)
+UNTOLD = Estimate("compliance", math.nan, (math.nan, math.nan), math.nan, "m/N", "fit to x")
 ASKED = (friction_loops, find_sticks, breakaway, presliding)
 
 
@@ -76,18 +77,21 @@ def tried(
     >>> sure.breakaway.ratio.known  # what such a record says of static friction its twins without any say too
     False
     """
+    findings = findings.having(**{key: without(findings.results.get(key), UNTRIED) for key in ONSETS})
     answers = {estimate.name: estimate for estimate in findings.estimates}
     with workers(processes, __name__) as mapped:  # they are ready when the rig is found
         belief = believe(findings.record, mapped=mapped)
         ask = partial(_ask, stated=belief.record.rig)
         trial = try_on_twins(belief, answers, ask, count=twins, rng=rng, progress=progress, mapped=mapped)
-    answered = findings.having(
-        loops=_with(findings.loops, trial.estimates),
-        sticks=_with(findings.sticks, trial.estimates),
-        breakaway=_with(findings.breakaway, trial.estimates),
-        presliding=_yields(findings.presliding, trial),
-        trial=trial,
-    )
+    told = {
+        "loops": _with(findings.loops, trial.estimates),
+        "sticks": _with(findings.sticks, trial.estimates),
+        "breakaway": _with(findings.breakaway, trial.estimates),
+        "presliding": findings.presliding if findings.stiffness is not None else _yields(findings.presliding, trial),
+    }
+    if trial.doubt is not None:  # what was not tried rests on the same constants and channels
+        told |= {key: flagged(told.get(key, findings.results.get(key)), trial.doubt) for key in BY_FORCE}
+    answered = findings.having(**told, trial=trial)
     return replace(answered, notes=(*findings.notes, _note(trial)))
 
 
@@ -101,42 +105,27 @@ def _note(trial: Trial) -> str:
 
 def _yields(quick: Presliding | None, trial: Trial) -> Presliding | None:
     """What a contact does before it slips, by the fit to x where it tells; not what rigid twins show too."""
-    if quick is None:
-        return None
-    stiffness, power = trial.estimates.get(GIVES), trial.yields
-    if stiffness is not None and stiffness.value > 0:
-        return _telling(quick, "gives way", f"a contact of {stiffness} leaves less of x than a rigid one", stiffness)
+    stiffness, power = trial.estimates.get(GIVES), trial.felt.get(COMPLIANCE)
     if trial.doubt is not None:
-        why = trial.doubt.words
-    elif power is None:
-        why = "a contact that gives way would not have moved x enough to be seen"
-    else:
-        return _telling(quick, "rigid", f"a contact softer than {1 / power.felt:.3g} N/m would have been seen in x")
-    return _telling(quick, "can not be told", why)
+        return None if quick is None else _telling("can not be told", trial.doubt.words)
+    if stiffness is not None and stiffness.value > 0:
+        why, low, high = f"a contact of {stiffness} leaves less of x than a rigid one", *stiffness.interval
+        value, ends, sd = 1 / stiffness.value, (1 / high, 1 / low if low > 0 else math.inf), 1 / stiffness.value**2
+        told = replace(UNTOLD, value=value, interval=ends, sd=stiffness.sd * sd, status=stiffness.status)
+        return _telling("gives way", why, told, stiffness)
+    if power is not None:
+        told = replace(UNTOLD, value=0.0, interval=(0.0, power.felt), sd=power.felt / 2, status="ok")
+        return _telling("rigid", f"a contact softer than {1 / power.felt:.3g} N/m would have been seen in x", told)
+    why = "a contact that gives way would not have moved x enough to be seen"
+    return None if quick is None else _telling("can not be told", why)
 
 
-def _telling(quick: Presliding, verdict: str, why: str, stiffness: Estimate | None = None) -> Presliding:
-    """Another verdict on how a contact gives way, both directions alike."""
-    sides = (quick.compliance_forward, quick.compliance_back)
-    if verdict == "rigid":
-        forward, back = sides
-    elif stiffness is None:
-        forward, back = (side.unknown(why) for side in sides)
-    else:
-        low, high = stiffness.interval
-        ends = (1 / high, 1 / low if low > 0 else math.inf)
-        sd = stiffness.sd / stiffness.value**2
-        forward, back = (
-            replace(
-                side, value=1 / stiffness.value, interval=ends, sd=sd, method=stiffness.method, status=stiffness.status
-            )
-            for side in sides
-        )
-    return replace(
-        quick, stiffness=stiffness, stiffness_forward=None, stiffness_back=None, backlash=None,
-        compliance_forward=forward, compliance_back=back, verdict=verdict, evidence=why,
-        status="ok" if stiffness is None else stiffness.status,
-    )  # fmt: skip
+def _telling(verdict: str, why: str, told: Estimate | None = None, stiffness: Estimate | None = None) -> Presliding:
+    """How a contact gives way, both directions alike."""
+    told = replace(UNTOLD, status=Status(why)) if told is None else told
+    forward, back = (replace(told, name=f"compliance {side}") for side in ("forward", "back"))
+    status = "ok" if stiffness is None else stiffness.status
+    return Presliding(stiffness, None, None, None, forward, back, verdict, why, status)
 
 
 def _ask(record: Record, *, stated: StatedRig | None) -> dict[str, Estimate]:

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from functools import cache, partial
 from typing import Any
 
 import numpy as np
 
 from stickslip.answers.asked import Asked
-from stickslip.answers.findings import Findings, record_name
+from stickslip.answers.findings import BY_FORCE, NOT_TRIED, ONSETS, Findings, flagged, record_name, with_doubt
 from stickslip.answers.preparation import (
     AT_ONCE,
     CONSTANTS,
@@ -35,16 +35,13 @@ from stickslip.cycle.onset import breakaway
 from stickslip.cycle.regression import regress_friction
 from stickslip.cycle.sticks import find_sticks
 from stickslip.errors import EstimateError, StickslipError
-from stickslip.estimate import Constant, Doubt, Estimate, Status, stands
+from stickslip.estimate import Constant, Doubt, Status
 from stickslip.record.flaws import constant
 from stickslip.record.record import Record, require_record
 from stickslip.rig.settings import RigSettings
+from stickslip.twin.search import lacking
 
 STRETCH = 1 << 14  # samples in which the contact is fitted
-BY_FORCE = (
-    "loops", "breakaway", "stiffness", "contact_damping", "transition", "coupled", "cause", "presliding",
-)  # fmt: skip
-ONSETS = ("sticks", "breakaway", "presliding")  # when it sticks, and what it does until it slips
 BALANCED = ("balance", "energy")  # checks that a wrong mass, spring or sensor fails
 GOES_ON = 0.8  # of the motion at first that is left at last, where something drives it
 NO_BASE = "there is no channel z: the base is taken to be at rest, but something keeps the motion up"
@@ -123,6 +120,7 @@ def analyze(
         if led and answers.get(question.unless) is None and question.fits(whole):
             answers[question.key] = asked.ask(question.name, partial(_answer, question, whole, fused, slid))
     answers = doubted(answers, whole, unknown=made.doubt, refusals=asked.refusals)
+    answers = untried(answers) if lacking(whole) is None else answers
     answers["loops"] = _late(answers.get("loops"), record, rig)
     if all(answer is None for answer in answers.values()):
         raise _nothing(name, record, asked.refusals)
@@ -324,19 +322,9 @@ def _reasons(
         yield f"{strays[0]}: a mass, a spring or a sensor is not as stated, or the contact no spring", ONSETS
 
 
-def flagged(found: Any, reason: Doubt | str) -> Any:
-    """An answer with each of its numbers flagged that was thought to be sure; that of the drive stays sure."""
-    if isinstance(found, Estimate):
-        lesser = stands(found.status)
-        if found.name == "forcing frequency" or not (lesser or not found.known):
-            return found
-        return replace(found, status=Status(reason) if lesser else Status(reason, found.status))
-    if found is None:
-        return None
-    numbers = {each.name: getattr(found, each.name) for each in fields(found)}
-    return replace(
-        found, **{name: flagged(value, reason) for name, value in numbers.items() if isinstance(value, Estimate)}
-    )
+def untried(answers: dict[str, Any]) -> dict[str, Any]:
+    """The answers, with a doubt at those that rigs of another kind give too."""
+    return {**answers, **{key: with_doubt(answers.get(key), NOT_TRIED) for key in ONSETS}}
 
 
 def _contradiction(told: Consistency | None) -> str:

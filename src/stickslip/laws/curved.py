@@ -276,8 +276,8 @@ class Creeping(Protocol):
     def rates(self) -> tuple[CurvedMode, ...]:
         """The modes of sliding."""
 
-    def holding(self, speed: float) -> CurvedMode:
-        """The mode "held" of a contact that creeps, up to a speed [m/s]."""
+    def holding(self, speed: float, side: int = 0) -> CurvedMode:
+        """The mode "held" of a contact that creeps, up to a speed [m/s]; to one side only, where it is told."""
 
 
 @dataclass(frozen=True)

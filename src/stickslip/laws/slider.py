@@ -112,14 +112,15 @@ def _level(held: CurvedMode, side: float) -> float | None:
 
 def _creeping(law: Any, slider: str, stiffness: float, damping: float) -> Iterator[CurvedMode]:
     """The motion of a slider whose law tells its speed by the force; the modes tell the direction."""
-    spring, held = stiffness * (symbol("x") - symbol(slider)), law.holding(1.0)
+    spring = stiffness * (symbol("x") - symbol(slider))
     force = symbol(FORCE) if damping else spring
-    creep, rates = held.creep.put({"f": force}), {name: rate.put({"f": force}) for name, rate in held.rates.items()}
-    rates[slider] = creep
-    if damping:
-        balance = spring + damping * (symbol("v") - creep)
-        rates[FORCE] = _along(balance, rates) / (1.0 + damping * creep.slope(FORCE))
     for name, side, other in (("back", -1, "forward"), ("forward", 1, "back")):
+        held = law.holding(1.0, side)
+        creep, rates = held.creep.put({"f": force}), {own: rate.put({"f": force}) for own, rate in held.rates.items()}
+        rates[slider] = creep
+        if damping:
+            balance = spring + damping * (symbol("v") - creep)
+            rates[FORCE] = _along(balance, rates) / (1.0 + damping * creep.slope(FORCE))
         yield CurvedMode(name, "slip", side, force, (Exit({"f": -float(side)}, other),), rates)
 
 

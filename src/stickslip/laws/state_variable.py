@@ -257,16 +257,18 @@ class RateState(Sliding):
             for name, side, turn in either_side()
         )
 
-    def holding(self, speed: float) -> CurvedMode:
+    def holding(self, speed: float, side: int = 0) -> CurvedMode:
         r"""Creep slower than a speed [m/s]: the mass goes as fast as its friction, which is the push, makes it go.
 
         With :math:`q = f/(a N)` and :math:`G = \exp[(\mu_0 + b\ln(V_0\theta/D_c))/a]` the law says
         :math:`v = (2 V_0/G) \sinh q`. For the age's sake :math:`|v|` is :math:`(2 V_0/G)(\cosh q - 1)`: both are
-        nothing where they differ, this one is smooth.
+        nothing where they differ, this one is smooth. To one side it is :math:`(2 V_0/G) |\sinh q|`, at any speed.
         """
         stress, grip = symbol("f") / (self.direct * self.normal), self._grip()
         onward, backward, still = exp(stress - grip), exp(-stress - grip), exp(-grip)
         pace = onward + backward - 2 * (1 - STILLEST) * still
+        if side:
+            pace = side * (onward - backward) + 2 * STILLEST * still
         return CurvedMode(
             "held",
             "stick",

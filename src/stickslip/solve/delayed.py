@@ -78,7 +78,8 @@ def delayed_tape(system: Oscillator, order: int) -> Tape:
     """The flat arrays of a system whose law has a time lag; steps of the past are polynomials of this order."""
     assert isinstance(system.law, TimeDelay)
     built = tape(replace(system, law=_Unrolled(system.law, order)))
-    return replace(built, system=system, physical=PAST, opening=built.opening[:PAST])
+    places = {**built.places, "state": built.places["state"][:, :PAST]}  # what is recalled is no state
+    return replace(built, system=system, physical=PAST, opening=built.opening[:PAST], places=places)
 
 
 def run_delayed(

@@ -17,6 +17,7 @@ from stickslip.story import scope
 from stickslip.story.story import Line, Story
 from stickslip.story.words import cautions, interval_of, number, sentence, value_of
 
+MOSTLY = 0.5  # of the time: a bound above it tells nothing
 RARELY = 0.005  # of the time
 SAME = 0.05  # forward and back differ noticeably beyond this part of the level
 ALIKE = 0.02  # a static friction that differs from the sliding one by less is about as large
@@ -148,7 +149,10 @@ def _of_level(findings: Findings) -> str:
     doubt = "" if stands(level.status) else f", which is not to be trusted ({level.status})"
     if level.interval[0] == 0:
         return f"no sliding friction is resolved: it is below {value_of(level, level.interval[1])} (95 %){doubt}"
-    sure = "95 %, with your constants exact" if _taken_exact(findings) else "95 %"
+    how = (
+        ", not tried on twins" if findings.untried else ", with your constants exact" if _taken_exact(findings) else ""
+    )
+    sure = f"95 %{how}"
     return f"the contact slides against {value_of(level)} of friction ({sure}: {interval_of(level)}){doubt}"
 
 
@@ -169,14 +173,21 @@ def _of_loops(findings: Findings) -> Iterator[str]:
     if low > 0 or high < 0:
         yield f"Friction {'rises' if low > 0 else 'falls'} with speed, by {value_of(loops.slope)}."
     elif math.isfinite(low + high):
-        yield "No change of friction with speed is resolved."
+        power = findings.trial and findings.trial.felt.get(loops.slope.name)
+        seen = f": {value_of(loops.slope, power.felt)} would be" if power else ""
+        yield f"No change of friction with speed is resolved{seen}."
 
 
 def _of_sticks(findings: Findings) -> str:
     sticks = findings.sticks
     assert sticks is not None
     if findings.trial is not None and sticks.share.known and sticks.share.interval[0] == 0.0 < sticks.share.interval[1]:
-        return f"no stick is resolved: it sticks below {100 * sticks.share.interval[1]:.2g} % of the time (95 %)"
+        most = sticks.share.interval[1]
+        return (
+            f"no stick is resolved: it sticks below {100 * most:.2g} % of the time (95 %)"
+            if most < MOSTLY
+            else "how long it sticks is not told"
+        )
     if not any(event.kind == "stick" for event in sticks.events):
         brief = sticks.share.value >= RARELY
         share = value_of(sticks.share)
@@ -187,7 +198,7 @@ def _of_sticks(findings: Findings) -> str:
     stops = f", with {often:.2g} stops in each cycle" if math.isfinite(often) and often > 0 else ""
     low, high = sticks.share.interval
     share = interval_of(sticks.share) if high - low > 0.01 else value_of(sticks.share)
-    return f"it sticks {share} of the time{stops}"
+    return f"it {'sticks' if stands(sticks.share.status) else 'seems to stick'} {share} of the time{stops}"
 
 
 def _of_breakaway(found: Breakaway) -> Iterator[str]:
@@ -195,6 +206,9 @@ def _of_breakaway(found: Breakaway) -> Iterator[str]:
     low, high = ratio.interval
     if not math.isfinite(low + high):
         yield f"The breakaway force is not known: {ratio.status}."
+        return
+    if not stands(ratio.status):
+        yield f"At breakaway it seems to bear {value_of(ratio)} times as much as while it slides."
         return
     more = "more than" if low > 1 + ALIKE else "less than" if high < 1 - ALIKE else "about as much as"
     sides = " and ".join(f"{value_of(each)} {each.name.split()[-1]}" for each in (found.forward, found.back) if each)
@@ -220,8 +234,9 @@ def _of_presliding(found: Presliding) -> Iterator[str]:
     if found.verdict == "gives way" and found.stiffness is not None:
         gap = found.backlash
         play = f", with {value_of(gap)} of play" if gap is not None and gap.interval[0] > 0 else ""
+        gives = "gives" if stands(found.stiffness.status) else "seems to give"
         yield (
-            f"Before it slips the contact gives way, with a stiffness of {value_of(found.stiffness)} "
+            f"Before it slips the contact {gives} way, with a stiffness of {value_of(found.stiffness)} "
             f"(95 %: {interval_of(found.stiffness)}){play}."
         )
     elif found.verdict == "rigid":

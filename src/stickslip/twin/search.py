@@ -59,6 +59,7 @@ STEPS = 4  # passes of it over each
 LEAST = 50  # samples
 SEARCHED = 4000  # samples in which it is searched where a law's valley lies
 HALVINGS = 6  # of a step that leads away, before the descent ends
+LEARNS = 0.5  # of what was left, that a step leaves at most where its slopes are learned from it and not taken anew
 SETTLED = 0.999  # of what is left, from which a further pass gains nothing
 SENSED = ("x", "z", "v", "a", "load")  # channels that a virtual rig writes
 LAWS = 3  # that are tried beside the simplest
@@ -113,20 +114,12 @@ def believe(record: Record, *, mapped: Map = map) -> Belief:
     >>> bool(abs(belief.kinetic - 1.0) < 0.01), len(belief.twin(np.random.default_rng(1))) == len(record)
     (True, True)
     """
+    if (lacks := lacking(record)) is not None:
+        raise lacks
     stated = record.rig
-    if stated is None or stated.mass is None or stated.stiffness is None or is_measured(record, "friction"):
-        raise EstimateError(
-            "a friction without a balance of forces behind it",
-            f"{QUESTION} needs the mass and the spring that moved",
-            "state mass and stiffness",
-        )
-    record.require("x", "v", question=QUESTION)
-    if not any(name in record and np.ptp(record[name]) > 0 for name in ("z", "force")):
-        raise EstimateError(
-            "neither a motion z of the base nor an applied force",
-            f"{QUESTION} is moved as the record was",
-            "record what moves the mass",
-        )
+    assert stated is not None
+    assert stated.mass is not None
+    assert stated.stiffness is not None
     oscillator = Oscillator(
         mass=stated.mass,
         stiffness=stated.stiffness,
@@ -144,6 +137,28 @@ def believe(record: Record, *, mapped: Map = map) -> Belief:
     led = _led(begun, [record.rows(0, samples) for samples in _horizons(record)])
     simple = _nearest(replace(led, record=record))
     return _needed(_richer(_needed(simple, SLOPE, KINETIC), mapped), SLOPE)
+
+
+def lacking(record: Record) -> StickslipError | None:
+    """What a record lacks to have a twin, as the error that :func:`believe` raises; None where it lacks nothing."""
+    stated = record.rig
+    if stated is None or stated.mass is None or stated.stiffness is None or is_measured(record, "friction"):
+        return EstimateError(
+            "a friction without a balance of forces behind it",
+            f"{QUESTION} needs the mass and the spring that moved",
+            "state mass and stiffness",
+        )
+    try:
+        record.require("x", "v", question=QUESTION)
+    except StickslipError as error:
+        return error
+    if not any(name in record and np.ptp(record[name]) > 0 for name in ("z", "force")):
+        return EstimateError(
+            "neither a motion z of the base nor an applied force",
+            f"{QUESTION} is moved as the record was",
+            "record what moves the mass",
+        )
+    return None
 
 
 def _needed(belief: Belief, *parts: str) -> Belief:
@@ -199,8 +214,8 @@ def _nearest_of(starts: list[Belief], record: Record) -> list[Belief]:
     """The nearest to a record's beginning of those that a family's starts lead to, and others as near."""
     first, *longer = (record.rows(0, samples) for samples in _horizons(record))
     starts = sorted((replace(begun, record=first) for begun in starts), key=_left)
-    nearest = sorted((_tried(begun, STEPS) for begun in starts[:STARTS]), key=_left)[:KEPT]
-    best, *others = sorted((_with_slope(_led(begun, longer)) for begun in nearest), key=_left)
+    nearest = sorted((_tried(begun, 1) for begun in starts[:STARTS]), key=_left)[:KEPT]
+    best, *others = sorted((_with_slope(_led(begun, [first, *longer])) for begun in nearest), key=_left)
     return [best, *(other for other in others if _as_near(other, best) and not _same(other, best))]
 
 
@@ -217,7 +232,11 @@ def _same(one: Belief, other: Belief) -> bool:
 
 def _over(begun: Belief, record: Record) -> Belief:
     """The nearest over a whole record."""
-    return _tried(replace(begun, record=record), PASSES)
+    begun = replace(begun, record=record)
+    try:
+        return _nearest(begun)
+    except StickslipError:
+        return begun
 
 
 def _horizons(record: Record) -> list[int]:
@@ -236,9 +255,9 @@ def _led(begun: Belief, horizons: list[Record]) -> Belief:
 
 
 def _tried(begun: Belief, passes: int) -> Belief:
-    """The nearest from there; as it was of a law that can not be followed."""
+    """Nearer, by so many passes; as it was of a law that can not be followed."""
     try:
-        return _nearest(begun, passes)
+        return _descended(begun, passes, roughly=True)[0]
     except StickslipError:
         return begun
 
@@ -319,24 +338,46 @@ def _left(belief: Belief) -> float:
 
 def _nearest(belief: Belief, passes: int = PASSES) -> Belief:
     """The belief whose displacement is nearest to the record's, where that is near; else as it was begun."""
-    belief = _linearised(belief)
-    for _ in range(passes):
-        fit = belief.fit
-        assert fit is not None
-        before = _left(belief)
-        step = fit.gain @ belief.residual - fit.pull
-        step /= max(1.0, *(abs(s) / belief.reach(n) for n, s in zip(fit.names, step, strict=True)))
-        for halving in range(HALVINGS):
-            moved = belief.by(fit.names, step / 2**halving)
-            nearer = _left(moved)
-            if nearer < before:
-                break
-        else:
+    belief, fresh = _descended(belief, passes)
+    return belief if fresh else _linearised(belief)
+
+
+def _descended(belief: Belief, passes: int, *, roughly: bool = False) -> tuple[Belief, bool]:
+    """The nearest after so many passes, and whether its slopes were taken just there; roughly, noise is an end."""
+    belief, fresh, taken = _linearised(belief), True, 1
+    while not (roughly and belief.like_noise):
+        before, moved = _left(belief), _step(belief)
+        if moved is not None and _left(moved) < LEARNS * before:
+            belief, fresh = _learned(belief, moved), False
+            continue
+        ended = fresh and (moved is None or _left(moved) > SETTLED * before)
+        if moved is not None:
+            belief, fresh = moved, False
+        if ended or taken >= passes:
             break
-        belief = _linearised(moved)
-        if nearer > SETTLED * before:
-            break
-    return belief
+        belief, fresh, taken = _linearised(belief), True, taken + 1
+    return belief, fresh
+
+
+def _step(belief: Belief) -> Belief | None:
+    """Nearer to the record by its own slopes; None where no part of that step leads nearer."""
+    fit = belief.fit
+    assert fit is not None
+    before = _left(belief)
+    step = fit.gain @ belief.residual - fit.pull
+    step /= max(1.0, *(abs(s) / belief.reach(n) for n, s in zip(fit.names, step, strict=True)))
+    moved = (belief.by(fit.names, step / 2**halving) for halving in range(HALVINGS))
+    return next((nearer for nearer in moved if _left(nearer) < before), None)
+
+
+def _learned(before: Belief, moved: Belief) -> Belief:
+    """With slopes that the step has shown, and no simulation more: Broyden's rule, each value by what it moves."""
+    fit = before.fit
+    assert fit is not None
+    scale = np.sum(fit.jacobian**2, axis=0)
+    step = np.array([moved.values[name] - before.values[name] for name in fit.names])
+    missed = before.residual - moved.residual - fit.jacobian @ step
+    return _fitted(moved, fit.names, fit.jacobian + np.outer(missed, scale * step / (scale @ step**2)))
 
 
 def _linearised(belief: Belief) -> Belief:
@@ -351,7 +392,12 @@ def _linearised(belief: Belief) -> Belief:
     )
     if not names:
         raise EstimateError("a displacement that nothing moves", f"{QUESTION} moves as its law does", "see the record")
-    jacobian = levelled(np.column_stack([slopes[name] for name in names]))
+    return _fitted(belief, names, levelled(np.column_stack([slopes[name] for name in names])))
+
+
+def _fitted(belief: Belief, names: tuple[str, ...], jacobian: Array) -> Belief:
+    """With what x tells of its values, by their slopes."""
+    residual = belief.residual
     independent = len(residual) / correlation_time(residual)
     freedom = max(1.0, independent - len(names))
     weight = float(residual @ residual) / freedom

@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from statistics import NormalDist
 from typing import Any
 
 import numpy as np
@@ -15,7 +16,7 @@ from stickslip.errors import EstimateError, StickslipError
 from stickslip.estimate import FEW, NORMAL_95, UNSTATED, Doubt, Estimate, Status, doubts_of, kinds
 from stickslip.record.record import Record
 from stickslip.statistics import student
-from stickslip.twin.belief import EXCESS, GIVE, KINETIC, SLOPE, Belief, levelled
+from stickslip.twin.belief import EXCESS, GIVE, KINETIC, RATE, SLOPE, Belief, levelled
 from stickslip.twin.search import CHANCE
 from stickslip.workers import Map
 
@@ -28,6 +29,7 @@ LEVEL, FALL, RATIO, GIVES = (
 DIRECTIONS = ("sliding friction forward", "sliding friction back")
 STATIC = ("static friction forward", "static friction back", RATIO)
 SHARE, STOPS, FREQUENCY = "stuck share of the time", "stops per cycle", "forcing frequency"
+OFFSET, ENERGY = "friction offset", "energy per cycle"
 # What the displacement tells through the equation of motion; below, what is asked of the twins as of the record.
 FITTED: dict[str, Callable[[Belief], float]] = {
     LEVEL: lambda rig: rig.kinetic,
@@ -37,8 +39,19 @@ FITTED: dict[str, Callable[[Belief], float]] = {
     RATIO: lambda rig: rig.ratio,
     GIVES: lambda rig: rig.contact,
 }
-BOUNDS = {FALL: (-math.inf, math.inf), SHARE: (0.0, 1.0), RATIO: (1.0, math.inf)}  # of others: zero and more
-ASKED = (*DIRECTIONS, SHARE, STOPS)
+COMPLIANCE = "compliance"
+# What a part of friction is told by, what that is without it, and its value.
+PARTS: dict[str, tuple[str, float, Callable[[Belief], float]]] = {
+    LEVEL: (KINETIC, 0.0, lambda rig: rig.kinetic),
+    FALL: (SLOPE, 0.0, lambda rig: rig.slope),
+    RATIO: (EXCESS, 1.0, lambda rig: rig.ratio),
+    COMPLIANCE: (GIVE, 0.0, lambda rig: 1 / rig.contact),
+}
+EITHER = (-math.inf, math.inf)
+BOUNDS = {FALL: EITHER, OFFSET: EITHER, SHARE: (0.0, 1.0), RATIO: (1.0, math.inf)}  # of others: zero and more
+ASKED = (*DIRECTIONS, OFFSET, ENERGY, SHARE, STOPS)
+# What moves an answer where the zero of a sensor, and no friction, sets the directions apart: so many times the offset.
+ZERO = {OFFSET: -1.0, STATIC[0]: 1.0, STATIC[1]: -1.0}  # of sliding, it is the level then
 SIZES = tuple(1e-4 * 1.4**step for step in range(30))  # of friction, or of the motion: parts looked for, to two fifths
 STICKS = ("stick", "microstick")  # kinds of event
 ANSWERED = 0.5  # of the twins, that must answer a question for the record's answer to be tried on them
@@ -84,10 +97,10 @@ class Trial:
         The rig that the record was believed to come from.
     estimates : mapping of str to Estimate
         The answers after the trial, by name.
-    static : Power or None
-        Static over sliding friction: what the displacement tells of it; None where it tells nothing.
-    yields : Power or None
-        How far the contact gives way before it slips, as a compliance [m/N]: what is felt of it.
+    felt : mapping of str to Power or None
+        What would have been felt: of the sliding friction [N], its slope against speed [N s/m], the static friction
+        over it, the "compliance" of a contact that gives way [m/N], and the stuck share of the time; None where the
+        record tells nothing.
     strays : float
         Root mean square by which x strays from its nearest rig, over that of twins from theirs.
     """
@@ -95,8 +108,7 @@ class Trial:
     count: int
     belief: Belief
     estimates: Answers
-    static: Power | None
-    yields: Power | None
+    felt: Mapping[str, Power | None]
     strays: float
 
     @property
@@ -111,11 +123,10 @@ class Trial:
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON: how many, the law believed in, what would be felt, and how far x strays."""
-        felt = {RATIO: self.static, "compliance": self.yields}
         return {
             "count": self.count,
             "law": {"name": type(self.belief.law).__name__, **_numbers(self.belief)},
-            "felt": {name: None if power is None else vars(power) for name, power in felt.items()},
+            "felt": {name: None if power is None else vars(power) for name, power in self.felt.items()},
             "strays": self.strays,
         }
 
@@ -181,19 +192,28 @@ def try_on_twins(
         )
     misfit = _Misfit(_strays(belief, twins), belief.strain, belief.left)
     tried = {}
+    others = _counted(belief, frequency)
     for name in ASKED:
         if name in answers and answers[name].known:
             pairs = [(twin.answers.get(name), twin.truth[name]) for twin in twins]
             both = belief.falls or UNSTATED in kinds(answers[name].status)
-            answer = _tried(answers[name], pairs, misfit, both=both)
-            tried[name] = _among(answer, _counted(belief, name, frequency))
+            tried[name] = _among(_tried(answers[name], pairs, misfit, both=both), others[name])
     if GIVE in belief.values:
         answers = {**answers, GIVES: Estimate(GIVES, belief.contact, (0.0, math.inf), math.inf, "N/m", "fit to x")}
     for name, value in FITTED.items():
         if name in answers and (name != GIVES or GIVE in belief.values):
             tried[name] = _among(_fitted(answers[name], value, belief, twins, misfit), _apart(belief, value))
+    apart = tried[OFFSET].value if OFFSET in tried else 0.0
+    tried |= {name: _among(tried[name], [times * apart]) for name, times in ZERO.items() if name in tried}
+    if ENERGY in tried:
+        tried[ENERGY] = _among(tried[ENERGY], [-_work_of_drift(belief, frequency), _work_of_drift(belief, frequency)])
+    if LEVEL in tried and tried[LEVEL].known:
+        tried |= {name: _holding(tried[name], tried[LEVEL].interval) for name in DIRECTIONS if name in tried}
     bounded = {name: answer.within(*BOUNDS.get(name, (0.0, math.inf))) for name, answer in tried.items()}
-    return Trial(count, belief, bounded, *_powers(belief), misfit.strays)
+    felt = {**_powers(belief), SHARE: _share_felt(bounded.get(SHARE))}
+    if (share := felt[SHARE]) is not None and not share.claimed:
+        bounded[SHARE] = _among(bounded[SHARE], [-bounded[SHARE].value]).within(*BOUNDS[SHARE])
+    return Trial(count, belief, bounded, felt, misfit.strays)
 
 
 @dataclass(frozen=True)
@@ -255,31 +275,44 @@ def _truth(rig: Belief, record: Record, frequency: float) -> dict[str, float]:
     stops = sum(kind in STICKS and time * frequency < cycles for time, kind in record.truth["events"])
     return {
         **dict.fromkeys(DIRECTIONS, rig.kinetic),
+        OFFSET: 0.0,
+        ENERGY: rig.work(cycles / frequency) / cycles if cycles else math.nan,
         SHARE: float(record.truth[SHARE]),
         STOPS: stops / cycles if cycles else math.nan,
     }
 
 
-def _powers(belief: Belief) -> tuple[Power | None, Power | None]:
-    """What x would have shown of static above sliding friction, and of a contact that gives way [m/N]."""
-    kinetic, fit = belief.values.get(KINETIC, 0.0), belief.fit
-    if kinetic <= 0 or fit is None:
-        return None, None
+def _powers(belief: Belief) -> dict[str, Power | None]:
+    """What x would have shown of each part, at one in a hundred: by how sure it is, or the least that is felt."""
+    fit, kinetic = belief.fit, belief.values.get(KINETIC, 0.0)
+    if fit is None:
+        return {}
     from scipy.special import stdtrit  # half a second, where nothing else of an analysis loads it
 
     chance = float(stdtrit(fit.freedom, 1 - CHANCE))
-    static = yields = None
-    if EXCESS in belief.values:
-        static = Power(belief.ratio, 1.0, 1.0 + chance * fit.sd(EXCESS) / kinetic)
-    elif felt := belief.first_felt(({EXCESS: size * kinetic} for size in SIZES), chance):
-        static = Power(1.0, 1.0, 1.0 + felt[EXCESS] / kinetic)
     furthest = float(np.max(np.abs(belief.record["x"])))
-    softer = ({GIVE: math.log(kinetic / (size * furthest))} for size in SIZES)
-    if GIVE in belief.values:
-        yields = Power(1 / belief.contact, 0.0, chance * fit.sd(GIVE) / belief.contact)
-    elif felt := belief.first_felt(softer, chance):
-        yields = Power(0.0, 0.0, math.exp(-felt[GIVE]))
-    return static if static and math.isfinite(static.felt) else None, yields
+    sought = {
+        KINETIC: [size * belief.size(KINETIC) for size in SIZES],
+        SLOPE: [size * belief.size(SLOPE) for size in SIZES],
+        EXCESS: [size * kinetic for size in SIZES if kinetic > 0],
+        GIVE: [math.log(kinetic / (size * furthest)) for size in SIZES if kinetic > 0],
+    }
+    powers: dict[str, Power | None] = {}
+    for name, (part, null, value) in PARTS.items():
+        if part in belief.values:
+            felt = null + abs(value(belief) - value(belief.by((part,), np.array([-chance * fit.sd(part)]))))
+        else:
+            seen = belief.first_felt(({part: size} for size in sought[part]), chance)
+            felt = math.inf if seen is None else abs(value(belief.at(**seen)))
+        powers[name] = Power(value(belief), null, felt) if math.isfinite(felt) else None
+    return powers
+
+
+def _share_felt(share: Estimate | None) -> Power | None:
+    """The stuck share that would have been told from none, by how far twins' answers scatter."""
+    if share is None or not math.isfinite(share.sd):
+        return None
+    return Power(share.value, 0.0, float(NormalDist().inv_cdf(1 - CHANCE)) * share.sd)
 
 
 def _tried(quick: Estimate, pairs: list[tuple[Estimate | None, float]], misfit: _Misfit, *, both: bool) -> Estimate:
@@ -333,11 +366,26 @@ def _apart(belief: Belief, value: Callable[[Belief], float]) -> list[float]:
     return [value(rival) - value(belief) for rival in belief.rivals]
 
 
-def _counted(belief: Belief, name: str, frequency: float) -> list[float]:
+def _counted(belief: Belief, frequency: float) -> dict[str, list[float]]:
     """The same of what is counted in a simulated motion."""
     chance = np.random.default_rng(0)  # the noise that it draws is not looked at
-    true, *others = (_truth(rig, rig.twin(chance), frequency)[name] for rig in (belief, *belief.rivals))
-    return [other - true for other in others]
+    rigid = [not {GIVE, RATE} & rig.values.keys() for rig in belief.rivals]
+    true, *others = (_truth(rig, rig.twin(chance), frequency) for rig in (belief, *belief.rivals))
+    # a contact that gives way holds at each reversal: that is no stop of one that does not
+    alike = [other for other, stops in zip(others, rigid, strict=True) if stops or {GIVE, RATE} & belief.values.keys()]
+    return {name: [one[name] - true[name] for one in (alike if name in (SHARE, STOPS) else others)] for name in ASKED}
+
+
+def _work_of_drift(belief: Belief, frequency: float) -> float:
+    """What the drift of x's sensor, which twins have not, may add to the work of a cycle that does not close [J]."""
+    x, moved = belief.record["x"], belief.moved
+    line = x - moved - belief.residual
+    return belief.stated.stiffness * float(np.ptp(line)) / (belief.record.duration * frequency) * float(np.ptp(x)) / 2
+
+
+def _holding(answer: Estimate, interval: tuple[float, float]) -> Estimate:
+    """The answer with an interval that holds another one."""
+    return _among(answer, [here - own for here, own in zip(interval, answer.interval, strict=True)])
 
 
 def _among(answer: Estimate, apart: list[float]) -> Estimate:
