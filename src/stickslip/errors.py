@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+MISSTATED = "delimiter"  # stated otherwise than the file has it
+TOO_SHORT = "too short"  # of a record
 NO_RATE = "no sampling rate"  # the kind of error where nothing states one
 
 

@@ -12,6 +12,10 @@ from stickslip.answers.fits import read_fitted as read_fitted
 from stickslip.answers.frequencies import TimeFrequency as TimeFrequency
 from stickslip.answers.frequencies import time_frequency as time_frequency
 from stickslip.answers.long_records import analyze_blocks as analyze_blocks
+from stickslip.answers.many import Batch as Batch
+from stickslip.answers.many import Kept as Kept
+from stickslip.answers.many import Row as Row
+from stickslip.answers.many import spread as spread
 from stickslip.answers.mending import mend as mend
 from stickslip.answers.squeaks import Condition as Condition
 from stickslip.answers.squeaks import compare_squeaks as compare_squeaks

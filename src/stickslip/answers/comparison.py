@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -49,6 +50,23 @@ def compare(findings: Sequence[Findings]) -> Comparison:
     0.3
     """
     require_several(findings)
+    results, notes = against_load(findings)
+    return Comparison(tuple(findings), notes, results=results)
+
+
+class Slid(Protocol):
+    """What is known of one record's friction and load."""
+
+    @property
+    def name(self) -> str: ...
+    @property
+    def level(self) -> Estimate | None: ...
+    @property
+    def normal(self) -> float | None: ...
+
+
+def against_load(findings: Sequence[Slid]) -> tuple[dict[str, Estimate | None], tuple[str, ...]]:
+    """The coefficient and the line of friction against the normal load; and what could not be used."""
     known = [f for f in findings if f.normal is not None and f.level is not None and f.level.unit == "N"]
     left_out = {
         "The normal load of {} is not known; state it to fit the coefficient.": [f for f in findings if not f.normal],
@@ -60,7 +78,7 @@ def compare(findings: Sequence[Findings]) -> Comparison:
     notes = [words.format(", ".join(f.name for f in those)) for words, those in left_out.items() if those]
     results: dict[str, Estimate | None] = dict.fromkeys(("coefficient", "slope", "offset"))
     if len(known) < 2:
-        return Comparison(tuple(findings), tuple(notes), results=results)
+        return results, tuple(notes)
     loads = np.array([f.normal for f in known], dtype=float)
     levels, sds = (np.array([getattr(f.level, key) for f in known]) for key in ("value", "sd"))
     over = f"over {len(known)} records"
@@ -81,7 +99,7 @@ def compare(findings: Sequence[Findings]) -> Comparison:
         results["offset"] = offset.within(0.0, otherwise=LATE)
     else:
         notes.append("Fewer than three loads: whether the line passes through the origin can not be told.")
-    return Comparison(tuple(findings), tuple(notes), results={**results, "coefficient": coefficient})
+    return {**results, "coefficient": coefficient}, tuple(notes)
 
 
 def _line(design: NDArray[np.float64], levels: NDArray[np.float64], sds: NDArray[np.float64]) -> list[dict[str, float]]:

@@ -12,6 +12,7 @@ import numpy as np
 
 from stickslip.answers.asked import Asked
 from stickslip.answers.findings import BY_DECREMENTS, Comparison, Findings, record_name, require_several
+from stickslip.answers.mistakes import mistakes_of_decay
 from stickslip.decay.answer import DecayFit, rig_units
 from stickslip.decay.decrement import Decrement, decrement
 from stickslip.decay.envelope import EnvelopeDecay, extreme_decay, hilbert_decay, linear_decrement, log_decrement
@@ -304,7 +305,12 @@ def analyze_decay(
     decay = Decay(releases, waveform, thesis, motion, older, refusal=refusal, **constants)
     settings = {"method": method, "channel": used, "restoring": restoring, **constants}
     notes = tuple(dict.fromkeys(asked.notes))
-    return Findings(record_name(record), record, faults, notes=notes, settings=settings, results={"decay": decay})
+    first = releases.ring_downs[0]
+    slips = mistakes_of_decay(
+        used, abs(first.amplitude), decay.best.frequency.value, constants.get("mass"), constants.get("stiffness")
+    )
+    results = {"decay": decay, "slips": slips}
+    return Findings(record_name(record), record, faults, notes=notes, settings=settings, results=results)
 
 
 def _constants(channel: str, **stated: Constant | None) -> dict[str, Any]:

@@ -66,7 +66,8 @@ class Findings(Answers):
         :func:`~stickslip.analyze`: ``loops``, ``regression`` and ``asymmetric`` (both directions by themselves),
         ``sticks``, ``breakaway``, ``stiffness``, ``contact_damping``, ``transition``, ``coupled``, ``cause``,
         ``consistency``, ``presliding``, ``pull``, ``delay`` (of the accelerometer), ``comparison`` (of the friction
-        felt and computed) and ``trial`` (of its twins, by :func:`~stickslip.tried`). Of
+        felt and computed), ``slips`` (what was probably stated wrongly), ``lacking`` (what must be stated
+        before there is a force) and ``trial`` (of its twins, by :func:`~stickslip.tried`). Of
         :func:`~stickslip.analyze_decay`: ``decay``. Of :func:`~stickslip.analyze_squeaks`: ``squeaks``, ``beside``,
         ``loops``, ``coupling``, ``spectra``, ``quality`` and ``impulses``.
     faults : tuple of Fault
@@ -143,9 +144,8 @@ class Findings(Answers):
 
     @property
     def contradiction(self) -> str:
-        """What slip of the hand in the channels forbids to trust any force, in words; else empty."""
-        consistency = self.results.get("consistency")
-        return consistency.slip if consistency is not None else ""
+        """What was stated wrongly, and forbids to trust any force, in words; else empty."""
+        return " or ".join(slip.words for slip in self.results.get("slips") or ())
 
     def true_value(self, estimate: Estimate) -> float | None:
         """The true value of what was estimated, where the record is simulated and tells it."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache, partial
 from typing import Any
 
@@ -11,6 +11,7 @@ import numpy as np
 
 from stickslip.answers.asked import Asked
 from stickslip.answers.findings import BY_FORCE, NOT_TRIED, ONSETS, Findings, flagged, record_name, with_doubt
+from stickslip.answers.mistakes import missing, mistakes, slipped, untrue
 from stickslip.answers.preparation import (
     AT_ONCE,
     CONSTANTS,
@@ -25,24 +26,24 @@ from stickslip.balance.balance import ALONE, Balance, pulled_slider
 from stickslip.balance.force import FUSIONS, friction_force
 from stickslip.balance.likely_contact import STRAYING
 from stickslip.balance.motion import is_measured, slid_on
-from stickslip.consistent.contradictions import Consistency, consistency
+from stickslip.consistent.contradictions import consistency
+from stickslip.consistent.slips import Slip
 from stickslip.contact.cause import lag_or_compliance
 from stickslip.contact.contact import contact_damping, contact_stiffness
 from stickslip.contact.sliding_onset import coupled_frequency, transition_speed
 from stickslip.cycle.before_slip import presliding
-from stickslip.cycle.loops import Loops, friction_loops
+from stickslip.cycle.loops import friction_loops
 from stickslip.cycle.onset import breakaway
 from stickslip.cycle.regression import regress_friction
 from stickslip.cycle.sticks import find_sticks
-from stickslip.errors import EstimateError, StickslipError
-from stickslip.estimate import Constant, Doubt, Status
+from stickslip.errors import TOO_SHORT, EstimateError, StickslipError
+from stickslip.estimate import Constant, Doubt
 from stickslip.record.flaws import constant
-from stickslip.record.record import Record, require_record
+from stickslip.record.record import RIG_UNITS, Record, require_record
 from stickslip.rig.settings import RigSettings
 from stickslip.twin.search import lacking
 
 STRETCH = 1 << 14  # samples in which the contact is fitted
-BALANCED = ("balance", "energy")  # checks that a wrong mass, spring or sensor fails
 GOES_ON = 0.8  # of the motion at first that is left at last, where something drives it
 NO_BASE = "there is no channel z: the base is taken to be at rest, but something keeps the motion up"
 
@@ -119,15 +120,16 @@ def analyze(
         led = not question.follows or answers.get(question.follows) is not None
         if led and answers.get(question.unless) is None and question.fits(whole):
             answers[question.key] = asked.ask(question.name, partial(_answer, question, whole, fused, slid))
-    answers = doubted(answers, whole, unknown=made.doubt, refusals=asked.refusals)
+    slips = mistakes(record, rig, answers.get("consistency"), answers.get("loops"))
+    answers = doubted(answers, whole, slips, unknown=made.doubt, refusals=asked.refusals)
     answers = untried(answers) if lacking(whole) is None else answers
-    answers["loops"] = _late(answers.get("loops"), record, rig)
     if all(answer is None for answer in answers.values()):
         raise _nothing(name, record, asked.refusals)
     names = [question.key for question in QUESTIONS]
     results = {**dict.fromkeys(names), **answers, "delay": made.delay, "comparison": made.comparison, "trial": None}
+    results |= {"slips": slips, "lacking": missing(whole, rig)}
     normal = normal_load(record, rig, name, asked.notes)
-    settings = {**_told(whole), "contact": slid}
+    settings = {**_stated(rig, all_of_it=bool(results["lacking"])), **_told(whole), "contact": slid}
     return Findings(name, whole, faults, normal, tuple(asked.notes), settings, results=results)
 
 
@@ -240,21 +242,6 @@ def _can_be_fused(record: Record, *, again: bool) -> bool:
     )
 
 
-def _late(loops: Loops | None, record: Record, rig: RigSettings) -> Loops | None:
-    """The loops, flagged where a sensor is stated to come later than a cycle of the motion."""
-    delays = {name: channel.delay for name, channel in record.channels.items()}
-    delays |= {name: told.delay for name, told in rig.sensors.items() if "delay" in told.model_fields_set}
-    cycles = {name: abs(late) * loops.frequency.value for name, late in delays.items()} if loops is not None else {}
-    far = [name for name, count in cycles.items() if count > 1]
-    if loops is None or not far:
-        return loops
-    words = (
-        f"{' and '.join(far)} {'is' if len(far) == 1 else 'are'} stated to come {delays[far[0]]:.4g} s late, "
-        f"{cycles[far[0]]:.2g} cycles of the motion (milliseconds taken for seconds, perhaps)"
-    )
-    return replace(loops, status=Status(words, loops.status))
-
-
 def _fused(record: Record) -> Record:
     """The middle of a record, enough to fit a contact by its likelihood, with all sensors put together."""
     cut = middle(record, STRETCH)
@@ -273,6 +260,13 @@ def _told(record: Record) -> dict[str, Any]:
     return told | ({"sd": dict(record.rig.sd)} if record.rig is not None and record.rig.sd else {})
 
 
+def _stated(rig: RigSettings, *, all_of_it: bool) -> dict[str, Any]:
+    """What is stated of the sensors; and of the rig's constants, where they do not lead to a force."""
+    sensors = {name: told.model_dump(exclude_unset=True) for name, told in rig.sensors.items()}
+    constants = {key: float(getattr(rig, key)) for key in RIG_UNITS if all_of_it and getattr(rig, key) is not None}
+    return {**constants, **({"sensors": sensors} if sensors else {})}
+
+
 def _nothing(name: str, record: Record, refusals: list[StickslipError]) -> EstimateError:
     value = f"{name} answers no question about friction"
     still = [each for each in MOTION if each in record and constant(record[each])]
@@ -283,7 +277,10 @@ def _nothing(name: str, record: Record, refusals: list[StickslipError]) -> Estim
             "look at its cable, range and column",
         )
     if refusals:
-        return EstimateError(f"{value}: {refusals[0].value}", refusals[0].rule, refusals[0].next_step)
+        first = refusals[0]
+        if first.kind == TOO_SHORT:
+            return EstimateError(f"{name} is too short: {len(record)} samples", *first.args[1:], kind=first.kind)
+        return EstimateError(f"{value}: {first.value}", first.rule, first.next_step, kind=first.kind)
     return EstimateError(
         f"{value}: its channels are {', '.join(f'{c.name} [{c.unit}]' for c in record.channels.values())}",
         "a displacement x or velocity v is needed, and a force, or mass and stiffness to find it",
@@ -295,11 +292,17 @@ def _nothing(name: str, record: Record, refusals: list[StickslipError]) -> Estim
 
 
 def doubted(
-    answers: dict[str, Any], record: Record, *, unknown: Doubt | None, refusals: Sequence[StickslipError]
+    answers: dict[str, Any],
+    record: Record,
+    slips: Sequence[Slip],
+    *,
+    unknown: Doubt | None,
+    refusals: Sequence[StickslipError],
 ) -> dict[str, Any]:
     """The answers, flagged by the gravest doubt that concerns each; `unknown` is what is not stated of the rig."""
     told, gravest = dict(answers), dict[str, Doubt | str]()
-    for reason, keys in _reasons(told.get("consistency"), record, unknown, refusals):
+    contradiction = slipped(slips) or untrue(told.get("consistency"))
+    for reason, keys in _reasons(contradiction, record, unknown, refusals):
         for key in keys:
             if gravest.setdefault(key, reason) == reason:
                 told[key] = flagged(told.get(key), reason)
@@ -307,11 +310,11 @@ def doubted(
 
 
 def _reasons(
-    consistent: Consistency | None, record: Record, unknown: Doubt | None, refusals: Sequence[StickslipError]
+    contradiction: str, record: Record, unknown: Doubt | None, refusals: Sequence[StickslipError]
 ) -> Iterator[tuple[Doubt | str, Iterable[str]]]:
     """Each doubt with the questions that it concerns, the gravest first."""
-    if words := _contradiction(consistent):
-        yield words, (*BY_FORCE, "sticks")
+    if contradiction:
+        yield contradiction, (*BY_FORCE, "sticks")
     if _base_unseen(record):
         yield NO_BASE, (*BY_FORCE, "sticks")
     if unknown:
@@ -325,19 +328,6 @@ def _reasons(
 def untried(answers: dict[str, Any]) -> dict[str, Any]:
     """The answers, with a doubt at those that rigs of another kind give too."""
     return {**answers, **{key: with_doubt(answers.get(key), NOT_TRIED) for key in ONSETS}}
-
-
-def _contradiction(told: Consistency | None) -> str:
-    """What one slip in the channels, or in the rig's constants, would explain; a clipped sensor says so itself."""
-    if told is None:
-        return ""
-    if told.slip:
-        return f"the channels contradict each other: perhaps {told.slip}"
-    failed = told.failed
-    if any("range" in check.name for check in failed):
-        return ""
-    apart = [check.sentence for check in failed if any(word in check.name for word in BALANCED)]
-    return f"the record and the rig's constants contradict each other: {apart[0]}" if apart else ""
 
 
 def _base_unseen(record: Record) -> bool:

@@ -12,6 +12,7 @@ import click
 
 import stickslip as ss
 from stickslip.cli.interrupted import INTERRUPTED
+from stickslip.cli.many import Places, ask_many, finish, many_options
 from stickslip.cli.options import all_option, reading_options, result_options, usable
 from stickslip.cli.progress import progress
 from stickslip.cli.records import (
@@ -65,6 +66,7 @@ twins_option = click.option(
     help="How the friction is found: by all sensors together (fusion), by some, or by derivatives; auto says why.",
 )
 @twins_option
+@many_options
 @result_options("FILE-stickslip")
 @reading_options
 def analyze(
@@ -81,16 +83,27 @@ def analyze(
     FILES that belong to one record are joined with +, as in x.mat+z.mat. A quoted pattern ("run_*.csv") stands for
     all files that fit. Several records are compared, with the normal load too where it is known.
 
+    Of more than 20 records each is a row of one table, worked on by several processes, and an interrupted run goes on
+    when it is called again.
+
     Results go into a folder: report.html to open in a browser, results.json, and the figures.
 
     \b
     stickslip analyze run.csv --channels "x=disp [mm]" --mass 3.08 --stiffness "1.19 N/mm"
     stickslip analyze "run_*.csv" --config rig.toml --normal "*250g*=2.45" --normal "*450g*=4.41"
     """
+    places = Places.of(options)
     rig = rig_of(**options)
     groups = [group for argument in files for group in groups_of(argument)]
     require_fits(options["normal"], groups)
     folder = output or default_folder(groups)
+    if places.wanted(groups):
+        chosen = click.get_current_context().get_parameter_source("twins") is not click.core.ParameterSource.DEFAULT
+        asked = {"method": method, "twins": twins if chosen else 0}
+        with progress(len(groups)) as tell:
+            batch = ask_many("analyze", groups, rig, asked, places, folder=folder, tell=tell)
+        finish(batch, places, folder if output or not as_json else None, folder, as_json=as_json, everything=everything)
+        return
     with progress(2 * len(groups) + 1) as tell:
         found, refused = answers(
             groups,
@@ -138,6 +151,8 @@ def _tried(findings: Findings, twins: int, tell: Callable[..., None]) -> Finding
     def asked(share: float) -> None:
         tell(f"trying the answers of {findings.name} on twins, {100 * share:.0f} %")
 
+    if findings.contradiction:  # the rig that it would be tried on is not the one that wrote the record
+        return findings
     asked(0.0)
     try:
         return ss.tried(findings, twins=twins, processes=processors(), progress=asked)

@@ -8,6 +8,7 @@ from typing import Any
 import click
 
 import stickslip as ss
+from stickslip.cli.many import Places, ask_many, finish, many_options
 from stickslip.cli.options import reading_options, result_options
 from stickslip.cli.progress import progress
 from stickslip.cli.records import (
@@ -48,6 +49,7 @@ from stickslip.cli.show import show
     help="The spring's law; pendulum for an angle that swings far.",
 )
 @click.option("--channel", metavar="NAME", help="x, theta, v or a; the first of these that the file has unless given.")
+@many_options
 @result_options("FILE-stickslip")
 @reading_options
 def decay(files: tuple[str, ...], output: Path | None, as_json: bool, everything: bool, **options: Any) -> None:
@@ -63,6 +65,7 @@ def decay(files: tuple[str, ...], output: Path | None, as_json: bool, everything
     stickslip decay release.csv --channels "x=disp [mm]" --stiffness "2.31 N/mm"
     stickslip decay "release_*.csv" --method thesis --json
     """
+    places = Places.of(options)
     asked = {key: options.pop(key) for key in ("method", "channel", "restoring", "mass", "stiffness")}
     rig = rig_of(**options)
     if any(each.partition(":")[0] == "drift" for each in rig.repair):
@@ -74,6 +77,11 @@ def decay(files: tuple[str, ...], output: Path | None, as_json: bool, everything
     groups = [group for argument in files for group in groups_of(argument)]
     folder = output or (default_folder(groups) if len(groups) == 1 else Path("decays-stickslip"))
     asked |= {key: getattr(rig, key) for key in ("mass", "stiffness") if asked[key] is None}
+    if places.wanted(groups):
+        with progress(len(groups)) as tell:
+            batch = ask_many("decay", groups, rig, asked, places, folder=folder, tell=tell)
+        finish(batch, places, folder if output or not as_json else None, folder, as_json=as_json, everything=everything)
+        return
     with progress(2 * len(groups) + 1) as tell:
         found, refused = answers(groups, rig, lambda record: ss.analyze_decay(record, **asked), tell)
         tell("drawing and writing", 2 * len(groups))

@@ -36,6 +36,13 @@ def reading_options(command: Callable[..., None]) -> Callable[..., None]:
             metavar='"COLUMN=UNIT"',
             help='Unit of a column whose header states none: "x=mm", "#1=ms". Repeatable.',
         ),
+        click.option(
+            "--sensor",
+            "sensors",
+            multiple=True,
+            metavar='"CHANNEL.NAME=VALUE"',
+            help='What is known of a sensor: "a.delay=3 ms", "a.mount=125 Hz, 0.1", "load.inertia=20 g". Repeatable.',
+        ),
         click.option("--fs", metavar="HZ", help="Sampling rate, for a file that states none."),
         click.option("--time", metavar="COLUMN", help="Column that holds the time, where its header does not say."),
         click.option("--delimiter", metavar="SIGN", help="Delimiter of a text file, where it can not be told."),
@@ -51,7 +58,7 @@ def reading_options(command: Callable[..., None]) -> Callable[..., None]:
             "--config",
             type=click.Path(path_type=Path),
             metavar="RIG.TOML",
-            help="File of the rig's constants and channel map; options go before it.",
+            help="The rig's constants and channel map; unless given rig.toml of this folder. Options go before it.",
         ),
     ]
     for option in reversed(options):
@@ -92,18 +99,21 @@ def result_options(folder: str, *, short: bool = True) -> Callable[[Callable[...
     return lambda command: output(as_json(all_option(command) if short else command))
 
 
+changes_option = click.option(
+    "--set",
+    "changes",
+    multiple=True,
+    metavar='"NAME=VALUE"',
+    help='Another value of a parameter: "kinetic=1.3", "amplitude=0.7 mm", "law.stiffness=2 N/um". Repeatable.',
+)
+
+
 def case_options(command: Callable[..., None]) -> Callable[..., None]:
     """The options that say how long it runs and what is changed of it."""
     options = [
         click.option("--duration", metavar="TIME", help="Time to simulate in s, or with its unit."),
         click.option("--cycles", type=click.FloatRange(min=0, min_open=True), help="The same in periods of the drive."),
-        click.option(
-            "--set",
-            "changes",
-            multiple=True,
-            metavar='"NAME=VALUE"',
-            help='Another value of a parameter: "kinetic=1.3", "amplitude=0.7 mm", "law.stiffness=2 N/um". Repeatable.',
-        ),
+        changes_option,
     ]
     for option in reversed(options):
         command = option(command)

@@ -15,10 +15,14 @@ from stickslip.cli.decay import decay
 from stickslip.cli.devices import devices
 from stickslip.cli.exchange import check, convert, datasets
 from stickslip.cli.fit import fit
+from stickslip.cli.impact import impact
+from stickslip.cli.init import init
 from stickslip.cli.interrupted import INTERRUPTED, SENTENCE
 from stickslip.cli.lab import lab
+from stickslip.cli.mended import mended
 from stickslip.cli.predict import predict
 from stickslip.cli.progress import compiling
+from stickslip.cli.regimes import bifurcation, dither, stability
 from stickslip.cli.rig import rig
 from stickslip.cli.simulate import simulate
 from stickslip.cli.squeak import squeak
@@ -28,12 +32,15 @@ from stickslip.cli.thesis import thesis
 from stickslip.cli.wavelet import wavelet
 from stickslip.cli.words import spoken
 
+ARGUMENTS = "stickslip.arguments"  # the key under which the context keeps what was typed
+
 
 class _Commands(click.Group):
     """Every error that stickslip raises on purpose ends as one sentence and its exit code."""
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         """What is asked wrongly before any command is refused as within one."""
+        ctx.meta[ARGUMENTS] = list(args)
         if not args:
             return super().parse_args(ctx, args)  # shows the help
         try:
@@ -52,6 +59,8 @@ class _Commands(click.Group):
             ctx.exit(_misused(error, " ".join(filter(None, (ctx.command_path, ctx.invoked_subcommand)))))
         except ss.StickslipError as error:
             complain(spoken(error))
+            for line in mended(ctx.meta.get(ARGUMENTS, ()), error):
+                say(line, err=True)
             ctx.exit(error.exit_code)
         except OSError as error:  # a name that the system does not take, a disk that is full
             if error.filename is None:
@@ -79,19 +88,24 @@ for _command in (
     acquire,
     analyze,
     bench,
+    bifurcation,
     check,
     commission,
     convert,
     datasets,
     decay,
     demo,
+    dither,
     devices,
     fit,
+    impact,
+    init,
     lab,
     predict,
     rig,
     simulate,
     squeak,
+    stability,
     sweep,
     thesis,
     wavelet,

@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 Answer = TypeVar("Answer")
 
 LONG = 1 << 26  # bytes on the disk
+RIG_FILE = "rig.toml"  # of the folder one is in: read where no other is named
 PART = 1 << 18  # rows of a long record's part
 
 
@@ -39,15 +40,25 @@ def rig_of(
     channels: Sequence[str],
     units: Sequence[str],
     repair: str | None,
+    sensors: Sequence[str] = (),
     normal: Sequence[str] = (),
+    here: bool = True,
     **constants: str | None,
 ) -> RigSettings:
-    """The settings of the file, with those of the command line in front."""
+    """The settings of the file, with those of the command line in front; rig.toml of this folder is that file.
+
+    A rig.toml is looked for only if it may be `here`.
+    """
+    if config is None and here and Path(RIG_FILE).is_file():
+        config = Path(RIG_FILE)
+        complain(f"columns and constants by {RIG_FILE}")
     given: dict[str, Any] = {key: value for key, value in constants.items() if value is not None}
     base = ss.rig.read_rig(config).model_dump(exclude_unset=True) if config else {}
     for key, pairs in (("channels", channels), ("units", units)):
         if pairs:
             given[key] = {**base.get(key, {}), **dict(pair(text, f"--{key}") for text in pairs)}
+    if sensors:
+        given["sensors"] = _sensors(base.get("sensors", {}), sensors)
     if repair is not None:
         given["repair"] = [word.strip() for word in repair.split(",")]
     if normal:  # the first pattern that fits decides
@@ -56,6 +67,26 @@ def rig_of(
             _require_load(load)
         given["normal"] = loads | {key: load for key, load in base.get("normal", {}).items() if key not in loads}
     return ss.rig.rig_settings({**base, **given}, source="the command line")
+
+
+def _sensors(known: Mapping[str, Any], stated: Sequence[str]) -> dict[str, dict[str, Any]]:
+    """What is known of the sensors, with what the command line states in front."""
+    sensors = {name: dict(details) for name, details in known.items()}
+    for text in stated:
+        name, value = pair(text, "--sensor")
+        channel, point, detail = name.partition(".")
+        if not point:
+            raise click.BadParameter(f"'{text}' is not CHANNEL.NAME=VALUE", param_hint="--sensor")
+        parts = [_number(part.strip()) for part in value.split(",")]
+        sensors.setdefault(channel, {})[detail] = parts if detail == "mount" else _number(value)
+    return sensors
+
+
+def _number(text: str) -> float | str:
+    try:
+        return float(text)
+    except ValueError:
+        return text
 
 
 def _require_load(load: str) -> None:
@@ -173,7 +204,7 @@ def _with_source(record: Record, files: Sequence[Path], names: Sequence[str]) ->
     if called.keys() <= known:
         return dataclasses.replace(record, history=tuple(_called(step, called) for step in record.history))
     sources = [
-        {"name": name, **({} if path.parent == Path() else {"folder": str(path.parent)}), "sha256": _checksum(path)}
+        {"name": name, **({} if path.parent == Path() else {"folder": str(path.parent)}), "sha256": checksum(path)}
         for name, path in zip(called.values(), files, strict=True)
     ]
     step = ss.record.Step("read_record", {"files": sources}, "a record as it was written")
@@ -190,7 +221,7 @@ def _called(step: Step, names: Mapping[str, str]) -> Step:
 
 
 @functools.cache
-def _checksum(path: Path) -> str:
+def checksum(path: Path) -> str:
     with path.open("rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
@@ -206,7 +237,7 @@ def collected(refused: list[ss.StickslipError], files: Sequence[Path], names: Se
     except ss.StickslipError as error:
         known = any(name in str(error) for name in names)
         value = error.value if known else f"{' + '.join(names)}: {error.value}"
-        refused.append(type(error)(value, error.rule, error.next_step))
+        refused.append(type(error)(value, error.rule, error.next_step, kind=error.kind))
 
 
 def answers(

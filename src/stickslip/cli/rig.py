@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Any
 import click
 
 import stickslip as ss
-from stickslip.cli.options import case_options, folder_name, pair, result_options, wanted_case
+from stickslip.cli.options import case_options, folder_name, pair, reading_options, result_options, wanted_case
 from stickslip.cli.progress import progress
+from stickslip.cli.records import folder_after, groups_of, read, rig_of
 from stickslip.cli.show import show
 
 if TYPE_CHECKING:
@@ -22,7 +23,20 @@ FS, RATES = (4000.0,), (1000.0, 2000.0, 4000.0)  # Hz
 PRESETS = {"air-track": "air_track", "linear-bearing": "linear_bearing", "perfect": "perfect"}
 
 
-@click.command()
+class _Rig(click.Group):
+    """What is no other command of the group measures: `stickslip rig SCENARIO`."""
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        """With the command's name where it is left out."""
+        return super().parse_args(ctx, args if args and args[0] in self.commands else ["measure", *args])
+
+
+@click.group(cls=_Rig)
+def rig() -> None:
+    """Measure a simulated motion with a virtual rig, plan an experiment on it, or join what two recorders wrote."""
+
+
+@rig.command("measure")
 @click.argument("case", metavar="SCENARIO|FILE.toml")
 @click.option(
     "--preset",
@@ -77,11 +91,13 @@ PRESETS = {"air-track": "air_track", "linear-bearing": "linear_bearing", "perfec
 )
 @case_options
 @result_options("NAME-rig, or NAME-plan,")
-def rig(case: str, output: Path | None, as_json: bool, everything: bool, plan: bool, **options: Any) -> None:
+def measure(case: str, output: Path | None, as_json: bool, everything: bool, plan: bool, **options: Any) -> None:
     """Measure a simulated motion with a virtual rig, or plan an experiment on it.
 
     SCENARIO or FILE.toml is what stickslip simulate takes. The record is what sensors would have written that lag,
     ring, forget, clip and round, with the truth beside it: try a method on it before there is a rig.
+
+    What two recorders with clocks of their own wrote of one run is made one record by stickslip rig join.
 
     With --plan the motion is measured again and again, at each --fs, with and without the accelerometer and the load
     cell, and a table tells how far off the answers are: the delay between sensors, the friction at each moment and its
@@ -140,3 +156,53 @@ def _planned(
     """Many."""
     chosen = {name: options[name] for name in ("draws", "seed", "start", "shaker")}
     return ss.answers.plan_experiment(run, rig=bench, rates=options["rates"] or RATES, progress=tell, **chosen)
+
+
+@rig.command("join")
+@click.argument("first")
+@click.argument("second")
+@click.option("--first-channels", multiple=True, metavar='"NAME=COLUMN [UNIT]"', help="Columns of FIRST. Repeatable.")
+@click.option("--second-channels", multiple=True, metavar='"NAME=COLUMN [UNIT]"', help="Columns of SECOND. Repeatable.")
+@click.option(
+    "--on", metavar='"CHANNEL" or "CHANNEL,CHANNEL"', help="What both recorded of one motion; found unless given."
+)
+@click.option(
+    "--offset", metavar="TIME", help="Time to add to SECOND's clock in s, or with its unit; found unless given."
+)
+@click.option("--drift", is_flag=True, help="Find how much faster one clock runs, too.")
+@click.option("--format", "form", type=click.Choice(["csv", "h5", "parquet"]), default="csv", show_default=True,
+              help="Format of the record.")  # fmt: skip
+@result_options("FIRST-joined")
+@reading_options
+def join(first: str, second: str, output: Path | None, as_json: bool, everything: bool, **options: Any) -> None:
+    """Make one record of what two recorders wrote of the same run, each on its own clock.
+
+    FIRST keeps its clock; SECOND is moved by the offset at which both saw the same motion, and interpolated onto FIRST.
+    A displacement may meet a velocity or an acceleration. The folder holds the joined record, which the other commands
+    read without options.
+
+    \b
+    stickslip rig join daq.csv logger.csv --first-channels "x=pos [mm]" --second-channels "v=speed [m/s]"
+    """
+    form, on, shift, drift = (options.pop(key) for key in ("form", "on", "offset", "drift"))
+    own = [options.pop(f"{which}_channels") for which in ("first", "second")]
+    if options["channels"] and any(own):
+        raise click.BadParameter("columns are named for both, or for each", param_hint="--channels")
+    groups = [group for argument in (first, second) for group in groups_of(argument)]
+    if len(groups) != 2:
+        raise click.BadParameter(f"{len(groups)} records; two are joined", param_hint="FIRST SECOND")
+    seconds = None if shift is None else float(ss.Estimate.stated("offset", shift, "s"))
+    shared = None if on is None else tuple(each.strip() for each in on.split(","))
+    with progress(2) as tell:
+        tell("reading", 0)
+        a, b = (
+            read(group, rig_of(**{**options, "channels": named or options["channels"]}))
+            for group, named in zip(groups, own, strict=True)
+        )
+        tell("finding the offset of the clocks", 1)
+        named_on: Any = shared[0] if shared and len(shared) == 1 else shared
+        rate = ss.signals.clock_rate(a, b, on=named_on) if drift else 1.0
+        joined = ss.signals.synchronise(a, b, on=named_on, offset=seconds, rate=rate)
+        folder = output or (None if as_json else folder_after(groups[0][0], "joined"))
+        written = ss.publish(joined, folder=folder, form=form) if folder else None
+    show(joined, written, as_json=as_json, everything=everything, form=form)

@@ -47,8 +47,8 @@ def _print_short(story: Story) -> None:
     """At most MOST_LINES lines: the answer, the rows that lead, their cautions, and what else there is."""
     in_tables = sum(len(table.rows) for table in story.tables if not table.folded)
     rows, lines = story.lines[: MOST_ROWS - min(in_tables, OF_TABLES)], []
-    told = [story.answer, *([] if story.lines or story.tables else story.others)]  # without rows the sentences are all
-    for text in (*story.urgent, *told, *(f"{part.title}: {part.answer}" for part in story.parts[:MOST_PARTS])):
+    told = [] if story.lines or story.tables else story.others  # without rows the sentences are all
+    for text in (*story.opening, *told, *(f"{part.title}: {part.answer}" for part in story.parts[:MOST_PARTS])):
         lines += _lines(text)
     lines += [*_remedy(story), *_numbers(story, rows)]
     left, hidden = MOST_ROWS - len(rows), 0
@@ -66,7 +66,7 @@ def _print_short(story: Story) -> None:
     _print(story.title, lines)
     more = {
         "quantity": len(story.lines) - len(rows), "row": hidden, "caution": len(story.notices) - len(cautions),
-        "sentence": len(story.others) + 1 - len(told), "note": len(story.notes),
+        "sentence": len(story.others) - len(told), "note": len(story.notes),
         "record": max(0, len(story.parts) - MOST_PARTS),
     }  # fmt: skip
     counted = [
@@ -100,7 +100,7 @@ def _print(title: str, lines: Sequence[str]) -> None:
 
 def _remedy(story: Story) -> list[str]:
     """The command that mends what is wrong, on a line that can be copied."""
-    return ["To read it so that they agree:", story.remedy] if story.remedy else []
+    return ["To mend it:", story.remedy] if story.remedy else []
 
 
 def _lines(text: object, begin: str = "") -> list[str]:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 import stickslip as ss
+from stickslip.cli.many import Places, ask_many, finish, many_options
 from stickslip.cli.options import reading_options, result_options
 from stickslip.cli.progress import progress
 from stickslip.cli.records import (
@@ -44,6 +45,7 @@ if TYPE_CHECKING:
     metavar="VALUE",
     help="Distance of the friction from the axis of torsion in m, for its work.",
 )
+@many_options
 @result_options("FILE-squeak")
 @reading_options
 def squeak(
@@ -68,10 +70,18 @@ def squeak(
     stickslip squeak squeal.wav --channels "sound=sound * 2.5 [Pa]"
     stickslip squeak wet_6N.csv wet_1N.csv --normal "*6N*=6.13" --normal "*1N*=1.23"
     """
+    places = Places.of(options)
     rig = rig_of(**options)
     groups = [group for argument in files for group in groups_of(argument)]
     require_fits(options["normal"], groups)
     folder = output or Path(f"{groups[0][0].stem}-squeak" if len(groups) == 1 else "squeaks-compared")
+
+    if places.wanted(groups):
+        asked = {"channel": channel, "frequencies": frequencies, "lever": lever}
+        with progress(len(groups)) as tell:
+            batch = ask_many("squeak", groups, rig, asked, places, folder=folder, tell=tell)
+        finish(batch, places, folder if output or not as_json else None, folder, as_json=as_json, everything=everything)
+        return
 
     def ask(record: Record) -> Findings:
         found = ss.analyze_squeaks(record, channel=channel, frequencies=frequencies, contact=rig.contact, lever=lever)

@@ -18,14 +18,10 @@ from stickslip.balance.motion import is_measured, require_change, stretches
 from stickslip.consistent.checks import (
     FAILS,
     HOLDS,
-    ONE_SLIP,
     UNTOLD,
     Check,
-    Slip,
     compared,
     judged,
-    mixups,
-    slip_check,
     untold,
 )
 from stickslip.consistent.forced_checks import (
@@ -37,8 +33,10 @@ from stickslip.consistent.forced_checks import (
     momentum_check,
     stops_check,
     velocity_check,
+    zero_off,
 )
 from stickslip.consistent.sliding_balance import Stated, stated_checks, what_fails
+from stickslip.consistent.slips import ONE_SLIP, Slip, mixups, slip_check
 from stickslip.errors import EstimateError
 from stickslip.estimate import Constant, Result, plain
 from stickslip.record.check import find_clipping
@@ -78,11 +76,14 @@ class Consistency(Result):
         "ok", or what can not all be true.
     slips : tuple of Slip
         What would make the channels agree, the likeliest first.
+    zero : Slip or None
+        The zero that is off, where the mean force is not zero by much.
     """
 
     checks: tuple[Check, ...]
     status: str
     slips: tuple[Slip, ...] = ()
+    zero: Slip | None = None
 
     @property
     def failed(self) -> tuple[Check, ...]:
@@ -127,7 +128,7 @@ def consistency(
     w^2 \dot x)\,dt = 0` hold, true of every friction law under a harmonic drive; can the mass slide without stops
     under this friction, or stop (Den Hartog's boundary; :math:`F \le \pi k Z / 4` for any contact); is a sensor at
     the end of its range; is a reversal sampled densely enough; do the channels belong to the same cycle. Where it does
-    not add up, every sign, exchange and unit of one channel is tried that would make it.
+    not add up, every sign, exchange and unit of a channel, a constant or the clock is tried that would make it.
 
     Of stated values: friction against what the base can give, against what the amplitude asks for, Den Hartog's
     boundary, and the transition speed (thesis, 3.4). A text's last digit tells its rounding: "0.51 mm" is rounded
@@ -187,11 +188,10 @@ def consistency(
         sampling_check(record, seen),
         *cycle_checks(record, seen),
     )
-    slips: tuple[Slip, ...] = ()
-    if any(check.verdict == FAILS for check in checks):
-        slips = mixups(seen.balance)
-        checks = (*checks, *slip_check(seen.balance, slips))
-    return Consistency(checks, what_fails(checks), slips)
+    failing = any(check.verdict == FAILS for check in checks)
+    slips = mixups(seen.balance, failing=failing) if seen.steady and seen.lines.cycles is not None else ()
+    checks = (*checks, *slip_check(seen.balance, slips))
+    return Consistency(checks, what_fails(checks), slips, zero_off(seen))
 
 
 def silent(record: Record, names: Sequence[str]) -> dict[str, str]:

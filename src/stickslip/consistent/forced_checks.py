@@ -11,8 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stickslip.balance.mass import Complex, Lines, find_lines, response_of
-from stickslip.consistent.checks import APART, HOLDS, UNTOLD, Amplitudes, Check, compared, judged, untold
+from stickslip.consistent.checks import APART, FAILS, HOLDS, UNTOLD, Check, compared, judged, untold
 from stickslip.consistent.sliding_balance import Slider
+from stickslip.consistent.slips import Amplitudes, Slip
 from stickslip.record.channels import Channel
 from stickslip.record.record import RIG_UNITS, Record
 from stickslip.statistics import mean_uncertainty
@@ -25,6 +26,8 @@ MOST_ORDERS, PLACES = 40, 2000  # harmonics, and places in a cycle, of which the
 LOUD = 5.0  # standard deviations of its mean from which a harmonic counts
 SLOW = 0.04  # share of the peak speed below which the mass rests
 FEW_TRIPS = 2.0  # times the largest force over the stroke, that a spring might have kept
+STEADY = 0.9  # of its amplitude is left of a line's mean over the stretches, where they are in phase
+FAR_OFF = 0.1  # of the amplitude: a zero that is off by less harms little
 STOPS = 0.1  # share of the time below it from which a motion stops: a harmonic one is there for 0.025
 
 
@@ -98,6 +101,12 @@ class Seen:
         parts = [values.real, values.imag] if np.iscomplexobj(values) else [values]
         spreads = [mean_uncertainty(np.asarray(part, dtype=float))[0] if len(part) > 1 else 0.0 for part in parts]
         return math.hypot(*spreads) / math.sqrt(self.lines.worth)
+
+    @property
+    def steady(self) -> bool:
+        """Whether each channel keeps its phase from stretch to stretch: else their mean lines are of no one motion."""
+        read = [values[:, self.at] for name, values in self.lines.amplitudes.items() if name not in RATES]
+        return all(abs(values.mean()) > STEADY * np.abs(values).mean() for values in read)
 
     @property
     def balance(self) -> Amplitudes:
@@ -290,6 +299,18 @@ def momentum_check(seen: Seen) -> Check:
         name, float(np.mean(left)), float(np.mean(right)), sd=sd, unit=unit,
         holds="what acts on the mass has no mean over whole cycles", fails=sentence,
     )  # fmt: skip
+
+
+def zero_off(seen: Seen) -> Slip | None:
+    """The accelerometer or the load cell whose zero is off by a good part of what it reads, with the cure."""
+    check = momentum_check(seen)
+    if check.verdict != FAILS:
+        return None
+    name = "a" if check.unit == "m/s^2" else "load"
+    off = check.left if name == "a" else check.right - check.left
+    if abs(off) < FAR_OFF * abs(complex(seen.strongest(name).mean())):
+        return None
+    return Slip(check.sentence, zeros={name: off})
 
 
 def identity_check(seen: Seen) -> Check:

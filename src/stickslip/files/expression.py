@@ -78,6 +78,21 @@ def times(text: str, factor: float, *, unit: str | None = None) -> str:
     return text if factor == 1 else text.replace(spec.arithmetic, f"{factor:.14g} * ({spec.arithmetic})", 1)
 
 
+def shifted(text: str, by: float, channel: str) -> str:
+    """A channel as asked for, less a zero `by` in SI; empty where a sensitivity stands between.
+
+    Examples
+    --------
+    >>> shifted("acc [g]", 0.980665, "a"), shifted("F [N]", -2.0, "load")
+    ('(acc) - 0.1 [g]', '(F) + 2 [N]')
+    """
+    spec = split_spec(text)
+    if "@" in text:
+        return ""
+    off = by / (channel_unit(spec.unit, channel).scale if spec.unit else 1.0)
+    return text.replace(spec.arithmetic, f"({spec.arithmetic}) {'-' if off > 0 else '+'} {abs(off):.6g}", 1)
+
+
 def _gain(text: str) -> tuple[str, float]:
     """What stands before the uncertainty of a gain, and that as a part of it; ``a +- b`` is arithmetic."""
     match = re.fullmatch(rf"(.*){PLUS_MINUS}\s*([^\[\]@]*)", text, re.DOTALL)

@@ -15,7 +15,7 @@ from stickslip.errors import RecordError, StickslipError
 from stickslip.files.expression import Linear, Spec, apply_sensitivity, channel_unit, linear, split_spec, unknown
 from stickslip.files.table import Block, Column, Table, supplied, unique
 from stickslip.printing import printable
-from stickslip.record.channels import VOCABULARY, Channel, checked_name, described
+from stickslip.record.channels import UNSTATED, VOCABULARY, Channel, checked_name, described
 from stickslip.units import LONGEST, Unit, parse_unit
 
 _SLASH = re.compile(r"[\[(][^\[(\])]*[\])]|([/\\])")  # one in brackets belongs to a unit
@@ -276,7 +276,7 @@ class Columns:
         elif stated is None:
             usual = VOCABULARY[name].units[-1 if name == "sound" else 0] if name in VOCABULARY else "1"
             unit = Unit(usual, 1.0, usual)
-            source += f" (no unit stated, taken as {usual})" if usual != "1" else ""
+            source += f"{UNSTATED}taken as {usual})" if usual != "1" else ""
         else:
             unit = self._unit(name, stated)
             source += f" [{stated}]" if spec.unit is None else ""

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
-from stickslip.errors import FormatError
+from stickslip.errors import MISSTATED, FormatError
 from stickslip.files.table import FREE, Block, Column, Options, Table
 from stickslip.record.metadata import read_beside
 
@@ -400,6 +400,7 @@ def find_layout(head: bytes, whole: bool, options: Options, name: str) -> Layout
     cells, delimiter, decimal = _best_split(lines, options)
     widths = Counter(len(row) for row in cells if row)
     if not widths:
+        _require_as_stated(lines, options, name)
         first = next(((number, line.strip()) for number, line in enumerate(lines, 1) if line.strip()), (1, ""))
         raise FormatError(
             f"row {first[0]} of '{name}' reads '{first[1][:40]}', and none of the first {len(lines)} holds numbers",
@@ -435,6 +436,20 @@ def is_number(cell: str, decimal: str) -> bool:
 def is_missing(cell: str) -> bool:
     """Whether a cell is empty or holds a word that instruments write for no reading."""
     return cell.lower() in _EMPTY or cell in NOT_NUMBERS
+
+
+def _require_as_stated(lines: Sequence[str], options: Options, name: str) -> None:
+    """Refuse a delimiter or a decimal sign without which the text can be read."""
+    stated = [f"{key} '{getattr(options, key)}'" for key in ("delimiter", "decimal") if getattr(options, key)]
+    cells, delimiter, decimal = _best_split(lines, Options())
+    if stated and any(cells):
+        signs = {"\t": "tabs", WHITESPACE: "spaces"}
+        raise FormatError(
+            f"the {' and the '.join(stated)} {'do' if len(stated) > 1 else 'does'} not fit '{name}'",
+            f"its columns are separated by {signs.get(delimiter, repr(delimiter))}, with the decimal sign '{decimal}'",
+            "leave delimiter= and decimal= out, or give these",
+            kind=MISSTATED,
+        )
 
 
 def split(line: str, delimiter: str) -> list[str]:

@@ -29,7 +29,6 @@ MOST_FIGURES, MOST_SOUNDS, LONGEST_SOUND = 6, 8, 1 << 20  # shown in the lab; by
 POINTS = 2000  # pairs of least and greatest value of a channel that are drawn
 MOTION, FORCES = {"x", "v"}, {"friction", "load", "force"}
 CONSTANTS = ("mass", "stiffness", "damping")
-UNTOLD = " (no unit stated, "  # how a channel's source tells it
 
 
 def describe(asked: Asked) -> dict[str, Any]:
@@ -110,7 +109,7 @@ def shown(name: str, parts: Iterable[Record]) -> dict[str, Any]:
                 "name": channel.name,
                 "unit": channel.unit,
                 "words": channel.quantity,
-                "column": channel.name if restored else channel.source.partition(UNTOLD)[0] or channel.name,
+                "column": channel.name if restored else channel.column or channel.name,
                 "low": plain(np.fmin.reduce(curves[channel.name])),
                 "high": plain(np.fmax.reduce(curves[channel.name])),
             }

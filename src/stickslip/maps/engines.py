@@ -72,7 +72,7 @@ def on_cluster(plan: Plan, numbers: Sequence[int], keep: Keep, address: str | No
     """Run blocks on the Dask cluster whose scheduler is at `address`, or on one made of this machine's cores."""
     from distributed import KilledWorker, as_completed
 
-    with _client(address) as client:
+    with client_of(address) as client:
         shared = client.scatter(plan, broadcast=True)
         waiting = iter(numbers)
 
@@ -100,7 +100,7 @@ def _run(plan: Plan, number: int) -> tuple[int, Any, Any]:
 
 
 @contextmanager
-def _client(address: str | None) -> Iterator[Client]:
+def client_of(address: str | None) -> Iterator[Client]:
     """A cluster of one's own, or the one that stands at an address."""
     dask, distributed = required("dask"), required("distributed")
     if address is None:

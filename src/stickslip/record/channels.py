@@ -9,6 +9,8 @@ from numbers import Real
 
 from stickslip.errors import RecordError
 
+UNSTATED = " (no unit stated, "  # how a channel's source tells it
+
 
 @dataclass(frozen=True)
 class Quantity:
@@ -84,6 +86,11 @@ class Channel:
     discharge: float | None = None
     gain_sd: float = 0.0
     assumed: bool = False
+
+    @property
+    def column(self) -> str:
+        """The column that it came from, as a channel map names it."""
+        return self.source.partition(UNSTATED)[0]
 
     def __post_init__(self) -> None:
         described(checked_name(self.name), self.unit)

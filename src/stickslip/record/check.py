@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from stickslip.record import flaws
 from stickslip.record.clock import BRIDGED, fit_line, inspect, is_uniform
 from stickslip.record.flaws import Runs
-from stickslip.units import prefixed
 
 if TYPE_CHECKING:
     from stickslip.record.record import Record
@@ -222,17 +221,26 @@ def _pairs(first: NDArray[np.intp], width: int = 1) -> Runs:
 
 def _unstated(record: Record) -> list[Fault]:
     """The clock and the channels whose unit nobody stated, with what they span in the one that was taken."""
-    faults = _clock_unstated(record)
-    for name, channel in record.channels.items():
-        finite = record[name][np.isfinite(record[name])]
-        if channel.assumed and len(finite):
-            factor, unit = prefixed(float(np.ptp(finite)), channel.unit)
-            message = (
-                f"{name} states no unit: read as {channel.unit} it spans {factor * np.ptp(finite):.3g} {unit}; "
-                f'if it is in another, say which, as in channels={{"{name}": "COLUMN [UNIT]"}}.'
-            )
-            faults.append(Fault("unit", name, ((0, len(record) - 1),), message))
-    return faults
+    finite = {name: record[name][np.isfinite(record[name])] for name, each in record.channels.items() if each.assumed}
+    spans = {
+        name: (record.channels[name].unit, float(np.ptp(values))) for name, values in finite.items() if len(values)
+    }
+    if not spans:
+        return _clock_unstated(record)
+    names, units = list(spans), _listed([unit for unit, _ in spans.values()])
+    spanned = _listed([_number(span, ".3g", unit) for unit, span in spans.values()])
+    several = len(names) > 1
+    read = f"state no unit: read as {units} they span" if several else f"states no unit: read as {units} it spans"
+    message = (
+        f"{_listed(names)} {read} {spanned}; if {'they are in others' if several else 'it is in another'}, say which, "
+        f'as in channels={{"{names[0]}": "COLUMN [UNIT]"}}.'
+    )
+    channel = None if several else names[0]
+    return [*_clock_unstated(record), Fault("unit", channel, ((0, len(record) - 1),), message)]
+
+
+def _listed(words: list[str]) -> str:
+    return " and ".join(filter(None, (", ".join(words[:-1]), words[-1])))
 
 
 def _clock_unstated(record: Record) -> list[Fault]:

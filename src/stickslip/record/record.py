@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from stickslip.errors import RecordError
+from stickslip.errors import TOO_SHORT, RecordError
 from stickslip.printing import html_table
 from stickslip.record import metadata
 from stickslip.record.channels import VOCABULARY, Channel, checked_name, described
@@ -292,7 +292,10 @@ class Record:
         self.require(*names, question=question)
         if len(self) < samples:
             raise RecordError(
-                f"the record has {len(self)} samples", f"{question} needs at least {samples}", "give a longer record"
+                f"the record has {len(self)} samples",
+                f"{question} needs at least {samples}",
+                "give a longer record",
+                kind=TOO_SHORT,
             )
         if self.stamps is not None:
             raise RecordError(

@@ -1,3 +1,5 @@
+from stickslip.rig.columns import Guess as Guess
+from stickslip.rig.columns import guess_columns as guess_columns
 from stickslip.rig.sensor import Digitiser as Digitiser
 from stickslip.rig.sensor import Mount as Mount
 from stickslip.rig.sensor import Noise as Noise

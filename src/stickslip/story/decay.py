@@ -18,7 +18,7 @@ from stickslip.decay.fit_decay import LEFT_OVER
 from stickslip.decay.release import CAUGHT
 from stickslip.estimate import Estimate, kinds
 from stickslip.figures.decay import plates_of, plates_together
-from stickslip.story.scope import Scope, of_fit
+from stickslip.story.scope import Scope, completed, corrected, of_fit
 from stickslip.story.story import Line, Story, Table, tried
 from stickslip.story.words import WITHIN_DIGIT, cautions, doubts, interval_of, number, value_of
 
@@ -42,7 +42,16 @@ def of_findings(findings: Findings) -> Story:
         settings={**settings, **stated},
         tables=[*_by_other_ways([*decay.beside, *beside]), *([tried("motion", motions)] if motions else [])],
         draw=lambda: plates_of(decay), data=lambda: _data(decay), look=lambda: _scope(findings),
+        remedy=_remedy(findings),
     )  # fmt: skip
+
+
+def _remedy(findings: Findings) -> str:
+    """The command without the mistake that was made, or with the units that were left out."""
+    options = [] if findings.settings["restoring"] == "linear" else ["--restoring", findings.settings["restoring"]]
+    if slips := findings.results.get("slips"):
+        return corrected(findings, slips[0], "decay", options)
+    return completed(findings, "decay", options)
 
 
 def _scope(findings: Findings) -> Scope | None:
@@ -120,6 +129,9 @@ def _decrements(found: Decrement) -> dict[str, Any]:
 def _headline(findings: Findings) -> Iterator[str]:
     """What was found, in a few sentences."""
     decay = findings.decay
+    if slips := findings.results.get("slips"):
+        yield f"Probably {' or '.join(each.words for each in slips)}: until that is mended no friction is given."
+        return
     yield from _frictions(findings)
     yield from _left_over(decay)
     if decay.refusal is not None and decay.best is not decay.motion:

@@ -3,18 +3,38 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 from stickslip.answers.findings import record_name
+from stickslip.balance.impact import ImpactTest
 from stickslip.errors import EstimateError
 from stickslip.estimate import Estimate
 from stickslip.record.record import Record
-from stickslip.story.story import Line, Story
-from stickslip.story.words import leading
+from stickslip.story.story import Line, Story, Table
+from stickslip.story.words import leading, value_of
 
 
 def of_one(estimate: Estimate, *, record: Record | None = None) -> Story:
     """An estimate by itself."""
     return of_several([estimate], record=record)
+
+
+def of_tap(found: ImpactTest, *, record: Record | None = None) -> Story:
+    """What rings after a tap, and whose resonance each is."""
+    named = [f"{each.name} at {value_of(each.frequency)}" for each in found.resonances]
+    many = f"{len(named)} resonance{'s' * (len(named) > 1)} ring{'s' * (len(named) == 1)} after the tap"
+    lines = [
+        Line.of(number, name=f"{quantity}, {each.name}")
+        for each in found.resonances
+        for quantity, number in (("frequency", each.frequency), ("damping ratio", each.damping))
+    ]
+    rows = [(each.name, ", ".join(each.channels), each.evidence) for each in found.resonances]
+    told: dict[str, Any] = {
+        "headline": [f"{many}: {'; '.join(named)}."], "lines": lines, "data": found.to_dict,
+        "cautions": [] if found.status == "ok" else [found.status],
+        "tables": [Table("Why each is called so", ("resonance", "seen by", "evidence"), rows, folded=True)],
+    }  # fmt: skip
+    return Story("Tap", **told) if record is None else Story.of_record(record_name(record), record, **told)
 
 
 def of_several(estimates: Sequence[Estimate], *, record: Record | None = None) -> Story:

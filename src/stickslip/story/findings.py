@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import importlib
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -50,7 +50,7 @@ def of_findings(findings: Findings, *, form: str = "") -> Story:
     length = {"sampling rate": f"{record.fs:g} Hz", "length": f"{len(record)} samples, {record.duration:g} s"}
     return replace(
         own,
-        headline=[*leading(findings.faults), *own.headline],
+        headline=_headed(findings, own.headline),
         lines=[*(Line.of(each, findings.true_value(each)) for each in sorted(findings.quoted, key=_place)), *own.lines],
         faults=[str(fault) for fault in findings.faults],
         notes=[*findings.notes, *own.notes],
@@ -60,6 +60,12 @@ def of_findings(findings: Findings, *, form: str = "") -> Story:
         history=record.history,
         data=lambda: _data(findings, own),
     )
+
+
+def _headed(findings: Findings, told: Sequence[str]) -> list[str]:
+    """What is wrong with units before the answer; behind it where that names the mistake."""
+    named = 1 if findings.contradiction else 0
+    return [*told[:named], *leading(findings.faults), *told[named:]]
 
 
 def of_comparison(comparison: Comparison) -> Story:

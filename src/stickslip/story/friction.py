@@ -7,7 +7,9 @@ from collections.abc import Iterator
 from typing import Any
 
 from stickslip.answers.findings import Comparison, Findings
+from stickslip.answers.mistakes import hopeless
 from stickslip.balance.balance import Pull
+from stickslip.consistent.slips import Slip
 from stickslip.cycle.before_slip import Presliding
 from stickslip.cycle.onset import Breakaway
 from stickslip.estimate import Estimate, stands
@@ -15,7 +17,7 @@ from stickslip.figures.friction import plates_of, plates_together
 from stickslip.record.record import RIG_UNITS
 from stickslip.story import scope
 from stickslip.story.story import Line, Story
-from stickslip.story.words import cautions, interval_of, number, sentence, value_of
+from stickslip.story.words import Caution, cautions, interval_of, number, sentence, value_of
 
 MOSTLY = 0.5  # of the time: a bound above it tells nothing
 RARELY = 0.005  # of the time
@@ -26,7 +28,7 @@ TOO_WIDE = 0.5  # an interval wider than this part of the value deserves a word
 
 def of_findings(findings: Findings) -> Story:
     """One record."""
-    headed = () if findings.contradiction else (findings.breakaway, findings.presliding)
+    headed = () if next(_wrong(findings), "") else (findings.breakaway, findings.presliding)
     said = [estimate for answer in headed if answer is not None for estimate in answer.estimates]
     return Story(
         findings.name, list(_headline(findings)), cautions(findings, said), notes=list(_exact(findings)),
@@ -47,7 +49,9 @@ def of_comparison(comparison: Comparison) -> Story:
 
 
 def _settings(findings: Findings) -> dict[str, str]:
-    told = {key: str(value) for key, value in findings.settings.items() if key != "sd"}
+    told = {key: str(value) for key, value in findings.settings.items() if key not in ("sd", "sensors")}
+    for channel, stated in findings.settings.get("sensors", {}).items():
+        told[f"sensor {channel}"] = ", ".join(f"{key} {value}" for key, value in stated.items())
     sd = findings.settings.get("sd", {})
     for key in told.keys() & RIG_UNITS.keys():
         told[key] = _constant(findings.settings[key], sd.get(key, 0.0), RIG_UNITS[key])
@@ -85,20 +89,40 @@ def _taken_exact(findings: Findings) -> bool:
 
 
 def _remedy(findings: Findings) -> str:
-    """The command that reads the channels without the slip that would make them agree."""
-    slips = findings.consistency.slips if findings.contradiction else ()
-    return scope.corrected(findings, slips[0]) if slips else ""
+    """The command that reads the channels without the slip that would make them agree, or states what is missing."""
+    zero = _zero_off(findings)
+    slips = findings.results.get("slips") or ([zero] if zero is not None else [])
+    return scope.corrected(findings, slips[0]) if slips else scope.completed(findings)
+
+
+def _zero_off(findings: Findings) -> Slip | None:
+    """The zero that is off by much, where nothing graver is wrong."""
+    return findings.consistency.zero if findings.consistency is not None and not findings.contradiction else None
+
+
+def _wrong(findings: Findings) -> Iterator[str]:
+    """What is stated wrongly, or not at all, and leaves no force to be given."""
+    slips, missing = findings.results.get("slips") or (), findings.results.get("lacking") or ()
+    if slips:
+        yield f"Probably {' or '.join(each.words for each in slips)}: until that is mended no force is given."
+    elif apart := hopeless(findings.consistency):
+        yield f"{sentence(apart)}. Until that is mended no force is given."
+    elif missing:
+        are, them = ("is", "it") if len(missing) == 1 else ("are", "them")
+        yield (
+            f"The {' and the '.join(missing)} {are} missing: without {them}, or a force sensor, the friction "
+            "can not be found."
+        )
 
 
 def _headline(findings: Findings) -> Iterator[str]:
-    if findings.contradiction:
-        yield (
-            f"The channels contradict each other: perhaps {findings.contradiction}. Until that is mended no force is "
-            "given here; the table has what they give as they are."
-        )
+    if wrong := list(_wrong(findings)):
+        yield from wrong
         if findings.sticks is not None:
             yield sentence(f"{_of_sticks(findings)}.")
         return
+    if zero := _zero_off(findings):
+        yield Caution(f"{sentence(zero.words)}.")
     clauses = [_of_level(findings)] if findings.loops is not None else []
     clauses += [_of_sticks(findings)] if findings.sticks is not None else []
     if findings.loops is not None:

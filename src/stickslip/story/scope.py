@@ -12,11 +12,11 @@ import numpy as np
 
 from stickslip.answers.findings import Findings
 from stickslip.balance.motion import is_measured
-from stickslip.consistent.checks import Slip
+from stickslip.consistent.slips import Slip
 from stickslip.errors import StickslipError
 from stickslip.figures.contact import across
 from stickslip.figures.style import Array, envelope, prefixed, spelled
-from stickslip.files.expression import split_spec, times
+from stickslip.files.expression import shifted, split_spec, times
 from stickslip.printing import printable
 from stickslip.record.record import RIG_UNITS, Record
 from stickslip.rig.rig import Rig
@@ -241,19 +241,66 @@ def command_of(record: Record, question: str, *options: str) -> tuple[str, int]:
     return (f"{shlex.join(words)} {ROWS}", _read(record).get("rows", (0,))[0] or 0) if words else ("", 0)
 
 
-def corrected(findings: Findings, slip: Slip) -> str:
-    """The command that asks again, with channels read without a slip of the hand; empty where none can."""
-    record = findings.record
-    told = _read(record).get("channels") or {
-        name: channel.source
-        for name, channel in record.channels.items()
-        if channel.source and is_measured(record, name)
-    }
-    if not told.keys() >= {of for of, _ in slip.cure.values()}:
+def corrected(findings: Findings, slip: Slip, question: str = "analyze", options: Sequence[str] = ()) -> str:
+    """The command that asks again, without a slip of the hand; empty where none can."""
+    record, settings = findings.record, dict(findings.settings)
+    read = dict(_read(record))
+    told = dict(read.get("channels") or _sources(record))
+    if not told.keys() >= {*slip.zeros, *(of for of, _ in slip.cure.values())}:
         return ""
     # of two that were exchanged each keeps its unit
     cured = {name: times(told[of], by, unit=split_spec(told[name]).unit) for name, (of, by) in slip.cure.items()}
-    return shlex.join(_asked(record, "analyze", tuple(_stated(findings.settings)), {**told, **cured}))
+    cured |= {name: shifted(told[name], off, name) for name, off in slip.zeros.items()}
+    if not all(cured.values()):
+        return ""
+    if cured:
+        read["channels"] = {**told, **cured}
+    if slip.clock != 1:
+        read |= {"fs": record.fs / slip.clock, "time": None}
+    settings |= {name: by * settings[name] for name, by in slip.constants.items() if name in settings}
+    sensors = {name: dict(stated) for name, stated in settings.get("sensors", {}).items()}
+    for name, late in slip.delays.items():
+        sensors.setdefault(name, {})["delay"] = late
+    return _again(findings, question, read, {**settings, "sensors": sensors}, options)
+
+
+def completed(findings: Findings, question: str = "analyze", options: Sequence[str] = ()) -> str:
+    """The command that asks again with what was not stated: a constant left to fill in, a unit as it was read."""
+    record, read = findings.record, dict(_read(findings.record))
+    assumed = {name: each.unit for name, each in record.channels.items() if each.assumed}
+    if assumed:
+        read["units"] = {**read.get("units", {}), **assumed}
+    clock = next((file["seconds"] for file in read.get("files", ()) if file.get("seconds")), "")
+    if clock and not read.get("fs"):
+        read["time"] = f"{clock} [s]"
+    missing = [
+        word for name in findings.results.get("lacking", ()) for word in (f"--{name}", f"VALUE {RIG_UNITS[name]}")
+    ]
+    if not (missing or assumed or clock):
+        return ""
+    return _again(findings, question, read, findings.settings, (*options, *missing))
+
+
+def _again(
+    findings: Findings, question: str, read: Mapping[str, Any], settings: Mapping[str, Any], options: Sequence[str]
+) -> str:
+    words = _asked(findings.record, question, (*_stated(settings), *_loaded(findings), *options), read)
+    rows = read.get("rows")
+    if words and rows:
+        words += ["--rows", ":".join("" if each is None else str(each) for each in rows)]
+    return shlex.join(words)
+
+
+def _loaded(findings: Findings) -> Iterator[str]:
+    """The normal load, where it was stated."""
+    if findings.normal is not None and "normal" not in findings.record:
+        yield from ("--normal", f"{findings.normal:.12g}")
+
+
+def _sources(record: Record) -> dict[str, str]:
+    """The columns that channels were read from, where the command named none."""
+    sources = {name: channel.column for name, channel in record.channels.items()}
+    return {name: source for name, source in sources.items() if source and is_measured(record, name)}
 
 
 def _read(record: Record) -> Mapping[str, Any]:
@@ -262,12 +309,10 @@ def _read(record: Record) -> Mapping[str, Any]:
     return reads[0] if len(reads) == 1 else {}
 
 
-def _asked(
-    record: Record, question: str, options: Sequence[str], channels: Mapping[str, str] | None = None
-) -> list[str]:
-    """The words of a command about the record's file, with other channels where they are given."""
-    read = _read(record)
-    if not read:
+def _asked(record: Record, question: str, options: Sequence[str], read: Mapping[str, Any] | None = None) -> list[str]:
+    """The words of a command about the record's file, `read` otherwise where that is given."""
+    read = _read(record) if read is None else read
+    if not read.get("files"):
         return []
     words = [
         "stickslip",
@@ -275,7 +320,7 @@ def _asked(
         "+".join(f"{file['folder']}/{file['name']}" if "folder" in file else file["name"] for file in read["files"]),
     ]
     for option in READING:
-        told = channels if channels and option == "channels" else read.get(option)
+        told = read.get(option)
         if isinstance(told, Mapping):
             words += [word for name, value in told.items() for word in (f"--{option}", f"{name}={value}")]
         elif told is not None:
@@ -295,3 +340,7 @@ def _stated(constants: Mapping[str, Any]) -> Iterator[str]:
     for key in ("damper", "contact"):
         if constants.get(key) == "base":
             yield from (f"--{key}", "base")
+    for channel, stated in (constants.get("sensors") or {}).items():
+        for key, value in stated.items():
+            text = ", ".join(map(str, value)) if isinstance(value, (tuple, list)) else f"{value:.12g}"
+            yield from ("--sensor", f"{channel}.{key}={text}")

@@ -26,11 +26,12 @@ TELLERS = {
     "Findings": "findings.of_findings", "Comparison": "findings.of_comparison",
     "TimeFrequency": "frequencies.of_map",
     "LawComparison": "fit.of_laws", "LawFit": "fit.of_law", "CurveFit": "fit.of_curve",
-    "Predictions": "prediction.of_predictions",
+    "Predictions": "prediction.of_predictions", "Batch": "many.of_batch",
     "Outcome": "simulation.of_outcome", "Trajectory": "simulation.of_run",
     "Record": "rig.of_record", "ExperimentPlan": "rig.of_plan",
-    "Bifurcation": "regimes.of_bifurcation", "Basins": "regimes.of_basins", "Boundary": "regimes.of_boundary",
-    "Dither": "regimes.of_dither", "Dataset": "maps.of_map",
+    "Bifurcation": "maps.of_bifurcation", "Basins": "maps.of_basins", "Boundary": "maps.of_boundary",
+    "Dither": "maps.of_dither", "Stability": "maps.of_stability",
+    "ImpactTest": "estimates.of_tap", "Dataset": "maps.of_map",
     "Commissioned": "bench.of_commissioned", "Tour": "tour.of_tour",
     "Estimate": "estimates.of_one", "list": "estimates.of_several", "tuple": "estimates.of_several",
 }  # fmt: skip
@@ -184,14 +185,14 @@ class Story:
         return next((told for told in self.headline if not isinstance(told, Caution)), "")
 
     @property
+    def opening(self) -> list[str]:
+        """What is read first, in this order: what every number hangs on, and the answer."""
+        return [told for told in self.headline if told and (isinstance(told, Caution) or told == self.answer)]
+
+    @property
     def others(self) -> list[str]:
         """The sentences behind the answer."""
         return [told for told in self.headline if not isinstance(told, Caution)][1:]
-
-    @property
-    def urgent(self) -> list[str]:
-        """What every number hangs on, told before it."""
-        return [told for told in self.headline if isinstance(told, Caution)]
 
     @functools.cached_property
     def notices(self) -> list[Caution]:
@@ -266,7 +267,7 @@ class Story:
     def _repr_html_(self) -> str:
         rows = [(line.name, line.value, line.interval, self.marks(line)) for line in self.leading]
         notes = [f"{self.mark(each)} {each.reason}".strip() for each in self.shown]
-        title = " ".join([*self.urgent, self.answer]) or self.title
+        title = " ".join(self.opening) or self.title
         return html_table(title, ("quantity", "value", "95 % interval", ""), rows, notes)
 
     @classmethod

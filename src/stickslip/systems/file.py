@@ -24,11 +24,12 @@ from stickslip.laws.formula import Formula
 from stickslip.laws.stribeck import Curve
 from stickslip.laws.time_delay import SpeedCurve
 from stickslip.oscillator import Oscillator
-from stickslip.parameters import PARTS, changed, declared, find, places
+from stickslip.parameters import PARTS, changed, declared, find, places, unit
 from stickslip.scenarios import DRIVES, LAWS
 from stickslip.settings import STRICT, checked, line_of, nearest, quantity, read_toml
 from stickslip.solve.tables import System, numbered
 from stickslip.structure import Contact, Structure
+from stickslip.units import parse_constant
 
 CYCLES = 20.0  # of a run where nothing is said
 MOST_CYCLES = 1e9  # more would not end, nor be counted
@@ -103,6 +104,27 @@ class Case:
             models = create_model("Changes", __config__=STRICT, **{"value": (kind, ...)})  # type: ignore[call-overload]
             values[name] = _checked_change(models, name, value)
         return dataclasses.replace(self, system=changed(self.system, values), known={})
+
+    def number(self, parameter: str, text: str | float) -> float:
+        """A value of one of the system's parameters in SI; text may have its unit.
+
+        Parameters
+        ----------
+        parameter : str
+            As in :meth:`having`.
+        text : str or float
+            "0.7 mm", or a number in SI.
+
+        Returns
+        -------
+        float
+
+        Raises
+        ------
+        ModelError
+            No such parameter, or a value without meaning.
+        """
+        return float(parse_constant(parameter, text, unit(self.system, parameter)))
 
     def lasting(
         self, *, duration: str | float | None = None, cycles: float | None = None, fs: str | float | None = None

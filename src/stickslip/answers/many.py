@@ -1,0 +1,256 @@
+"""Hundreds of records: what each answers in one row, kept as it comes, so that a run that was ended goes on."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass, field
+from itertools import islice
+from pathlib import Path
+from typing import Any, Self, TypeVar
+
+from stickslip.answers.comparison import against_load
+from stickslip.errors import ModelError, RecordError
+from stickslip.estimate import Estimate, Result
+from stickslip.maps.engines import AHEAD, client_of
+from stickslip.workers import processors
+from stickslip.workers import workers as processes
+
+Task = TypeVar("Task")
+CLUSTERS = ("cluster", "dask")  # names of the engine that asks a Dask cluster, an address behind "://"
+
+
+@dataclass(frozen=True)
+class Row:
+    """What one record answers, without the record.
+
+    Attributes
+    ----------
+    name, key : str
+        What it is called; the checksums of its files.
+    answer : str
+        The sentence that answers.
+    estimates : tuple of Estimate
+        Its numbers.
+    level : Estimate or None
+        The sliding friction, where it is known.
+    normal : float or None
+        Normal load [N], where it is known.
+    refusal : str
+        Why it answers nothing; else empty.
+    same_as : str
+        The record before it that has the same checksum; else empty.
+    picture : tuple of sequences of float
+        Abscissa and ordinate of a small picture.
+    """
+
+    name: str
+    key: str
+    answer: str = ""
+    estimates: tuple[Estimate, ...] = ()
+    level: Estimate | None = None
+    normal: float | None = None
+    refusal: str = ""
+    same_as: str = ""
+    picture: tuple[Sequence[float], Sequence[float]] = ((), ())
+
+    @property
+    def counts(self) -> bool:
+        """Whether it answers something that no record before it did."""
+        return not self.refusal and not self.same_as
+
+    @classmethod
+    def of_dict(cls, told: Mapping[str, Any]) -> Row:
+        """A row from plain data."""
+        level = told["level"]
+        return cls(**{
+            **told, "estimates": tuple(_estimate(each) for each in told["estimates"]),
+            "level": None if level is None else _estimate(level), "picture": tuple(told["picture"]),
+        })  # fmt: skip
+
+
+def _estimate(told: Mapping[str, Any]) -> Estimate:
+    return Estimate(**{**told, "interval": tuple(told["interval"]), "checks": tuple(told["checks"])})
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Batch(Result):
+    """What many records answer.
+
+    Attributes
+    ----------
+    question : str
+        The command that asked: analyze, decay or squeak.
+    rows : tuple of Row
+        One a record, in the order given.
+    axes : tuple of str
+        What the small pictures show.
+    together : mapping of str to Estimate
+        What they tell together: the coefficient of friction, where the normal loads are known.
+    notes : tuple of str
+        How they were asked.
+    """
+
+    question: str
+    rows: tuple[Row, ...]
+    axes: tuple[str, str]
+    together: Mapping[str, Estimate] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
+
+    @classmethod
+    def of(cls, question: str, rows: Sequence[Row], axes: tuple[str, str], notes: Sequence[str] = ()) -> Self:
+        """With the coefficient of friction over the records whose normal load is known."""
+        loaded = [row for row in rows if row.counts and row.normal is not None]
+        together, more = against_load(loaded) if len(loaded) > 1 else ({}, ())
+        found = {name: each for name, each in together.items() if each is not None}
+        return cls(question, tuple(rows), axes, found, (*more, *notes))
+
+    @property
+    def estimates(self) -> tuple[Estimate, ...]:
+        """What they tell together."""
+        return tuple(self.together.values())
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The quantities that records answer, those of most records first."""
+        often: dict[str, int] = {}
+        for row in self.rows:
+            for each in row.estimates:
+                often[each.name] = often.get(each.name, 0) + (row.counts and each.known)
+        return tuple(sorted(often, key=lambda name: -often[name]))
+
+    def known(self, name: str) -> list[Estimate]:
+        """A quantity of each record that has it, without copies of others."""
+        rows = (row for row in self.rows if row.counts)
+        return [each for row in rows for each in row.estimates if each.name == name and each.known]
+
+    def table(self) -> list[dict[str, Any]]:
+        """A row a record for a spreadsheet: of each quantity the value and the ends of its 95 % interval."""
+        return [dict(_cells(row, self.names)) for row in self.rows]
+
+
+def spread(
+    answer: Callable[[Task], Row], *, tasks: Sequence[Task], engine: str = "processes", workers: int | None = None
+) -> Iterator[Row]:
+    """Answer tasks on several processors, each row as soon as it is there.
+
+    Parameters
+    ----------
+    answer : callable
+        Answers one task; on several processes it must be picklable, and so must its tasks.
+    tasks : sequence
+        What is to be answered.
+    engine : str
+        "processes", "cluster" (Dask, on this machine) or "cluster://HOST:PORT".
+    workers : int, optional
+        Processes; all processors where left out.
+
+    Returns
+    -------
+    iterator of Row
+
+    Raises
+    ------
+    ModelError
+        No such engine, or no cluster.
+
+    Examples
+    --------
+    >>> [row.name for row in spread(lambda name: Row(name, name), tasks=["a.csv", "b.csv"], workers=1)]
+    ['a.csv', 'b.csv']
+    """
+    word, _, address = engine.partition("://")
+    if word == "processes" and not address:
+        return _by_processes(answer, tasks, workers or processors())
+    if word in CLUSTERS:
+        return _by_cluster(answer, tasks, address or None)
+    raise ModelError(f"engine '{engine}'", "it is processes, cluster or cluster://HOST:PORT", "choose one of them")
+
+
+def _by_processes(answer: Callable[[Task], Row], tasks: Sequence[Task], count: int) -> Iterator[Row]:
+    with _one_thread_each(), processes(min(count, len(tasks)), answer.__module__) as over:
+        yield from over(answer, tasks)
+
+
+@contextmanager
+def _one_thread_each() -> Iterator[None]:
+    """Linear algebra on one thread in each process: on several, full processes stand in each other's way."""
+    names = [name for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS") if name not in os.environ]
+    os.environ.update(dict.fromkeys(names, "1"))
+    try:
+        yield
+    finally:
+        for name in names:
+            del os.environ[name]
+
+
+def _by_cluster(answer: Callable[[Task], Row], tasks: Sequence[Task], address: str | None) -> Iterator[Row]:
+    if not tasks:
+        return
+    with client_of(address) as client:
+        from distributed import as_completed
+
+        waiting = iter(tasks)
+        count = AHEAD * max(1, sum(client.nthreads().values()))
+        running = as_completed([client.submit(answer, task, pure=False) for task in islice(waiting, count)])
+        for future in running:
+            yield future.result()
+            running.update([client.submit(answer, task, pure=False) for task in islice(waiting, 1)])
+
+
+def _cells(row: Row, names: Sequence[str]) -> Iterator[tuple[str, Any]]:
+    yield from (
+        ("file", row.name),
+        ("answer", row.answer or row.refusal),
+        ("same as", row.same_as),
+        ("sha256", row.key),
+    )
+    yield "normal load [N]", row.normal
+    found = {each.name: each for each in row.estimates}
+    for name in names:
+        each = found.get(name)
+        unit = "" if each is None or each.unit == "1" else f" [{each.unit}]"
+        if each is not None:
+            yield f"{name}{unit}", each.value
+            yield f"{name}, low{unit}", each.interval[0]
+            yield f"{name}, high{unit}", each.interval[1]
+            yield f"{name}, status", each.status
+
+
+class Kept:
+    """The rows that are done, in a file beside the folder of results; one that was asked otherwise is begun again."""
+
+    def __init__(self, path: Path, asked: Mapping[str, Any]) -> None:
+        self.path, self.rows = path, dict[str, Row]()
+        first = json.dumps({"asked": asked}, sort_keys=True, default=str)
+        lines = path.read_text(encoding="utf-8").split("\n") if path.exists() else []
+        if lines[:1] == [first]:
+            for line in lines[1:-1]:  # a last line without its end was cut off
+                row = Row.of_dict(json.loads(line))
+                self.rows[row.key] = row
+        try:
+            self.file = path.open("w", encoding="utf-8")
+        except OSError as error:
+            raise RecordError(
+                f"{path} can not be written ({error.strerror})", "what is done is kept there", "name another --output"
+            ) from error
+        self._write(first)
+        for row in self.rows.values():
+            self._write(json.dumps(asdict(row)))
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self.file.close()
+
+    def add(self, row: Row) -> None:
+        """Keep a row: it is in the file when this returns."""
+        self.rows[row.key] = row
+        self._write(json.dumps(asdict(row)))
+
+    def _write(self, line: str) -> None:
+        self.file.write(line + "\n")
+        self.file.flush()

@@ -1,0 +1,107 @@
+"""Mistakes in how a record or its rig was stated, each with what would mend it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+
+from stickslip.consistent.contradictions import Consistency
+from stickslip.consistent.slips import MILLISECONDS, Slip
+from stickslip.cycle.loops import Loops
+from stickslip.record.record import Record
+from stickslip.rig.settings import RigSettings
+
+LATEST = 0.1  # of a record's length: a sensor that is said to be later, and tells of no cycle, is late by milliseconds
+SHORTEST_DELAY = 0.05  # s: a true delay of more than a cycle is shorter than this, where the motion is fast
+HALF_TURN = math.pi  # rad: what swings farther, and is called an angle in rad, is one in degrees
+BALANCED = ("balance", "energy")  # checks that a wrong mass, spring or sensor fails
+FAR = 2.0  # times by which two sides that should be one differ, from which no force is given
+NEAR = 0.1  # by which a ratio of frequencies may miss the one that a slip makes
+
+
+def slipped(slips: Sequence[Slip]) -> str:
+    """What one slip of the hand would explain, in words; nothing without one."""
+    return f"something is stated wrongly: probably {' or '.join(slip.words for slip in slips)}" if slips else ""
+
+
+def untrue(told: Consistency | None) -> str:
+    """What of channels and constants can not all be true, in words; a clipped sensor says so itself."""
+    failed = told.failed if told is not None else ()
+    if any("range" in check.name for check in failed):
+        return ""
+    apart = [check.sentence for check in failed if any(word in check.name for word in BALANCED)]
+    return f"the record and the rig's constants contradict each other: {apart[0]}" if apart else ""
+
+
+def hopeless(told: Consistency | None) -> str:
+    """What of channels and constants can not all be true, where it is so far off that no force is worth a headline."""
+    failed = told.failed if told is not None else ()
+    apart = [check for check in failed if any(word in check.name for word in BALANCED) and check.right]
+    return untrue(told) if any(not 1 / FAR < check.left / check.right < FAR for check in apart) else ""
+
+
+def mistakes(record: Record, rig: RigSettings, consistent: Consistency | None, loops: Loops | None) -> tuple[Slip, ...]:
+    """What one slip of the hand would explain, the likeliest first; none where nothing speaks for one."""
+    late = _late(record, rig, loops)
+    return (late,) if late is not None else consistent.slips if consistent is not None else ()
+
+
+def _late(record: Record, rig: RigSettings, loops: Loops | None) -> Slip | None:
+    """Milliseconds taken for seconds, of a delay that lasts longer than a cycle, or much of the record."""
+    period = 1 / loops.frequency.value if loops is not None else LATEST * record.duration
+    stated = {name: channel.delay for name, channel in record.channels.items()}
+    stated |= {name: told.delay for name, told in rig.sensors.items() if "delay" in told.model_fields_set}
+    far = {name: late for name, late in stated.items() if abs(late) > max(period, SHORTEST_DELAY)}
+    if not far:
+        return None
+    late = next(iter(far.values()))
+    cycles = f" ({abs(late) / period:.3g} cycles of the motion)" if loops is not None else ""
+    words = f"the delay of {' and '.join(far)}, {late:.4g} s{cycles}, is in ms, not in s"
+    return Slip(words, delays={name: MILLISECONDS * late for name, late in far.items()})
+
+
+def missing(record: Record, rig: RigSettings) -> tuple[str, ...]:
+    """What must be stated before a friction force can be found; nothing where one is read or found."""
+    if not {"friction", "load", "force"}.isdisjoint(record) or "x" not in record:
+        return ()
+    return tuple(name for name in ("mass", "stiffness") if getattr(rig, name) is None)
+
+
+def mistakes_of_decay(
+    channel: str, swing: float, frequency: float, mass: float | None, stiffness: float | None
+) -> tuple[Slip, ...]:
+    """An angle in degrees, and what a frequency that mass and stiffness contradict would explain.
+
+    Parameters
+    ----------
+    channel : str
+        What was measured.
+    swing : float
+        Its amplitude in SI.
+    frequency : float
+        Of the oscillation [Hz].
+    mass, stiffness : float or None
+        As stated, in SI.
+
+    Returns
+    -------
+    tuple of Slip
+        The likeliest first.
+    """
+    if channel == "theta" and swing > HALF_TURN:
+        words = f"theta, which swings {swing:.3g} rad to each side, is in degrees, not in rad"
+        return (Slip(words, {channel: (channel, math.pi / 180)}),)
+    return tuple(_of_frequency(frequency, mass, stiffness))
+
+
+def _of_frequency(frequency: float, mass: float | None, stiffness: float | None) -> Iterator[Slip]:
+    if not mass or not stiffness or not math.isfinite(frequency):
+        return
+    ratio = frequency * 2 * math.pi / math.sqrt(stiffness / mass)
+    for slip, expected in (
+        (Slip("the stiffness is in N/mm, not in N/m", constants={"stiffness": 1e3}), 1e3**0.5),
+        (Slip("the mass is in g, not in kg", constants={"mass": 1e-3}), 1e3**0.5),
+        (Slip("the time is in ms, not in s", clock=MILLISECONDS), MILLISECONDS),
+    ):
+        if abs(ratio / expected - 1) < NEAR:
+            yield slip

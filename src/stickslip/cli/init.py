@@ -1,0 +1,215 @@
+"""stickslip init"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+import stickslip as ss
+from stickslip.cli.options import reading_options
+from stickslip.cli.records import RIG_FILE, groups_of, read, rig_of
+from stickslip.cli.terminal import aligned, complain, say, wrapped
+from stickslip.cli.words import spoken
+
+if TYPE_CHECKING:
+    from stickslip import Record
+    from stickslip.answers import Findings
+    from stickslip.rig import Guess, RigSettings
+
+NONE = "-"  # what is typed for a column that is left out
+LOOKED_AT = 64  # rows of each further file
+USUAL = {"x": "m", "z": "m", "v": "m/s", "a": "m/s^2", "theta": "rad"} | dict.fromkeys(
+    ("load", "force", "friction", "normal"), "N"
+)
+ASKED = ("x", "z", "v", "a", "load", "force", "friction", "normal", "theta", "sound")
+CONSTANTS = {
+    "mass": "Mass that moves (kg, or with its unit; ± its uncertainty)",
+    "stiffness": "Stiffness of the spring (N/m, or as 2.31 N/mm)",
+    "damping": "Viscous damping of the suspension (N s/m)",
+}
+
+
+@click.command()
+@click.argument("files", nargs=-1, required=True, metavar="FILES...")
+@click.option("--mass", metavar="VALUE", help='Oscillating mass in kg, or with its unit ("2.42 ± 0.02 kg").')
+@click.option("--stiffness", metavar="VALUE", help="Spring in N/m, or with its unit.")
+@click.option("--damping", metavar="VALUE", help="Viscous damping of the suspension in N s/m.")
+@click.option("--damper", type=click.Choice(["ground", "base"]), help="What the damper ends on.")
+@click.option("--contact", type=click.Choice(["ground", "base"]), help="What the mass slides on.")
+@click.option("--yes", is_flag=True, help="Ask nothing: take what was recognised and what the options say.")
+@click.option("--output", type=click.Path(path_type=Path), default=Path(RIG_FILE), show_default=True, metavar="FILE",
+              help="The file to write.")  # fmt: skip
+@click.option("--force", is_flag=True, help="Write over it if it is there.")
+@reading_options
+def init(files: tuple[str, ...], yes: bool, output: Path, force: bool, **options: Any) -> None:
+    """Describe a rig once: columns, units and constants go into rig.toml.
+
+    FILES are records of the rig. Shown is what was recognised in the first of them; asked is what each column measures,
+    its unit, and the rig's mass, spring and damper with their uncertainties. In the folder of rig.toml the other
+    commands need no options then.
+
+    \b
+    stickslip init run1.csv
+    stickslip init "run_*.csv" --yes --mass "2.42 ± 0.02 kg" --stiffness "2.31 N/mm"
+    """
+    if output.exists() and not force:
+        raise click.BadParameter(f"'{output}' is there already; --force writes over it", param_hint="--output")
+    groups = [group for argument in files for group in groups_of(argument)]
+    stated = rig_of(**{**options, "here": False})
+    record = read(groups[0], stated)
+    guesses = [] if stated.channels else ss.rig.guess_columns(record)
+    _show(groups[0], record, guesses)
+    if not yes:
+        guesses = [_asked(each) for each in guesses]
+    told = _settings(options, stated, guesses, {} if yes else _constants(options, record, guesses))
+    rig = ss.rig.rig_settings(told, source="the answers")
+    try:
+        output.write_text("\n".join(_toml(told, groups[0])) + "\n", encoding="utf-8")
+    except OSError as error:
+        raise click.BadParameter(f"'{output}' can not be written ({error.strerror})", param_hint="--output") from error
+    for line in _after(groups, rig, output):
+        say(line)
+
+
+# ---- what is shown
+
+
+def _show(files: Sequence[Path], record: Record, guesses: Sequence[Guess]) -> None:
+    say(" + ".join(map(str, files)))
+    say(f"{len(record)} samples at {record.fs:.6g} Hz, {record.duration:.4g} s.")
+    rows = [(each.column, each.unit + ("" if each.stated else " ?"), each.spanned, _words(each)) for each in guesses]
+    for line in aligned(("column", "unit", "span", "taken for"), rows) if rows else ():
+        say(line)
+    suspicious = [
+        f"{each.column}: the file states no unit; {each.unit} is a guess." for each in guesses if _unsure(each)
+    ]
+    suspicious += [
+        f"{each.column}: taken for {each.channel} by its unit alone." for each in guesses if "alone" in each.why
+    ]
+    faults = [spoken(fault) for fault in record.check() if fault.kind != "unit"]
+    for words in (*suspicious, *faults):
+        for line in wrapped(words, "! "):
+            say(line)
+
+
+def _unsure(guess: Guess) -> bool:
+    return not guess.stated and bool(guess.unit) and guess.unit != "1"
+
+
+def _words(guess: Guess) -> str:
+    return f"{guess.channel}, {guess.words}" if guess.channel else guess.words
+
+
+# ---- what is asked
+
+
+def _asked(guess: Guess) -> Guess:
+    """The column as the user calls it."""
+    say()
+    channel = click.prompt(
+        f"{guess.column}: {', '.join(ASKED)}, or {NONE} to leave it out", default=guess.channel or NONE,
+        value_proc=_a_channel, err=False,
+    )  # fmt: skip
+    if channel == NONE:
+        return replace(guess, channel="")
+    unit = guess.unit if guess.stated else click.prompt("  its unit", default=guess.unit or USUAL.get(channel, "1"))
+    return replace(guess, channel=channel, unit=unit, why="your word")
+
+
+def _a_channel(text: str) -> str:
+    if text != NONE and text not in ASKED:
+        raise click.UsageError(f"'{text}' is none of {', '.join(ASKED)}, {NONE}")
+    return text
+
+
+def _constants(options: Mapping[str, Any], record: Record, guesses: Sequence[Guess]) -> dict[str, str]:
+    """Mass, spring, damper and what the mass slides on, where no option states them; nothing of what is not known."""
+    say()
+    told: dict[str, str] = {}
+    for name, words in CONSTANTS.items():
+        if options[name] is None:
+            answer = click.prompt(f"{words}; Enter if not known", default="", show_default=False, value_proc=_a(name))
+            told |= {name: answer} if answer else {}
+    if any(each.channel == "z" for each in guesses):
+        for name, words in (("contact", "What does the mass slide on"), ("damper", "What does the damper end on")):
+            if options[name] is None:
+                told[name] = click.prompt(words, type=click.Choice(["ground", "base"]), default="ground")
+    return told
+
+
+def _a(name: str) -> Callable[[str], str]:
+    """A constant as typed, refused where it has no meaning."""
+
+    def proper(text: str) -> str:
+        try:
+            ss.rig.rig_settings({name: text} if text else {}, source="the answer")
+        except ss.errors.ModelError as error:
+            raise click.UsageError(f"{error.value}; {error.rule}") from error
+        return text
+
+    return proper
+
+
+# ---- what is written
+
+
+def _settings(
+    options: Mapping[str, Any], stated: RigSettings, guesses: Sequence[Guess], answers: Mapping[str, str]
+) -> dict[str, Any]:
+    given = {name: options[name] for name in (*CONSTANTS, "damper", "contact") if options[name] is not None}
+    known = {key: value for key, value in stated.model_dump(exclude_unset=True).items() if key not in given}
+    channels = {each.channel: each.text for each in guesses if each.channel}
+    return {**known, **given, **answers, **({"channels": channels} if channels else {})}
+
+
+def _toml(told: Mapping[str, Any], files: Sequence[Path]) -> Iterator[str]:
+    """Plain values first, then the tables."""
+    yield f"# The rig of {' + '.join(path.name for path in files)}, as stickslip init wrote it. A bare number is in SI."
+    yield '# State how sure a constant is as in mass = "2.42 ± 0.02 kg", and a gain as in a = "acc [g] ± 1 %".'
+    tables = {key: value for key, value in told.items() if isinstance(value, Mapping)}
+    yield from (f"{key} = {_value(value)}" for key, value in told.items() if key not in tables)
+    for key, table in tables.items():
+        plain = {name: value for name, value in table.items() if not isinstance(value, Mapping)}
+        if plain:
+            yield from ("", f"[{key}]", *(f"{json.dumps(name)} = {_value(value)}" for name, value in plain.items()))
+        for name in table.keys() - plain.keys():
+            inner = (f"{word} = {_value(value)}" for word, value in table[name].items() if value is not None)
+            yield from ("", f"[{key}.{json.dumps(name)}]", *inner)
+
+
+def _value(value: Any) -> str:
+    return json.dumps(list(value) if isinstance(value, tuple) else value, ensure_ascii=False)
+
+
+# ---- what comes of it
+
+
+def _after(groups: Sequence[Sequence[Path]], rig: RigSettings, output: Path) -> Iterator[str]:
+    """Whether the other files are alike, whether all can be true, and what to type next."""
+    yield ""
+    yield f"{output} is written."
+    for group in groups[1:]:
+        try:
+            read(group, rig.model_copy(update={"rows": f"0:{LOOKED_AT}", "repair": ()}))
+        except ss.StickslipError as error:
+            complain(f"{' + '.join(map(str, group))} is not like the first: {spoken(error)}")
+    for words in _wrong(groups[0], rig):
+        yield from wrapped(words, "! ")
+    config = "" if output == Path(RIG_FILE) else f" --config {output}"
+    yield f"Next: stickslip analyze {'+'.join(map(str, groups[0]))}{config}"
+
+
+def _wrong(files: Sequence[Path], rig: RigSettings) -> Iterator[str]:
+    """What the record says against what was stated."""
+    try:
+        found: Findings = ss.analyze(read(files, rig), rig=rig)
+    except ss.StickslipError as error:
+        yield spoken(error)
+        return
+    if found.contradiction or found.results["lacking"]:
+        yield spoken(ss.summary(found).answer)

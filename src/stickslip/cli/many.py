@@ -1,0 +1,202 @@
+"""Hundreds of records asked by analyze, decay or squeak: on several processors, kept as they come."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+import stickslip as ss
+from stickslip.cli.records import checksum, names_of, read
+from stickslip.cli.show import show
+
+if TYPE_CHECKING:
+    from stickslip import Record
+    from stickslip.answers import Batch, Row
+    from stickslip.rig import RigSettings
+
+MANY = 20  # records from which each is a row of a table, and has no page of its own
+POINTS = 120  # of a small picture
+SHOWN = 3.0  # cycles in it, where there are cycles
+
+
+def many_options(command: Callable[..., None]) -> Callable[..., None]:
+    """The options of hundreds of records."""
+    options = [
+        click.option("--workers", type=click.IntRange(min=1), metavar="N",
+                     help=f"Processes for more than {MANY} records, all processors unless given."),
+        click.option("--engine", metavar="NAME", default="processes", show_default=True,
+                     help="Where many records are worked on: processes, cluster (Dask, on this machine) or "
+                     "cluster://HOST:PORT."),
+        click.option("--table", type=click.Path(path_type=Path), metavar="FILE",
+                     help="Write one row a record into FILE.csv, FILE.parquet or FILE.xlsx."),
+    ]  # fmt: skip
+    for option in reversed(options):
+        command = option(command)
+    return command
+
+
+@dataclass(frozen=True)
+class Places:
+    """Where many records are worked on, and where their table goes."""
+
+    workers: int | None
+    engine: str
+    table: Path | None
+
+    @classmethod
+    def of(cls, options: dict[str, Any]) -> Places:
+        """Taken out of a command's options."""
+        return cls(options.pop("workers"), options.pop("engine"), options.pop("table"))
+
+    def wanted(self, groups: Sequence[Sequence[Path]]) -> bool:
+        """Whether the records are so many, or the table is asked for."""
+        return len(groups) > MANY or self.table is not None
+
+
+@dataclass(frozen=True)
+class Task:
+    """One record to be asked."""
+
+    question: str
+    files: tuple[Path, ...]
+    names: tuple[str, ...]
+    key: str
+    rig: RigSettings
+    options: Mapping[str, Any]
+
+
+def ask_many(
+    question: str,
+    groups: Sequence[Sequence[Path]],
+    rig: RigSettings,
+    options: Mapping[str, Any],
+    places: Places,
+    *,
+    folder: Path,
+    tell: Callable[..., None],
+) -> Batch:
+    """One row a record; those that an earlier run has kept are not asked again."""
+    if places.table is not None:
+        ss.story.check_table(places.table)
+    tasks = [
+        Task(question, tuple(group), tuple(names), "+".join(map(checksum, group)), rig, options)
+        for group, names in zip(groups, names_of(groups), strict=True)
+    ]
+    asked = {"question": question, "rig": rig.model_dump(), "options": dict(options), "version": ss.__version__}
+    with ss.answers.Kept(_kept(folder), asked) as kept:
+        left = list({task.key: task for task in reversed(tasks) if task.key not in kept.rows}.values())[::-1]
+        answers = ss.answers.spread(answered, tasks=left, engine=places.engine, workers=places.workers)
+        for done, row in enumerate(answers, start=len(tasks) - len(left) + 1):
+            kept.add(row)
+            tell(f"{question}: {row.name}", done)
+    rows = tuple(_rows(tasks, kept.rows))
+    return ss.answers.Batch.of(question, rows, AXES[question], _untried(options))
+
+
+def _kept(folder: Path) -> Path:
+    """Where rows are kept until the folder of results is there."""
+    return folder.with_name(f"{folder.name}.rows")
+
+
+def finish(batch: Batch, places: Places, folder: Path | None, kept: Path, *, as_json: bool, everything: bool) -> None:
+    """Write what was found, show it, and forget what was kept for another run."""
+    written = ss.publish(batch, folder=folder) if folder is not None else None
+    if places.table is not None:
+        ss.story.write_table(batch, places.table)
+    _kept(kept).unlink(missing_ok=True)
+    show(batch, written, as_json=as_json, everything=everything)
+
+
+def _rows(tasks: Sequence[Task], kept: Mapping[str, Row]) -> Iterator[Row]:
+    """In the order given, copies after the record that they are copies of."""
+    first: dict[str, str] = {}
+    for task in tasks:
+        name = " + ".join(task.names)
+        yield replace(kept[task.key], name=name, same_as=first.get(task.key, ""))
+        first.setdefault(task.key, name)
+
+
+def _untried(options: Mapping[str, Any]) -> tuple[str, ...]:
+    if options.get("twins") != 0:
+        return ()
+    return ("The answers of so many records are not tried on twins; --twins 40 does that, for some seconds each.",)
+
+
+# ---- one of them
+
+
+def answered(task: Task) -> Row:
+    """What one record answers; why, where it does not."""
+    name = " + ".join(task.names)
+    try:
+        record = read(task.files, task.rig, task.names)
+        found = ASK[task.question](record, task.rig, **task.options)
+        return ss.answers.Row(
+            name, task.key, ss.summary(found).answer, found.quoted, found.level, found.normal,
+            picture=PICTURES[task.question](found),
+        )  # fmt: skip
+    except ss.errors.ModelError:
+        raise
+    except ss.StickslipError as error:
+        return ss.answers.Row(name, task.key, refusal=str(error))
+
+
+def _analyzed(record: Record, rig: RigSettings, *, method: str, twins: int) -> Any:
+    found = ss.analyze(record, rig=rig, method=method)
+    if not twins or found.contradiction:
+        return found
+    try:
+        return ss.tried(found, twins=twins)
+    except ss.errors.EstimateError as error:
+        return replace(found, notes=(*found.notes, f"Twins: {error}"))
+
+
+def _decayed(record: Record, rig: RigSettings, **asked: Any) -> Any:
+    return ss.analyze_decay(record, **asked)
+
+
+def _squeaked(record: Record, rig: RigSettings, **asked: Any) -> Any:
+    found = ss.analyze_squeaks(record, contact=rig.contact, **asked)
+    return replace(found, normal=rig.normal_load(found.name) or found.normal)
+
+
+ASK: dict[str, Callable[..., Any]] = {"analyze": _analyzed, "decay": _decayed, "squeak": _squeaked}
+
+Picture = tuple[list[float], list[float]]
+
+
+def _loop(found: Any) -> Picture:
+    """Friction over the displacement, for some cycles of the middle."""
+    record = found.record
+    if "friction" not in record or "x" not in record:
+        return _trace(found)
+    count = len(record)
+    if found.loops is not None:
+        count = min(count, round(SHOWN * record.fs / found.loops.frequency.value))
+    first = (len(record) - count) // 2
+    return _thinned(record["x"][first : first + count], record["friction"][first : first + count])
+
+
+def _trace(found: Any) -> Picture:
+    """The channel that was asked over the time."""
+    record = found.record
+    channel = found.settings.get("channel") or next(iter(record))
+    return _thinned(record.time, record[channel if channel in record else next(iter(record))])
+
+
+def _thinned(x: Any, y: Any) -> Picture:
+    import numpy as np  # the command line starts without it
+
+    rows = np.linspace(0, len(x) - 1, min(POINTS, len(x))).astype(int)
+    kept = np.isfinite(x[rows]) & np.isfinite(y[rows])
+    return [float(f"{v:.5g}") for v in x[rows][kept]], [float(f"{v:.5g}") for v in y[rows][kept]]
+
+
+PICTURES: dict[str, Callable[[Any], Picture]] = {"analyze": _loop, "decay": _trace, "squeak": _trace}
+AXES = {
+    "analyze": ("displacement", "friction"), "decay": ("time", "displacement"), "squeak": ("time", "sound or motion"),
+}  # fmt: skip

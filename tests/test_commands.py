@@ -1,0 +1,117 @@
+"""Commands for what Python does: stability, bifurcation, dither, impact, rig join."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner, Result
+
+import stickslip as ss
+from stickslip.cli.program import main
+
+SLIDER = """
+[system]
+mass = 1.0
+stiffness = 1.0
+damping = 0.02
+
+[law]
+name = "Coulomb"
+kinetic = 1.0
+static = 1.5
+
+[drive]
+name = "Belt"
+speed = 0.5
+"""
+
+
+@pytest.fixture(autouse=True)
+def elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("COLUMNS", "80")
+
+
+def ask(*words: str) -> Result:
+    result = CliRunner().invoke(main, list(words))
+    assert result.exit_code == 0, result.output
+    assert len(result.stdout.splitlines()) <= 40 or "--json" in words
+    return result
+
+
+def test_stability_names_what_feeds_the_vibration() -> None:
+    told = json.loads(ask("stability", "MC-2 eta=0.02,0.06", "--json").stdout)
+    scenario = ss.scenarios.get("MC-2 eta=0.02,0.06")
+    found = ss.stability(scenario.system)
+    assert (told["stable"], told["mechanism"]) == (found.stable, found.mechanism)
+    assert told["growth"] == pytest.approx(found.growth)
+    text = ask("stability", "MC-2 eta=0.02,0.06", "--output", "out").stdout
+    assert f"Steady sliding is {'stable' if found.stable else 'unstable'}" in text
+    assert Path("out/report.html").is_file()
+
+
+def test_a_bifurcation_has_its_changes_where_python_has_them() -> None:
+    words = ("bifurcation", "DH-3 b=0.5 r=0.8", "law.kinetic", "--from", "200 mN", "--to", "0.8", "--steps", "4")
+    told = json.loads(ask(*words, "--json").stdout)
+    system = ss.scenarios.get("DH-3 b=0.5 r=0.8").system
+    found = ss.bifurcation(system, "law.kinetic", values=np.linspace(0.2, 0.8, 4))
+    assert [each["value"] for each in told["changes"]] == pytest.approx([each.value for each in found.changes])
+    text = ask(*words, "--output", "out").stdout
+    assert "the motion changes its kind" in text
+    assert "no stops" in text
+    assert Path("out/figures/bifurcation.svg").is_file()
+
+
+def test_dither_gives_the_smallest_amplitude() -> None:
+    Path("slider.toml").write_text(SLIDER)
+    told = json.loads(ask("dither", "slider.toml", "--frequency", "5", "--json").stdout)
+    assert told["amplitude"]["value"] == pytest.approx(0.000391, rel=0.05)  # as ss.dither's own example
+    assert told["sticks"][1] < 1 / 5
+
+
+def test_a_tap_tells_whose_resonance_each_is() -> None:
+    time = np.arange(4000) / 4000 - 0.2
+
+    def ring(frequency: float, damping: float) -> np.ndarray:
+        w = 2 * np.pi * frequency
+        return np.where(time > 0, np.exp(-damping * w * time) * np.sin(w * np.sqrt(1 - damping**2) * time), 0.0)
+
+    noise = np.random.default_rng(1).standard_normal((2, time.size))
+    a = ring(47.0, 0.02) + 0.5 * ring(125.0, 0.1) + 1e-3 * noise[0]
+    load = -2.42 * ring(47.0, 0.02) + 0.2 * ring(250.0, 0.05) + 1e-3 * noise[1]
+    ss.write_record(ss.Record.of({"a": a, "load": load}, fs=4000), "tap.csv")
+    text = " ".join(ask("impact", "tap.csv", "--mass", "2.42 kg").stdout.split())
+    assert "3 resonances ring after the tap: coupled contact at 47.0" in text
+    assert "mount of the accelerometer at 12" in text
+    told = json.loads(ask("impact", "tap.csv", "--mass", "2.42", "--json").stdout)
+    assert told["resonances"][0]["name"] == "coupled contact"
+
+
+@pytest.mark.parametrize("stated", [(), ("--offset", "-100 ms")])
+def test_two_recorders_are_joined(stated: tuple[str, ...]) -> None:
+    time = np.arange(4000) / 1000
+    late = time + 0.1  # the second recorder began so much later
+
+    def rows(name: str, header: str, *columns: np.ndarray) -> None:
+        np.savetxt(name, np.column_stack(columns), delimiter=",", header=header, comments="", fmt="%.9g")
+
+    rows("daq.csv", "t [s],pos [mm]", time, 1e3 * (np.sin(9 * time) + np.sin(23 * time)))
+    rows("logger.csv", "t [s],speed [m/s]", time, 9 * np.cos(9 * late) + 23 * np.cos(23 * late))
+    ask(
+        "rig", "join", "daq.csv", "logger.csv", "--first-channels", "x=pos [mm]", "--second-channels",
+        "v=speed [m/s]", "--output", "out", *(("--offset", "100 ms") if stated else ()),
+    )  # fmt: skip
+    joined = ss.read_record("out/record.csv")
+    inner = slice(200, -200)
+    expected = 9 * np.cos(9 * joined.time) + 23 * np.cos(23 * joined.time)
+    assert joined["v"][inner] == pytest.approx(expected[inner], abs=0.05)
+
+
+def test_rig_alone_measures_as_before() -> None:
+    result = CliRunner().invoke(main, ["rig", "--help"])
+    assert "Measure a simulated motion" in result.output
+    result = CliRunner().invoke(main, ["rig", "no such scenario"])
+    assert result.exit_code == 2

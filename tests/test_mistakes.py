@@ -1,0 +1,249 @@
+"""Mistakes in how a record or a rig is stated: the first line names each, and the command printed mends it."""
+
+from __future__ import annotations
+
+import functools
+import math
+import os
+import re
+import shlex
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner, Result
+
+import stickslip as ss
+from stickslip.cli.program import main
+from stickslip.consistent.slips import Amplitudes, mixups
+
+RIG = ("--mass", "2", "--stiffness", "3000", "--damping", "1")
+HEADER = "t [s],x [m],z [m],a [m/s^2],load [N]"
+
+
+@pytest.fixture(autouse=True)
+def elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """In a folder of its own; the files lie in another."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("COLUMNS", "80")
+    Path("data").mkdir()
+
+
+@functools.cache
+def motion() -> ss.Record:
+    """A slider of 2 kg, 3000 N/m and 1 N s/m on 1.2 N of friction."""
+    slider = ss.Oscillator(
+        mass=2.0, stiffness=3000.0, damping=1.0, law=ss.laws.Coulomb(1.2), drive=ss.drives.HarmonicBase(2e-3, 4.0)
+    )
+    seen = ss.simulate(slider, duration=6.0).record(fs=1000).rows(2000, 6000)
+    rng = np.random.default_rng(4)
+    noise = {"x": 2e-7, "z": 2e-7, "a": 1e-3, "friction": 3e-3}
+    return ss.Record.of({name: seen[name] + sd * rng.standard_normal(len(seen)) for name, sd in noise.items()}, fs=1000)
+
+
+def written(header: str, *, delimiter: str = ",", rows: int | None = None, **factors: float) -> Path:
+    """The motion in a file under that header, channels times these factors; `zero_a` is added to a."""
+    seen, zeros = motion(), {key: factors.pop(key) for key in list(factors) if key.startswith("zero_")}
+    columns = {
+        "t": np.arange(len(seen)) / 1000,
+        "x": seen["x"],
+        "z": seen["z"],
+        "a": seen["a"],
+        "load": seen["friction"],
+    }
+    columns = {
+        name: values * factors.get(name, 1.0) + zeros.get(f"zero_{name}", 0.0) for name, values in columns.items()
+    }
+    named = [cell.split()[0] for cell in header.split(",")]
+    table = np.column_stack([columns[name] for name in named])[:rows]
+    path = Path("data") / "run.csv"
+    np.savetxt(path, table, delimiter=delimiter, header=header.replace(",", delimiter), comments="", fmt="%.9g")
+    return path
+
+
+def ask(*words: object) -> Result:
+    return CliRunner().invoke(main, [*map(str, words), "--twins", "0"])
+
+
+def first_line(result: Result) -> str:
+    """The first sentence under the record's name, its lines joined; of an error that."""
+    if result.exit_code:
+        return result.stderr.splitlines()[0]
+    lines = result.stdout.splitlines()[2:]
+    return " ".join(lines[: lines.index("To mend it:")])
+
+
+def command_in(result: Result) -> list[str]:
+    lines = (result.stdout if result.exit_code == 0 else result.stderr).splitlines()
+    return shlex.split(lines[lines.index("To mend it:") + 1])
+
+
+def mended(result: Result, **filled: str) -> str:
+    """What the command that is printed prints, with what it leaves to be filled in."""
+    words = [filled.get(word, word) for word in command_in(result)[1:]]
+    answer = ask(*(word for word in words if word not in ("--twins", "0")))
+    assert answer.exit_code == 0, answer.output
+    assert "To mend it:" not in answer.stdout
+    return answer.stdout
+
+
+def right(told: str) -> bool:
+    """Whether the answer is the rig's friction."""
+    level = re.search(r"The contact slides against ([\d.]+) N of friction", told)
+    return level is not None and float(level[1]) == pytest.approx(1.2, rel=0.01)
+
+
+MISTAKES = {
+    "k in N/mm": (HEADER, {}, ("--stiffness", "3"), "Probably the stiffness is in N/mm, not in N/m"),
+    "k in N/mm, x and z alone": (
+        "t [s],x [m],z [m]", {}, ("--stiffness", "3"), "Probably the stiffness is in N/mm, not in N/m"),
+    "m in g": (HEADER, {}, ("--mass", "2000"), "Probably the mass is in g, not in kg"),
+    "a in g": ("t [s],x [m],z [m],a [m/s^2]", {"a": 1 / 9.80665}, (), "Probably a is in g, not in m/s^2"),
+    "sign of a": ("t [s],x [m],z [m],a [m/s^2]", {"a": -1}, (), "Probably a has the wrong sign"),
+    "sign of load": ("t [s],x [m],z [m],load [N]", {"load": -1}, (), "Probably load has the wrong sign"),
+    "time in ms": ("t [s],x [m],z [m],a [m/s^2]", {"t": 1e3}, (), "Probably the time is in ms, not in s"),
+    "time in ms, x and z alone": ("t [s],x [m],z [m]", {"t": 1e3}, (), "Probably the time is in ms, not in s"),
+    "x in mm": ("t [s],x [m],z [m],a [m/s^2]", {"x": 1e3}, (), "Probably x is in mm, not in m"),
+    "x and z in mm": ("t [s],x [m],z [m],a [m/s^2]", {"x": 1e3, "z": 1e3}, (), "Probably x and z are in mm, not in m"),
+    "x and z in mm, alone": ("t [s],x [m],z [m]", {"x": 1e3, "z": 1e3}, (), "Probably x and z are in mm, not in m"),
+    "x and z in mm, with load": (
+        "t [s],x [m],z [m],load [N]", {"x": 1e3, "z": 1e3}, (), "Probably x and z are in mm, not in m"),
+    "no units": ("t,x,z,a", {"x": 1e3, "z": 1e3}, (), "Probably x and z are in mm, not in m"),
+    "zero of a": ("t [s],x [m],z [m],a [m/s^2]", {"zero_a": 0.7}, (), "The accelerometer's zero is off by 0.7 m/s^2"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", MISTAKES)
+def test_a_mistake_is_named_first_and_the_command_printed_mends_it(name: str) -> None:
+    header, factors, stated, words = MISTAKES[name]
+    result = ask("analyze", written(header, **factors), *RIG, *stated)
+    assert first_line(result).startswith(words), result.output
+    given = "" if name == "zero of a" else "until that is mended no force is given"
+    assert given in first_line(result)
+    if name == "no units":  # those of a and t are still to be stated
+        again = ask(*command_in(result)[1:])
+        assert right(again.stdout)
+        return
+    assert right(mended(result))
+
+
+@pytest.mark.parametrize(("one", "other"), [("x", "a"), ("x", "z")])
+def test_exchanged_columns(one: str, other: str) -> None:
+    header = "t [s],x [m],z [m],a [m/s^2]"
+    path = written(header)
+    turned = {one: other, other: one}
+    named = [turned.get(cell.split()[0], cell.split()[0]) for cell in header.split(",")]
+    units = {"t": "s", "x": "m", "z": "m", "a": "m/s^2"}
+    text = path.read_text().splitlines()
+    path.write_text("\n".join([",".join(f"{name} [{units[name]}]" for name in named), *text[1:]]))
+    result = ask("analyze", path, *RIG)
+    assert first_line(result).startswith(f"Probably {one} and {other} are exchanged"), result.output
+    assert right(mended(result))
+
+
+def test_units_left_out_are_asked_for_by_a_command_that_states_those_taken() -> None:
+    result = ask("analyze", written("t,x,z,load"), *RIG)
+    assert first_line(result).startswith("t states no unit: read as s")
+    assert right(mended(result))
+
+
+def test_a_delay_without_its_unit() -> None:
+    Path("rig.toml").write_text("mass = 2\nstiffness = 3000\ndamping = 1\n[sensors.a]\ndelay = 3\n")
+    result = ask("analyze", written("t [s],x [m],z [m],a [m/s^2]"), "--config", "rig.toml")
+    assert first_line(result).startswith("Probably the delay of a, 3 s"), result.output
+    assert "a.delay=0.003" in command_in(result)
+
+
+@pytest.mark.parametrize("stated", ["mass", "stiffness"])
+def test_a_constant_that_is_missing(stated: str) -> None:
+    other, unit, value = {"mass": ("stiffness", "N/m", "3000"), "stiffness": ("mass", "kg", "2")}[stated]
+    known = {"mass": "2", "stiffness": "3000"}[stated]
+    result = ask("analyze", written("t [s],x [m],z [m]"), f"--{stated}", known)
+    assert first_line(result).startswith(f"The {other} is missing: "), result.output
+    assert command_in(result)[-2:] == [f"--{other}", f"VALUE {unit}"]
+    assert "The contact slides against" in mended(result, **{f"VALUE {unit}": f"{value} {unit}"})
+
+
+@pytest.mark.parametrize(("delimiter", "stated"), [(";", ","), (",", ";")])
+def test_a_wrong_delimiter(delimiter: str, stated: str) -> None:
+    result = ask("analyze", written("t [s],x [m],z [m]", delimiter=delimiter), *RIG, "--delimiter", stated)
+    assert result.exit_code == 1
+    assert first_line(result).startswith(f"stickslip: the delimiter '{stated}' does not fit 'run.csv'")
+    assert right(mended(result))
+
+
+def test_nineteen_samples() -> None:
+    result = ask("analyze", written("t [s],x [m],z [m]"), *RIG, "--rows", "0:19")
+    assert result.exit_code == 1
+    assert first_line(result).startswith("stickslip: run.csv is too short: 19 samples")
+    assert right(mended(result))
+    result = ask("analyze", written("t [s],x [m],z [m]", rows=19), *RIG)
+    assert "is too short: 19 samples" in result.stderr
+    assert "To mend it:" not in result.stderr, "nothing but a longer record does"
+
+
+def decayed(factor: float, *, mass: float = 0.0, clock: float = 1.0) -> Path:
+    """A pendulum of 1.3 Hz that dies away, from 0.3 rad."""
+    time = np.arange(4000) / 500
+    turn = 2 * math.pi * 1.3 * time
+    angle = 0.3 * np.exp(-0.02 * turn) * np.cos(turn) + 1e-4 * np.random.default_rng(1).standard_normal(time.size)
+    path = Path("data") / "release.csv"
+    header = "t [s],theta [rad]"
+    np.savetxt(path, np.column_stack([clock * time, factor * angle]), delimiter=",", header=header, comments="")
+    return path
+
+
+def test_an_angle_in_degrees() -> None:
+    result = CliRunner().invoke(main, ["decay", str(decayed(180 / math.pi)), "--method", "thesis"])
+    assert first_line(result).startswith("Probably theta, which swings "), result.output
+    assert "is in degrees, not in rad" in first_line(result)
+    words = command_in(result)
+    told = CliRunner().invoke(main, words[1:])
+    assert "a damping ratio of 0.0" in told.stdout
+    assert "To mend it:" not in told.stdout
+
+
+def test_a_frequency_that_mass_and_stiffness_contradict_by_a_thousand() -> None:
+    stiffness = 0.5 * (2 * math.pi * 1.3) ** 2
+    asked = ["decay", str(decayed(1.0)), "--method", "thesis", "--mass", "0.5", "--stiffness", str(stiffness / 1e3)]
+    result = CliRunner().invoke(main, asked)
+    assert first_line(result).startswith("Probably the stiffness is in N/mm, not in N/m"), result.output
+    told = CliRunner().invoke(main, command_in(result)[1:])
+    assert "To mend it:" not in told.stdout
+
+
+@pytest.mark.parametrize("seed", range(int(os.environ.get("STICKSLIP_DRAWS", "2"))))
+def test_no_correct_rig_is_called_a_mistake(seed: int) -> None:
+    """Sliders, sticking ones, elastic contacts that slip or never do, over rigs and drives of all sizes."""
+    rng, named, tried = np.random.default_rng(1000 + seed), 0, 0
+    for _ in range(60):
+        balance = _correct(rng)
+        found = mixups(balance, failing=False)
+        tried, named = tried + 1, named + bool(found)
+    assert tried == 60
+    assert named == 0
+
+
+def _correct(rng: np.random.Generator) -> Amplitudes:
+    """The strongest lines of a rig whose constants are known to 2 %, its gains to 1 %."""
+    mass, own, r = 10 ** rng.uniform(-2, 2), 10 ** rng.uniform(-0.3, 2.3), 10 ** rng.uniform(-1.3, 0.7)
+    stiffness, frequency, base = mass * (2 * math.pi * own) ** 2, r * own, 10 ** rng.uniform(-6, -2)
+    critical = 2 * math.sqrt(stiffness * mass)
+    damping = critical * 10 ** rng.uniform(-4, -0.7)
+    friction = 10 ** rng.uniform(-2, 0) * stiffness * base * min(1, abs(1 - r * r) + 0.2)
+    soft = {"stiffness": stiffness * 10 ** rng.uniform(0, 3), "damping": 0.025 * critical}
+    law = [
+        ss.laws.Coulomb(friction), ss.laws.Coulomb(friction, static=1.3 * friction),
+        ss.laws.CompliantContact(friction, **soft), ss.laws.CompliantContact(5 * stiffness * base, **soft),
+    ][rng.integers(4)]  # fmt: skip
+    drive = ss.drives.HarmonicBase(base, frequency)
+    slider = ss.Oscillator(mass=mass, stiffness=stiffness, damping=damping, law=law, drive=drive)
+    time = (np.arange(1024) / 256 + 35) / frequency
+    seen = ss.simulate(slider, cycles=40).sample(time, ("x", "z"))[0]
+    lines = seen @ np.exp(-2j * np.pi * frequency * time) * 2 / time.size
+    x, z = (complex(line) * (1 + 0.01 * rng.standard_normal()) for line in lines)
+    known = {
+        "mass": mass * (1 + 0.02 * rng.standard_normal()),
+        "stiffness": stiffness * (1 + 0.02 * rng.standard_normal()),
+    }
+    return Amplitudes({"x": x, "z": z}, 2 * math.pi * frequency, known, "ground", 0.01)
