@@ -15,10 +15,10 @@ from stickslip.laws.base import Law
 from stickslip.laws.compliant import CompliantContact, InertialContact
 from stickslip.laws.coulomb import Coulomb
 from stickslip.laws.linear_slope import LinearSlope, PositionLoad
-from stickslip.laws.lugre import Dahl
 from stickslip.laws.series import ElastoSlip, InSeries
 from stickslip.laws.state_variable import StateVariable
 from stickslip.laws.stribeck import Tabulated
+from stickslip.laws.time_delay import TimeDelay
 from stickslip.oscillator import Oscillator
 from stickslip.solve.energies import energy
 from stickslip.solve.simulate import simulate
@@ -149,7 +149,7 @@ def test_falling_friction_behind_a_contact_as_scipy_has_it() -> None:
         (lambda: InSeries(Coulomb(1.0), stiffness=1.0, damping=-1.0), "damping = -1"),
         (lambda: InSeries(LinearSlope(1.0, slope=-0.5), stiffness=1e3, damping=0.2), "slope of -0.5"),
         (lambda: InSeries(PositionLoad(1.0, gradient=-5.0), stiffness=3.0), "raise stiffness="),
-        (lambda: InSeries(Dahl(1.0, stiffness=100.0), stiffness=3.0), "Dahl in series"),
+        (lambda: InSeries(TimeDelay(LinearSlope(1.0, slope=0.1), lag=0.1), stiffness=3.0), "TimeDelay in series"),
     ],
 )
 def test_what_would_jump_is_refused(call, words: str) -> None:  # type: ignore[no-untyped-def]

@@ -16,9 +16,10 @@ from stickslip.errors import ModelError
 from stickslip.laws.base import Law
 from stickslip.laws.compliant import CompliantContact, InertialContact
 from stickslip.laws.coulomb import Coulomb
-from stickslip.laws.lugre import Dahl
+from stickslip.laws.linear_slope import LinearSlope
 from stickslip.laws.series import ElastoSlip
 from stickslip.laws.state_variable import StateVariable
+from stickslip.laws.time_delay import TimeDelay
 from stickslip.oscillator import Oscillator
 from stickslip.solve.energies import energy
 from stickslip.solve.periodic import steady_state
@@ -393,7 +394,7 @@ STATE = StateVariable(1.1, rate=2.0)
         (lambda: Contact(Coulomb(1.0), [1, 0], normal=[0, 1], stiffness=-1.0), "stiffness = -1"),
         (lambda: Contact(STATE, [1, 0], normal=[0, 1], stiffness=1.0), "StateVariable under a load that follows"),
         (lambda: Contact(STATE, [1, 0], preload=5.0), "under a preload"),
-        (lambda: Contact(Dahl(1.0, stiffness=100.0), [1, 0]), "Dahl in a structure"),
+        (lambda: Contact(TimeDelay(LinearSlope(1.0, slope=0.1), lag=0.1), [1, 0]), "TimeDelay in a structure"),
         (lambda: simulate(Structure(**GOOD), duration=1.0, start={"x3": 1.0}), "x3"),
         (lambda: simulate(Structure(**{**GOOD, "stiffness": np.zeros((2, 2))}), cycles=1), "no cycles"),
     ],

@@ -148,3 +148,13 @@ def test_a_sensor_whose_zero_is_off_changes_no_speed() -> None:
         assert other is not None
         assert other.value == pytest.approx(one.value, rel=1e-4)
         assert other.sd == pytest.approx(one.sd, rel=0.02)
+
+
+def test_a_contact_damped_beyond_ringing_is_refused() -> None:
+    """Its square root of a negative number ended the whole analysis of a record at 1 kHz."""
+    from stickslip.balance.balance import Rig
+    from stickslip.contact.sliding_onset import _set_going
+
+    known = np.array([1.13, 2.97, 71.5, np.log(20_000.0), 440.0])
+    with pytest.raises(EstimateError, match="rings"):
+        _set_going(known, Rig(mass=2.38, stiffness=2271.8, damping=0.12, damper="ground", contact="ground"))

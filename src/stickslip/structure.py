@@ -275,7 +275,8 @@ class Structure:
 
 def _loads(law: object) -> tuple[str, ...]:
     """By which of its parameters a contact may press a law: what of them all its forces are proportional to."""
-    return getattr(law, "loads", ())
+    loads = getattr(law, "loads", ())
+    return loads if isinstance(loads, tuple) else ()  # of a class whose laws differ in it: it is not told
 
 
 def _of_speed(quantity: Row) -> Row:

@@ -15,11 +15,13 @@ from stickslip.balance.force import friction_force
 from stickslip.balance.lag import sensor_delay
 from stickslip.contact.contact import contact_stiffness
 from stickslip.cycle.loops import friction_loops
+from stickslip.drives.kinds import HarmonicBase
 from stickslip.errors import ModelError, StickslipError
 from stickslip.oscillator import Oscillator
 from stickslip.parameters import finite
 from stickslip.record.record import Record
 from stickslip.rig.rig import Rig
+from stickslip.rig.shaker import Shaker
 from stickslip.solve.trajectory import Trajectory
 from stickslip.units import parse_value, prefixed
 
@@ -178,6 +180,7 @@ def plan_experiment(
     draws: int = 10,
     seed: int = 1,
     start: float = 0.0,
+    shaker: Shaker | None = None,
     progress: Callable[[str, float], None] | None = None,
 ) -> ExperimentPlan:
     """Which sensors, and how many samples a second, are needed for which accuracy?
@@ -203,6 +206,8 @@ def plan_experiment(
         Where chance comes from: the same seed gives the same plan.
     start : float
         Instant of the run [s] at which the records begin.
+    shaker : Shaker, optional
+        What is to move the base: a motion beyond its stroke, its frequencies or its force is refused.
     progress : callable, optional
         Called with words and the share that is done.
 
@@ -213,7 +218,8 @@ def plan_experiment(
     Raises
     ------
     ModelError
-        The run is not of an Oscillator, the rig does not sense x, or a number has no meaning.
+        The run is not of an Oscillator, the rig does not sense x, the shaker can not move it so, or a number has no
+        meaning.
 
     Examples
     --------
@@ -230,6 +236,8 @@ def plan_experiment(
         raise ModelError("a run of several masses", "an experiment is planned for one mass", "simulate an Oscillator")
     if "x" not in (sensor.channel for sensor in rig.sensors):
         raise ModelError("a rig that does not sense x", "every question needs the displacement", "add a sensor for x")
+    if shaker is not None:
+        _require_reach(run.system, shaker)
     if draws < 1 or not len(rates):
         raise ModelError(f"{draws} draws of {len(rates)} rates", "one of each is needed at least", "give more")
     for fs in rates:
@@ -247,6 +255,13 @@ def plan_experiment(
                 tried.setdefault(sensors, []).append(_Trial(known, rig, run, start + rig.offset).answers())
         setups += [Setup(float(fs), sensors, _accuracies(answers)) for sensors, answers in tried.items()]
     return ExperimentPlan(tuple(setups), draws, seed)
+
+
+def _require_reach(system: Oscillator, shaker: Shaker) -> None:
+    """Refuse a motion of the base that the shaker can not make, with the spring at its largest stretch."""
+    drive = system.drive
+    if isinstance(drive, HarmonicBase):  # a mass that stands still, as a stick leaves it, pulls with the amplitude
+        shaker.require(drive.frequency, drive.amplitude, pull=system.stiffness * drive.amplitude)
 
 
 def _choices(record: Record) -> Iterator[tuple[str, ...]]:

@@ -31,6 +31,7 @@ LOUD = 20.0  # standard deviations of its noise that the ringing must reach
 STANDS_OUT = 1.6  # times the largest singular value of noise
 AUDIBLE = 5.0  # standard deviations of its amplitude that a mode has in a channel that shows it
 ALIKE = 2.0  # factor within which acceleration and force of the coupled contact belong to one mass
+GROWN = 30.0  # powers of e to which a pole that the search tries may grow: beyond, no number can be fitted
 MISFIT = 1.5  # root mean square of what is left over, in standard deviations of the noise
 
 
@@ -72,8 +73,9 @@ def impact_test(record: Record, *, mass: Constant | None = None) -> ImpactTest:
     r"""Which resonances does a hammer tap excite, and which sensor shows them?
 
     The thesis's section 2.5: the base held, the contact engaged, a tap on the mass. After it every channel is a sum
-    of the same decaying oscillations, :math:`\sum_j \mathrm{Re}\, c_j e^{p_j t}` and a constant; the poles come from
-    the matrix pencil (Hua and Sarkar 1990) of all channels together and are refined by least squares, with intervals.
+    of the same decaying oscillations, :math:`\sum_j \mathrm{Re}\, c_j e^{p_j t}`, and a straight line; the poles come
+    from the matrix pencil (Hua and Sarkar 1990) of all channels together and are refined by least squares, with
+    intervals.
 
     A mode that both sensors show, the force as large against the acceleration as the mass says and opposed to it, is
     the contact's, coupled with the mass; one that only the accelerometer shows, or shows larger than that, is its
@@ -210,8 +212,9 @@ def _refined(poles: Complex, ringing: _Ringing) -> tuple[list[_Mode], float]:
 
     def waves(values: Array) -> Array:
         poles = np.array([_pole(math.exp(f), z) for f, z in values.reshape(-1, 2)])
-        wave = np.exp(np.outer(time, poles))
-        return np.column_stack([wave.real, -wave.imag, np.ones(len(time))])
+        grown = np.outer(time, poles)
+        wave = np.exp(np.minimum(grown.real, GROWN) + 1j * grown.imag)
+        return np.column_stack([wave.real, -wave.imag, np.ones(len(time)), time])  # what leaks away is a slope
 
     def misfit(values: Array) -> Array:
         columns = waves(values)

@@ -37,11 +37,15 @@ TRIGGER = re.compile(r"\s*(\w+)\s*([<>])\s*(\S+)\s*")
     help='Move an output by a tone meanwhile, in SI: "base=0.65e-3@2.5". Repeatable.',
 )  # fmt: skip
 @click.option(
+    "--runs", type=click.Path(path_type=Path), metavar="RUNS.TOML",
+    help="Record every run of a list, as bench next writes it, each with its own tone; --output names their folder.",
+)  # fmt: skip
+@click.option(
     "--output",
     required=True,
     type=click.Path(path_type=Path),
     metavar="FILE",
-    help="The record: .h5, .csv or .parquet.",
+    help="The record: .h5, .csv or .parquet; of --runs a folder.",
 )
 @click.option("--json", "as_json", is_flag=True, help="Print what was recorded as JSON and nothing else.")
 def acquire(names: tuple[str, ...], config: Path | None, output: Path, as_json: bool, **options: Any) -> None:
@@ -59,6 +63,9 @@ def acquire(names: tuple[str, ...], config: Path | None, output: Path, as_json: 
     tables, folder = (settings.devices if settings else {}), config.parent if config else None
     chosen = [bench.find_device(name, tables, folder=folder) for name in names]
     log = settings.log if settings else None
+    if options["runs"]:
+        _run_all(chosen, bench.read_runs(options["runs"]), output, log, as_json=as_json)
+        return
     drive = dict(_driven(each) for each in options["drives"])
     wanted = bench.Wanted(options["seconds"], _trigger(options["trigger"], options["before"]), drive, log)
     with progress(100) as tell:
@@ -66,6 +73,23 @@ def acquire(names: tuple[str, ...], config: Path | None, output: Path, as_json: 
     _show(done, as_json=as_json)
     if done.ended == "interrupted" and options["seconds"]:
         raise SystemExit(INTERRUPTED)
+
+
+def _run_all(devices: Any, runs: bench.RunList, folder: Path, log: Any, *, as_json: bool) -> None:
+    """Every run of a list, each into a file of its name; one that is there already is left out."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for run in runs.run:
+        path = folder / f"{run.name}.h5"
+        if path.exists():
+            say(f"{path} is there already: left out", err=True)
+            continue
+        moved: dict[str, bench.Signal] = {run.on: bench.Tone(run.amplitude, run.frequency)}
+        wanted = bench.Wanted(run.seconds, None, moved, log)
+        with progress(100) as tell:
+            done = bench.acquire(devices, output=path, wanted=wanted, watch=_watch(tell, run.seconds))
+        _show(done, as_json=as_json)
+        if done.ended == "interrupted":
+            raise SystemExit(INTERRUPTED)
 
 
 def _watch(tell: Any, seconds: float | None) -> Any:

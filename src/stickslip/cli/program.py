@@ -9,6 +9,8 @@ import click
 import stickslip as ss
 from stickslip.cli.acquire import acquire
 from stickslip.cli.analyze import analyze, demo
+from stickslip.cli.bench import bench
+from stickslip.cli.commission import commission
 from stickslip.cli.decay import decay
 from stickslip.cli.devices import devices
 from stickslip.cli.exchange import check, convert, datasets
@@ -85,8 +87,10 @@ def main() -> None:
 for _command in (
     acquire,
     analyze,
+    bench,
     bifurcation,
     check,
+    commission,
     convert,
     datasets,
     decay,

@@ -76,6 +76,12 @@ def rig() -> None:
     help='Of a plan, the least that is enough: "contact stiffness=500 N/m", "friction=10 mN". Repeatable.',
 )
 @click.option(
+    "--config",
+    type=click.Path(path_type=Path),
+    metavar="RIG.TOML",
+    help="Of a plan: its [shaker] has to be able to move the base so.",
+)
+@click.option(
     "--format",
     "form",
     type=click.Choice(["csv", "h5", "parquet"]),
@@ -107,7 +113,9 @@ def measure(case: str, output: Path | None, as_json: bool, everything: bool, pla
     needs = [pair(each, "--need") for each in options.pop("need")]
     if needs and not plan:
         raise click.BadParameter("what is needed is asked of a plan; add --plan", param_hint="--need")
-    form = options.pop("form")
+    form, config = options.pop("form"), options.pop("config")
+    settings = ss.rig.read_rig(config) if config else None
+    options["shaker"] = ss.rig.Shaker.of(settings.shaker) if settings and settings.shaker else None
     with progress(1) as tell:
         tell("simulating", 0)
         run = ss.story.outcome(wanted, progress=lambda share: tell(f"simulating, {share:.0%}", 0)).run
@@ -146,7 +154,7 @@ def _planned(
     run: Trajectory, bench: Rig, tell: Callable[[str, float], None], options: Mapping[str, Any]
 ) -> ExperimentPlan:
     """Many."""
-    chosen = {name: options[name] for name in ("draws", "seed", "start")}
+    chosen = {name: options[name] for name in ("draws", "seed", "start", "shaker")}
     return ss.answers.plan_experiment(run, rig=bench, rates=options["rates"] or RATES, progress=tell, **chosen)
 
 

@@ -325,6 +325,12 @@ def _set_going(known: Array, rig: Balance) -> float:
         )
     stiffness = math.exp(log_stiffness)
     square, decay = stiffness / rig.mass, (damping + rig.damping) / (2 * rig.mass)
+    if decay**2 >= square:
+        raise EstimateError(
+            f"a contact of {stiffness:.3g} N/m with {damping:.3g} N s/m",
+            "the speed of transition is that of a contact that rings as it begins to slide",
+            "look at the contact's damping, or at a faster motion",
+        )
     ring = math.sqrt(square - decay**2)
     drift = change / stiffness
     rest = (start + level) / stiffness - 2 * decay * drift / square

@@ -21,6 +21,8 @@ from stickslip.solve.trajectory import Trajectory
 
 MOST_ROWS = 10_000_000  # of a record: with its sensors' convolutions some hundred bytes each
 
+UNITS = {"x": "m", "v": "m/s", "a": "m/s^2", "friction": "N", "z": "m", "force": "N"}  # of what a sensor sits on
+
 Array = NDArray[np.float64]
 
 POUND, GRAVITY = 4.4482216152605, 9.80665  # force [N], acceleration [m/s^2]
@@ -227,14 +229,78 @@ class Rig:
             )
         chance = np.random.default_rng(rng)
         times = begin + np.arange(count) / (fs * (1 + self.rate))
-        signals = _signals(run)
+        samples, channels = self._read_all(_signals(run), run.starts, times, chance)
+        settings = {"rig": repr(self), "fs": fs, "rng": rng if isinstance(rng, int) else None, "start": start}
+        history = (
+            Step("simulate", {"system": repr(run.system)}, f"{len(run.modes)} pieces, {run.status}"),
+            Step("Rig.measure", settings, f"{count} samples of {', '.join(samples)}"),
+        )
+        return Record(samples, channels, float(fs), 0.0, history, None, _truth(run, begin, float(times[-1])))
+
+    def read(
+        self,
+        signals: Mapping[str, Callable[[Array], Array]],
+        *,
+        duration: float,
+        fs: float,
+        rng: int | np.random.Generator | None = None,
+    ) -> Record:
+        """What would this rig have recorded of motions and forces that are given as functions of time?
+
+        Weights on a load cell, gauge blocks before a displacement sensor, a rig at rest: what no oscillator does.
+
+        Parameters
+        ----------
+        signals : mapping of str to callable
+            By what is sensed ("x", "z", "v", "a", "friction", "force"): its values [SI] at increasing instants [s],
+            none below 0; what is not given is zero.
+        duration : float
+            Of the record [s].
+        fs : float
+            Sampling rate [Hz].
+        rng : int or numpy.random.Generator, optional
+            Where chance comes from.
+
+        Returns
+        -------
+        Record
+
+        Raises
+        ------
+        ModelError
+            A rate or a duration that is not positive, or a signal that no sensor can sit on.
+
+        Examples
+        --------
+        >>> record = Rig().read({"friction": lambda time: np.where(time < 1, 0.0, 5.0)}, duration=2, fs=1000, rng=1)
+        >>> round(float(record["load"][-1]), 1)
+        4.9
+        """
+        finite("fs", fs, unit="Hz", positive=True)
+        finite("duration", duration, unit="s", positive=True)
+        if strange := [name for name in signals if name not in UNITS]:
+            raise ModelError(f"a signal '{strange[0]}'", f"there are {', '.join(UNITS)}", "choose one of them")
+        count = round(duration * fs)
+        if not 2 <= count <= MOST_ROWS:
+            raise ModelError(f"{count} samples", f"a rig writes 2 to {MOST_ROWS:g} rows", "change fs= or duration=")
+        known = {name: _Signal(signals.get(name, np.zeros_like), unit) for name, unit in UNITS.items()}
+        times = np.arange(count) / (fs * (1 + self.rate))
+        samples, channels = self._read_all(known, np.zeros(0), times, np.random.default_rng(rng))
+        settings = {"rig": repr(self), "fs": fs, "rng": rng if isinstance(rng, int) else None}
+        step = Step("Rig.read", settings, f"{count} samples of {', '.join(samples)}")
+        return Record(samples, channels, float(fs), 0.0, (step,))
+
+    def _read_all(
+        self, signals: Mapping[str, _Signal], breaks: Array, times: Array, chance: np.random.Generator
+    ) -> tuple[dict[str, Array], dict[str, Channel]]:
+        """Samples and channels of every sensor that sits on one of the signals."""
         samples: dict[str, Array] = {}
         channels: dict[str, Channel] = {}
         for sensor in self.sensors:
             own = np.random.default_rng(chance.integers(2**63))  # a sensor's noise does not hang on the others
             if sensor.source not in signals:
                 continue
-            samples[sensor.channel] = _read(sensor, signals, run.starts, times, own)
+            samples[sensor.channel] = _read(sensor, signals, breaks, times, own)
             unit = signals[sensor.source].unit
             label = described(sensor.channel, unit)
             channels[sensor.channel] = Channel(sensor.channel, unit, label, "Rig", sensor.sensitivity)
@@ -244,12 +310,7 @@ class Rig:
                 f"the run has {', '.join(signals)}",
                 "choose sensors of these",
             )
-        settings = {"rig": repr(self), "fs": fs, "rng": rng if isinstance(rng, int) else None, "start": start}
-        history = (
-            Step("simulate", {"system": repr(run.system)}, f"{len(run.modes)} pieces, {run.status}"),
-            Step("Rig.measure", settings, f"{count} samples of {', '.join(samples)}"),
-        )
-        return Record(samples, channels, float(fs), 0.0, history, None, _truth(run, begin, float(times[-1])))
+        return samples, channels
 
 
 class _Signal(NamedTuple):
@@ -261,11 +322,10 @@ class _Signal(NamedTuple):
 
 def _signals(run: Trajectory) -> dict[str, _Signal]:
     """Everything of a run that a sensor may sit on, by name."""
-    units = {"x": "m", "v": "m/s", "a": "m/s^2", "friction": "N", "z": "m", "force": "N"}
     moved = {"z": bool(run.table.motion.base), "force": bool(run.table.motion.force)}
     return {
         label: _Signal(_picked(run, name, j), unit)
-        for name, unit in units.items()
+        for name, unit in UNITS.items()
         if moved.get(name, True)
         for j, label in enumerate(run.labels(name))
     }

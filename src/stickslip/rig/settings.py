@@ -87,7 +87,7 @@ class SensorSettings(BaseModel):
 
 
 class ShakerSettings(BaseModel):
-    """What moves the base, and how far it can; see :class:`stickslip.bench.Shaker`.
+    """What moves the base, and how far it can; see :class:`stickslip.rig.Shaker`.
 
     Attributes
     ----------
@@ -111,6 +111,39 @@ class ShakerSettings(BaseModel):
     velocity: Annotated[float, quantity("m/s"), Field(gt=0)] | None = None
     force: Annotated[float, quantity("N"), Field(gt=0)] | None = None
     moving_mass: Annotated[float, quantity("kg"), Field(ge=0)] = 0.0
+
+
+GRAVITY = 9.80665  # m/s^2
+
+
+ADDED = Estimate.stated("mass", (0.5, 1e-4), "kg")
+
+
+class CommissionSettings(BaseModel):
+    """What is at hand when a rig is commissioned; see :func:`stickslip.bench.commission`.
+
+    Attributes
+    ----------
+    weights : tuple of float
+        On the load cell and on the spring, one after another [N].
+    gauges : tuple of float
+        Displacements by gauge blocks, one after another [m].
+    turns : tuple of float
+        Accelerations that the accelerometer is turned to in gravity, one after another [m/s^2].
+    weights_sd, gauges_sd : float
+        How sure they are, as a part of them: "0.01 %".
+    added : float or Estimate
+        Mass that is put on for the second free vibration [kg].
+    """
+
+    model_config = STRICT
+
+    weights: tuple[Annotated[float, quantity("N")], ...] = (0.0, 2.0, 4.0, 6.0, 8.0, 6.0, 4.0, 2.0, 0.0)
+    gauges: tuple[Annotated[float, quantity("m")], ...] = (0.0, 2e-3, 4e-3, 6e-3, 8e-3, 6e-3, 4e-3, 2e-3, 0.0)
+    turns: tuple[Annotated[float, quantity("m/s^2")], ...] = (0.0, *(GRAVITY, 0.0, -GRAVITY, 0.0) * 2)
+    weights_sd: Annotated[float, quantity("1"), Field(ge=0, lt=1)] = 0.0
+    gauges_sd: Annotated[float, quantity("1"), Field(ge=0, lt=1)] = 0.0
+    added: Annotated[float | Estimate, _constant("mass", positive=True), AS_PAIR] = ADDED
 
 
 def _log(value: Any) -> Log:
@@ -163,6 +196,8 @@ class RigSettings(BaseModel):
         goes before it.
     shaker : ShakerSettings or None
         What moves the base.
+    commission : CommissionSettings or None
+        What is at hand when the rig is commissioned.
 
     Examples
     --------
@@ -193,6 +228,7 @@ class RigSettings(BaseModel):
     rows: Annotated[str, BeforeValidator(_row_range)] | None = None
     log: Annotated[Log, PlainValidator(_log), PlainSerializer(lambda log: log.entries())] | None = None
     shaker: ShakerSettings | None = None
+    commission: CommissionSettings | None = None
 
     def logged(self, record: Record) -> Record:
         """The record with the log; what it says of itself stays."""

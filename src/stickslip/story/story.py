@@ -32,6 +32,7 @@ TELLERS = {
     "Bifurcation": "maps.of_bifurcation", "Basins": "maps.of_basins", "Boundary": "maps.of_boundary",
     "Dither": "maps.of_dither", "Stability": "maps.of_stability",
     "ImpactTest": "estimates.of_tap", "Dataset": "maps.of_map",
+    "Commissioned": "bench.of_commissioned", "Tour": "tour.of_tour",
     "Estimate": "estimates.of_one", "list": "estimates.of_several", "tuple": "estimates.of_several",
 }  # fmt: skip
 

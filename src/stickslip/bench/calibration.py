@@ -1,0 +1,230 @@
+"""A sensor against what is known: weights, gauge steps, gravity. A spring by weights."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stickslip.bench.holds import find_holds, jumps
+from stickslip.errors import EstimateError, ModelError
+from stickslip.estimate import Doubt, Estimate, Result, Status
+from stickslip.record.record import Record
+from stickslip.statistics import student
+
+Array = NDArray[np.float64]
+
+QUESTION, BY_WEIGHTS = "the sensitivity of a sensor", "a spring by weights"
+LEAST = 3  # levels
+BENT = 0.01  # of the range, from which a sensor is not called straight
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Calibration(Result):
+    """A sensor's readings against known values.
+
+    Attributes
+    ----------
+    channel : str
+        Its channel.
+    gain : Estimate
+        Reading over truth; 1 where the stated sensitivity is right.
+    zero : Estimate or None
+        Reading at the value zero [unit of the channel]; None where it leaks away.
+    linearity : Estimate
+        Largest deviation from the straight line, as a part of the range.
+    reference, levels : ndarray (n,)
+        The known values and what was read [unit of the channel]; of a leaking sensor their steps.
+    status : str
+        "ok", or in words what to beware of.
+    """
+
+    channel: str
+    gain: Estimate
+    zero: Estimate | None
+    linearity: Estimate
+    reference: Array
+    levels: Array
+    status: str
+
+    @property
+    def correction(self) -> float:
+        """What readings are to be multiplied with."""
+        return 1 / self.gain.value
+
+
+def calibrate(
+    record: Record, *, channel: str, reference: Sequence[float], reference_sd: float = 0.0, leaks: bool = False
+) -> Calibration:
+    """By which factor, and from which zero, does a sensor read what is put on it?
+
+    The record stands on one level after another: weights on a load cell, gauge blocks before a displacement sensor, an
+    accelerometer turned over in gravity. The levels are found in it (:func:`~stickslip.bench.holds.find_holds`); a
+    straight line through them against the known values gives gain and zero, its scatter how sure they are, with
+    Student's quantile for few levels. Of a sensor that leaks, the steps are read instead, each side drawn on to the
+    instant between, so that what leaks away while a level is held does not count.
+
+    Parameters
+    ----------
+    record : Record
+        With the levels, a second or more each.
+    channel : str
+        The sensor's.
+    reference : sequence of float
+        What it stood on, in order, in SI units of the channel.
+    reference_sd : float
+        How sure these are, as a part of them.
+    leaks : bool
+        Whether the sensor is piezoelectric, and forgets.
+
+    Returns
+    -------
+    Calibration
+
+    Raises
+    ------
+    RecordError
+        The channel is missing or not finite.
+    EstimateError
+        Fewer than three levels, levels that are all alike, or a reading that does not follow them.
+
+    Examples
+    --------
+    >>> weights = np.array([0.0, 1.0, 2.0, 3.0, 0.0])
+    >>> rng = np.random.default_rng(1)
+    >>> read = np.repeat(0.1 + 1.02 * weights, 2000) + 0.002 * rng.standard_normal(10000)
+    >>> found = calibrate(Record.of({"load": read}, fs=1000), channel="load", reference=weights)
+    >>> found.gain.includes(1.02), found.zero.includes(0.1)
+    (True, True)
+    """
+    values = np.asarray(reference, dtype=float)
+    _require_reference(values, reference_sd)
+    holds = find_holds(record, channel, len(values), question=QUESTION)
+    unit = record.channels[channel].unit
+    if leaks:
+        known, read = np.diff(values), jumps(holds)
+        design = known[:, None]
+        weight_sd = np.array([math.hypot(a.sd, b.sd) for a, b in itertools.pairwise(holds)])
+    else:
+        known, read = values, np.array([hold.level for hold in holds])
+        design = np.column_stack([known, np.ones(len(known))])
+        weight_sd = np.array([hold.sd for hold in holds])
+    fit, sd, left, quantile = _line(design, read, weight_sd)
+    gain_sd = math.hypot(sd[0], reference_sd * fit[0])
+    if not abs(fit[0]) > 3 * sd[0]:
+        raise EstimateError(
+            f"{channel} changes by {np.ptp(read):.3g} {unit} over levels of {np.ptp(known):.3g} {unit}",
+            f"{QUESTION} needs readings that follow what is put on it",
+            "check the cable, the channel and the list of levels",
+        )
+    method = f"{len(read)} {'steps between levels' if leaks else 'levels'} against known values"
+    gain = Estimate.normal(f"gain of {channel}", fit[0], sd=gain_sd, unit="1", method=method, quantile=quantile)
+    zero = None if leaks else Estimate.normal(
+        f"zero of {channel}", fit[1], sd=sd[1], unit=unit, method=method, quantile=quantile
+    )  # fmt: skip
+    largest = float(np.abs(left).max() / np.ptp(fit[0] * known))
+    linearity = Estimate.normal(
+        f"deviation of {channel} from a straight line", largest,
+        sd=float(weight_sd.max() / np.ptp(fit[0] * known)), unit="1", method=method,
+    ).within(0.0)  # fmt: skip
+    bent = [Doubt(f"{channel} is off a straight line by {100 * largest:.2g} % of the range", "bent")]
+    return Calibration(channel, gain, zero, linearity, known, read, Status(*bent * (largest > BENT)))
+
+
+def _require_reference(values: Array, sd: float) -> None:
+    if len(values) < LEAST or not np.all(np.isfinite(values)) or np.ptp(values) == 0:
+        raise EstimateError(
+            f"{len(values)} levels", f"{QUESTION} needs {LEAST} finite levels, two of them apart", "give more"
+        )
+    if not 0 <= sd < 1:
+        raise ModelError(f"reference_sd = {sd}", "it is a part of the known values, from 0 to 1", "0.001 is 0.1 %")
+
+
+def _line(design: Array, read: Array, read_sd: Array) -> tuple[Array, Array, Array, float]:
+    """Coefficients, their deviations, what is left, and Student's quantile; levels count alike.
+
+    The scatter may by chance be less than what noise alone leaves of a level: then that counts.
+    """
+    fit = np.linalg.lstsq(design, read)[0]
+    left = read - design @ fit
+    freedom = max(1, len(read) - design.shape[1])
+    scatter, chance = math.sqrt(float(left @ left) / freedom), math.sqrt(float(np.mean(read_sd**2)))
+    sd = max(scatter, chance) * np.sqrt(np.diag(np.linalg.inv(design.T @ design)))
+    return np.asarray(fit, dtype=float), sd, left, student(float(freedom))
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class SpringByWeights(Result):
+    """A spring's stiffness by what it gives under weights.
+
+    Attributes
+    ----------
+    stiffness : Estimate
+        [N/m].
+    force, displacement : ndarray (n,)
+        Weights [N] and displacements [m].
+    status : str
+        "ok", or in words what to beware of.
+    """
+
+    stiffness: Estimate
+    force: Array
+    displacement: Array
+    status: str
+
+
+def spring_by_weights(
+    record: Record, *, weights: Sequence[float], weights_sd: float = 0.0, channel: str = "x"
+) -> SpringByWeights:
+    """How stiff is the spring, by the displacement under known weights?
+
+    As :func:`calibrate`, the other way round: the displacement against the force is the compliance 1/k. What is not
+    known of the displacement's gain (``gain_sd`` of the channel) goes into the interval; the contact has to be off, or
+    its friction holds part of the weight.
+
+    Parameters
+    ----------
+    record : Record
+        With the displacement, a second or more under each weight.
+    weights : sequence of float
+        Force along the displacement, in order [N].
+    weights_sd : float
+        How sure these are, as a part of them.
+    channel : str
+        The displacement's.
+
+    Returns
+    -------
+    SpringByWeights
+
+    Raises
+    ------
+    RecordError, EstimateError
+        As :func:`calibrate`.
+
+    Examples
+    --------
+    >>> weights = np.array([0.0, 2.0, 4.0, 6.0, 0.0])
+    >>> x = np.repeat(weights / 2310, 2000) + 1e-6 * np.random.default_rng(1).standard_normal(10000)
+    >>> spring_by_weights(Record.of({"x": x}, fs=1000), weights=weights).stiffness.includes(2310)
+    True
+    """
+    found = calibrate(record, channel=channel, reference=weights, reference_sd=weights_sd)
+    compliance, gain_sd = found.gain, record.channels[channel].gain_sd
+    if compliance.value <= 0:
+        raise EstimateError(
+            "a spring that gives against the weight", "displacement and weight have one sign", "turn one of them round"
+        )
+    # an even interval of the logarithm: a stiffness is never below zero
+    part = math.hypot(compliance.spread / compliance.value, gain_sd)
+    stiffness = Estimate(
+        "spring stiffness", 1 / compliance.value,
+        (math.exp(-1.96 * part) / compliance.value, math.exp(1.96 * part) / compliance.value),
+        part / compliance.value, "N/m", f"displacement under {len(found.levels)} weights",
+        checks=(f"off a straight line by {100 * found.linearity.value:.2g} %",),
+    )  # fmt: skip
+    return SpringByWeights(replace(stiffness, status=found.status), found.reference, found.levels, found.status)

@@ -1,0 +1,190 @@
+"""Nothing moves: what does each sensor read, how noisy is it, what is a count worth, does it drift?"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stickslip.estimate import Doubt, Estimate, Result, Status, plain
+from stickslip.record.record import Record
+from stickslip.signals.noise import quantisation_step
+from stickslip.statistics import correlation_time, mean_uncertainty, student
+
+Array = NDArray[np.float64]
+
+QUESTION = "what sensors read at rest"
+LEAST = 500  # samples of a record at rest
+COARSE = 3.0  # standard deviations of the noise in a count, up to which the counts themselves are fitted
+MOVES = 6.0  # deviations from chance of a slow swing, from which the rig was not at rest
+WIDE = 1e-2  # of the logarithm: wide enough for rounding, narrow against what 500 samples tell
+HELD = 0.02  # of the samples off the one count, below which the noise is only bounded
+
+
+@dataclass(frozen=True, repr=False)
+class SensorAtRest(Result):
+    """One sensor while nothing moves.
+
+    Attributes
+    ----------
+    channel : str
+        Its channel.
+    zero : Estimate
+        What it reads [unit of the channel].
+    drift : Estimate
+        How fast that changes [unit of the channel / s].
+    noise : Estimate
+        Standard deviation of its noise, before it was rounded to counts [unit of the channel].
+    count : float
+        What a count of the digitiser is worth [unit of the channel]; zero where no steps show.
+    status : str
+        "ok", or in words what to beware of.
+    """
+
+    channel: str
+    zero: Estimate
+    drift: Estimate
+    noise: Estimate
+    count: float
+    status: str
+
+
+@dataclass(frozen=True, repr=False)
+class AtRest(Result):
+    """Every sensor while nothing moves.
+
+    Attributes
+    ----------
+    sensors : mapping of str to SensorAtRest
+        By channel.
+    duration : float
+        Of the record [s].
+    """
+
+    sensors: Mapping[str, SensorAtRest]
+    duration: float
+
+    @property
+    def estimates(self) -> tuple[Estimate, ...]:
+        """Zero, noise and drift of each."""
+        return tuple(each for sensor in self.sensors.values() for each in (sensor.zero, sensor.noise, sensor.drift))
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data for JSON."""
+        return {name: dict(plain(vars(sensor))) for name, sensor in self.sensors.items()}
+
+
+def at_rest(record: Record) -> AtRest:
+    r"""What does each sensor read while nothing moves, how noisy is it, and does it drift?
+
+    The zero is the mean, the drift the slope of a straight line, with the uncertainty that correlated noise leaves
+    (see :func:`~stickslip.statistics.mean_uncertainty`). The noise is what is left of the line. Where a count is not
+    small beside it, mean and deviation before rounding are those under which the counts are most likely,
+
+    .. math:: \sum_n N_n \log \left[ \Phi\left(\frac{c_n + q/2 - \mu}{\sigma}\right)
+              - \Phi\left(\frac{c_n - q/2 - \mu}{\sigma}\right) \right] \to \max ,
+
+    with N_n samples at the count c_n and counts of q.
+
+    Parameters
+    ----------
+    record : Record
+        Of a rig at rest, ten seconds or more: contact off or unloaded, base held, air on.
+
+    Returns
+    -------
+    AtRest
+
+    Raises
+    ------
+    RecordError
+        A channel that is not finite, a broken clock, fewer than 500 samples.
+
+    Examples
+    --------
+    >>> noise = np.random.default_rng(1).standard_normal((2, 20000))
+    >>> readings = np.round((3e-6 + 1e-6 * noise[0]) / 2.5e-6) * 2.5e-6
+    >>> found = at_rest(Record.of({"x": readings, "a": 0.2 + 0.04 * noise[1]}, fs=2000)).sensors
+    >>> found["x"].zero.includes(3e-6), found["x"].noise.includes(1e-6), found["a"].noise.includes(0.04)
+    (True, True, True)
+    """
+    record.require_clean(*record, question=QUESTION, samples=LEAST)
+    sensors = {name: _sensor(name, record) for name in record}
+    return AtRest(sensors, record.duration)
+
+
+def _sensor(name: str, record: Record) -> SensorAtRest:
+    values, unit = record[name], record.channels[name].unit
+    count = quantisation_step(values)
+    time = (np.arange(len(values)) - (len(values) - 1) / 2) / record.fs
+    slope = float(time @ values / (time @ time))
+    left = values - values.mean() - slope * time
+    worth = len(values) / max(1.0, correlation_time(left))
+    of = f"{len(values)} samples at rest"
+    zero_sd, freedom = mean_uncertainty(left)
+    level, noise = _noise(values - slope * time, left, count, worth)
+    zero = Estimate.normal(
+        f"zero of {name}", level, sd=zero_sd, unit=unit, method=f"mean of {of}", quantile=student(freedom)
+    )
+    sd, slope_freedom = mean_uncertainty(time * left / float(np.mean(time**2)))
+    drift = Estimate.normal(
+        f"drift of {name}", slope, sd=sd, unit=f"{unit}/s", method=f"slope of {of}", quantile=student(slope_freedom)
+    )
+    spread = noise[1] if math.isfinite(noise[1]) else 0.0
+    told = Estimate.normal(
+        f"noise of {name}", noise[0], sd=spread, unit=unit, method=f"likelihood of the counts of {of}" if count else of
+    ).within(0.0)
+    if not noise[0] or not math.isfinite(noise[1]):
+        told = Estimate(told.name, 0.0, (0.0, count / 2 or 0.0), count / 4, unit, f"{of} stand on one count")
+    return SensorAtRest(name, zero, drift, told, count, _status(name, values, left, worth, drift))
+
+
+def _noise(values: Array, left: Array, count: float, worth: float) -> tuple[float, tuple[float, float]]:
+    """Level, and deviation of the noise with its own; the second is infinite where only a bound is known."""
+    level, sd = float(values.mean()), float(left.std())
+    if not count or sd > COARSE * count:
+        return level, (sd, sd / math.sqrt(2 * max(1.0, worth - 2)))
+    counts, times = np.unique(np.round(values / count), return_counts=True)
+    if times.max() > (1 - HELD) * len(values):
+        return level, (sd, math.inf)
+    return _rounded(counts * count, times * worth / len(values), count, level, sd)
+
+
+def _rounded(
+    levels: Array, times: NDArray[np.float64], count: float, level: float, sd: float
+) -> tuple[float, tuple[float, float]]:
+    """Mean and deviation before rounding, by the likelihood of the counts; deviation of the latter by its curvature."""
+    from scipy.optimize import minimize
+    from scipy.special import ndtr
+
+    def cost(at: Array) -> float:
+        spread = count * math.exp(at[1])
+        ends = (
+            (levels + count / 2 - level - count * at[0]) / spread,
+            (levels - count / 2 - level - count * at[0]) / spread,
+        )
+        return -float(times @ np.log(np.maximum(ndtr(ends[0]) - ndtr(ends[1]), 1e-300)))
+
+    start = np.array([0.0, math.log(max(0.2, math.sqrt(max(0.0, (sd / count) ** 2 - 1 / 12))))])
+    best = minimize(cost, start, method="Nelder-Mead", options={"xatol": 1e-5, "fatol": 1e-6}).x
+    step = np.array([0.0, WIDE])
+    bend = (cost(best + step) - 2 * cost(best) + cost(best - step)) / WIDE**2
+    noise = count * math.exp(best[1])
+    return level + count * float(best[0]), (noise, noise / math.sqrt(bend) if bend > 0 else math.inf)
+
+
+def _status(name: str, values: Array, left: Array, worth: float, drift: Estimate) -> str:
+    blocks = left[: len(left) // 20 * 20].reshape(20, -1).mean(axis=1)
+    expected = left.std() / math.sqrt(max(1.0, len(left) / 20))
+    doubts: list[Doubt | str] = []
+    if np.ptp(values) == 0:
+        doubts.append(Doubt(f"{name} reads one number throughout: is it plugged in?", "dead"))
+    elif np.abs(blocks).max() > MOVES * expected and worth < len(left) / 20:
+        doubts.append(Doubt(f"{name} swings slowly: the rig moves, or its sensor warms up", "moves"))
+    if drift.known and not drift.includes(0.0):
+        doubts.append(Doubt(f"{name} drifts", "drifts", lesser=True))
+    return Status(*doubts)

@@ -1,0 +1,137 @@
+"""A commissioned rig told: its constants, its sensors, what each step did, and the rig.toml that came of it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from functools import partial
+from pathlib import Path
+
+from stickslip.bench.calibration import Calibration
+from stickslip.bench.response import ModalFit
+from stickslip.bench.steps import STEPS, BenchStep
+from stickslip.bench.walk import Commissioned
+from stickslip.estimate import Estimate, Result, stands
+from stickslip.figures.bench import plot_calibrations, plot_response
+from stickslip.figures.plate import Plate, plate
+from stickslip.story.findings import plain
+from stickslip.story.story import Line, Story, Table
+from stickslip.story.words import Caution, interval_of, value_of
+
+# What leads: of which step, and which of its numbers; the rest stands in the tables.
+LEADING = (
+    ("stick", "contact stiffness"), ("stick", "coupled frequency"), ("free", "natural frequency"),
+    ("free", "damping ratio"), ("free", "lead of a over x"), ("discharge", "discharge time constant"),
+    ("tap", "frequency of the mount of the accelerometer"), ("tap", "frequency of the mount of the load cell"),
+)  # fmt: skip
+OFF_LINE = (
+    "How far each level is off the straight line through all of them: scatter is how well the steps were set, a bow is "
+    "a sensor that bends."
+)
+ANSWER = (
+    "Averaged spectra, and the oscillator fitted line by line without their leakage: where a window is shorter than "
+    "the resonance rings, H1 and H2 part and the coherence falls, and the fit is what to read."
+)
+
+
+def of_commissioned(done: Commissioned) -> Story:
+    """The constants first; a table of the steps, and one of every number."""
+    known, found = done.known, done.results
+    constants = known.constants
+    own = [*(constants.estimates if constants else ()), *([known.damping] if known.damping else [])]
+    lines = [Line.of(each, done.true_value(each.name)) for each in own]
+    lines += [Line.of(each, done.true_value(each.name, step)) for step, each in _leading(done)]
+    cautions = [Caution(f"{_title(name)} {why}") for name, why in done.refused.items()]
+    cautions += [
+        Caution(f"{_title(name)} {status}.")
+        for name, result in found.items()
+        if not stands(status := str(getattr(result, "status", "ok")))
+    ]
+
+    def write(folder: Path) -> None:
+        (folder / "rig.toml").write_text(known.toml(), encoding="utf-8")
+
+    return Story(
+        "Commissioning", [_headline(done)], cautions, lines, tables=_tables(done),
+        settings=_settings(done), draw=lambda: _plates(done), data=lambda: dict(plain(done.to_dict())), write=write,
+    )  # fmt: skip
+
+
+def _headline(done: Commissioned) -> str:
+    known = done.known
+    constants = known.constants
+    asked = f"{len(done.results)} step{'s' * (len(done.results) != 1)} answered"
+    refused = f", {len(done.refused)} refused" if done.refused else ""
+    if constants is None:
+        return f"{asked}{refused}."
+    mass, spring = constants.estimates
+    damper = f" and a damper of {value_of(known.damping)}" if known.damping else ""
+    return f"The rig is a mass of {value_of(mass)} on a spring of {value_of(spring)}{damper}: {asked}{refused}."
+
+
+def _leading(done: Commissioned) -> Iterator[tuple[str, Estimate]]:
+    for step, name in LEADING:
+        for each in done.results[step].estimates if step in done.results else ():
+            if each.name == name:
+                yield step, each
+
+
+def _title(name: str) -> str:
+    return next((step.title for step in STEPS if step.name == name), name)
+
+
+def _tables(done: Commissioned) -> list[Table]:
+    rows = [
+        [step.title, step.todo, _short(done, step)]
+        for step in STEPS
+        if step.name in done.results or step.name in done.refused
+    ]
+    tables = [Table("What was done", ("question", "at the rig", "answer"), rows)]
+    truth = any(done.true_value(each.name, name) is not None for name, each in _numbers(done))
+    heads = ("step", "quantity", "value", "95 % interval", *(["true value"] if truth else []))
+    cells = [
+        [name, each.name, value_of(each), interval_of(each), *([_true(done, name, each)] if truth else [])]
+        for name, each in _numbers(done)
+    ]
+    return [*tables, Table("Which number did each step find?", heads, cells, folded=True)]
+
+
+def _numbers(done: Commissioned) -> Iterable[tuple[str, Estimate]]:
+    return ((name, each) for name, result in done.results.items() for each in result.estimates)
+
+
+def _true(done: Commissioned, step: str, each: Estimate) -> str:
+    true = done.true_value(each.name, step)
+    return "–" if true is None else value_of(each, true)
+
+
+def _short(done: Commissioned, step: BenchStep) -> str:
+    """The first numbers of a step, in a cell."""
+    if step.name in done.refused:
+        return f"refused: {done.refused[step.name]}"
+    return "; ".join(f"{each.name} {value_of(each)}" for each in _first(done.results[step.name]))
+
+
+def _first(result: Result) -> tuple[Estimate, ...]:
+    return tuple(each for each in result.estimates if each.known)[:3]
+
+
+def _settings(done: Commissioned) -> dict[str, str]:
+    settings = done.known.settings()
+    flat = {key: str(value) for key, value in settings.items() if not isinstance(value, dict)}
+    for name, table in settings.items():
+        if isinstance(table, dict):
+            flat |= {f"{name}.{key}": str(value) for key, value in table.items()}
+    return flat
+
+
+def _plates(done: Commissioned) -> list[Plate]:
+    sensors = {each.channel: each for each in done.results.values() if isinstance(each, Calibration)}
+    plates = []
+    sweep = done.results.get("sweep")
+    if isinstance(sweep, ModalFit) and sweep.response is not None:
+        plates.append(plate("frequency-response", partial(plot_response, sweep), "The answer to the base", ANSWER))
+    if sensors:
+        plates.append(
+            plate("calibration", partial(plot_calibrations, sensors), "How straight the sensors are", OFF_LINE)
+        )
+    return plates

@@ -1,0 +1,103 @@
+"""The whole of commissioning: a rig.toml that analyze reads, a walk that goes on where it ended, steps on files."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+import stickslip as ss
+from stickslip import bench
+from stickslip.cli.program import main
+
+RIG = ss.Rig().having("x", gain=1.02, offset=3e-5).having("load", gain=0.97, offset=0.02)
+BENCH = bench.SimulatedBench(rig=RIG, fs=1000, seed=4)
+
+
+def some(*names: str) -> list[bench.BenchStep]:
+    return [bench.step_named(name) for name in names]
+
+
+@pytest.fixture(scope="module")
+def done() -> bench.Commissioned:
+    return bench.commission(BENCH.step, steps=some("rest", "gauge-x", "weigh", "spring", "free"), truth=BENCH.truth)
+
+
+def run(*arguments: str | Path) -> str:
+    result = CliRunner().invoke(main, [str(each) for each in arguments])
+    assert result.exit_code == 0, result.output
+    return result.output
+
+
+def test_constants_are_found_in_spite_of_gains_and_zeros(done: bench.Commissioned) -> None:
+    constants = done.known.require_constants()
+    assert constants.mass.includes(2.42)
+    assert constants.stiffness.includes(2310)
+    assert constants.stiffness.sd < 5  # an uncorrected gain would be 2 %, 46 N/m
+    assert not done.refused
+
+
+def test_rig_toml_is_read_back_and_sets_records_right(done: bench.Commissioned, tmp_path: Path) -> None:
+    (tmp_path / "rig.toml").write_text(done.known.toml(), "utf-8")
+    rig = ss.rig.read_rig(tmp_path / "rig.toml")
+    assert isinstance(rig.mass, ss.Estimate)
+    assert rig.mass.includes(2.42)
+    weighed = RIG.read({"friction": lambda t: np.where(t < 1, 0.0, 5.0)}, duration=2, fs=1000, rng=9)
+    written = ss.write_record(weighed, tmp_path / "weighed.csv")
+    right = ss.read_record(written, channels=rig.channels)
+    assert np.mean(right["load"][:900]) == pytest.approx(0.0, abs=2e-3)
+    assert np.mean(right["load"][1200:1300]) == pytest.approx(5.0, rel=0.01)
+    assert 0 < right.channels["load"].gain_sd < 0.01
+    assert rig.sensors["x"].noise == pytest.approx(1e-6, rel=0.05)
+
+
+def test_what_was_stated_before_stays_in_the_file() -> None:
+    rig = ss.rig.rig_settings({"contact": "base", "log": {"surface": "steel"}, "channels": {"load": "F [mN]"}})
+    known = bench.commission(BENCH.step, rig=rig, steps=some("rest", "weigh")).known
+    told = ss.rig.rig_settings(known.settings())
+    assert (told.contact, told.log) == ("base", rig.log)
+    assert told.channels["load"].startswith("(F - ")  # the zero in mN, as the column is
+    assert abs(float(told.channels["load"].split()[2].rstrip(")")) - 20.0) < 1.0
+
+
+def test_a_contact_that_does_not_give_way_refuses_two_steps_only() -> None:
+    rigid = bench.SimulatedBench(
+        ss.Oscillator(mass=2.42, stiffness=2310, damping=1.0, law=ss.laws.Coulomb(1.0)), fs=500
+    )
+    walked = bench.commission(rigid.step, steps=some("rest", "tap", "stick"))
+    assert set(walked.refused) == {"tap", "stick"}
+    assert "rest" in walked.results
+
+
+def test_the_story_says_the_constants_first_and_the_truth_beside(done: bench.Commissioned) -> None:
+    story = ss.summary(done)
+    assert story.headline[0].startswith("The rig is a mass of 2.4")
+    assert story.lines[0].true is not None
+    assert next(table.title for table in story.tables) == "What was done"
+    assert {plate.name for plate in story.plates} == {"calibration"}
+
+
+def test_the_command_writes_goes_on_and_answers_single_files(tmp_path: Path) -> None:
+    folder, config = tmp_path / "commission", tmp_path / "devices.toml"
+    config.write_text('[devices.desk]\nkind = "sim"\nfs = 1000\n', "utf-8")
+    steps = ("--step", "rest", "--step", "weigh")
+    told = run("commission", "--device", "desk", "--config", config, *steps, "--output", folder)
+    assert "2 steps answered" in told
+    assert (folder / "report" / "report.html").exists()
+    assert ss.rig.read_rig(folder / "rig.toml").channels["load"]
+    kept = {path: path.stat().st_mtime_ns for path in (folder / "records").iterdir()}
+    told = run("commission", *steps, "--output", folder, "--json")  # without a device: what is there is enough
+    assert len(json.loads(told)["steps"]) == 2
+    assert kept == {path: path.stat().st_mtime_ns for path in (folder / "records").iterdir()}
+    record = next(path for path in kept if path.stem == "weigh")
+    alone = json.loads(run("commission", f"weigh={record}", "--json"))
+    assert alone["steps"]["weigh"][0]["name"] == "gain of load"
+
+
+def test_steps_are_listed_and_unknown_ones_refused() -> None:
+    assert "Tap the mass once" in run("commission", "--list", "--step", "tap").replace("\n", " ")
+    for wrong in (["--step", "nap", "--device", "sim"], []):
+        assert CliRunner().invoke(main, ["commission", *wrong]).exit_code == 2

@@ -1,0 +1,231 @@
+"""Each step of commissioning against closed forms, and all of them on simulated rigs whose truth is known."""
+
+from __future__ import annotations
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+
+import stickslip as ss
+from scripts import loaded
+from stickslip import bench
+from stickslip.bench.holds import find_holds
+
+NOISE = np.random.default_rng(7)
+
+
+def of(name: str, values: np.ndarray, fs: float = 1000.0) -> ss.Record:
+    return ss.Record.of({name: values}, fs=fs)
+
+
+# ---- at rest
+
+
+@pytest.mark.parametrize("noise", [0.3e-6, 0.8e-6, 1.6e-6, 5e-6])
+def test_the_noise_before_rounding_is_found_behind_counts(noise: float) -> None:
+    values = np.round((0.7e-6 + noise * NOISE.standard_normal(40_000)) / 2.5e-6) * 2.5e-6
+    found = bench.at_rest(of("x", values)).sensors["x"]
+    if noise == 0.3e-6:  # two samples in a hundred are off the one count
+        assert found.noise.interval[1] < 1e-6
+        return
+    assert found.count == pytest.approx(2.5e-6)
+    assert found.noise.value == pytest.approx(noise, rel=0.03)
+    assert found.zero.value == pytest.approx(0.7e-6, abs=5 * noise / 200 + 1e-8)
+
+
+def test_a_drift_and_a_dead_sensor_are_told() -> None:
+    time = np.arange(20_000) / 1000
+    moving = bench.at_rest(of("load", 0.01 * time + 0.002 * NOISE.standard_normal(time.size))).sensors["load"]
+    assert moving.drift.includes(0.01)
+    assert "drifts" in moving.status
+    dead = bench.at_rest(of("a", np.full(2000, 0.25))).sensors["a"]
+    assert "plugged in" in dead.status
+
+
+def test_a_rig_that_swings_is_not_at_rest() -> None:
+    time = np.arange(10_000) / 1000
+    found = bench.at_rest(of("x", 1e-4 * np.sin(2 * time) + 1e-6 * NOISE.standard_normal(time.size)))
+    assert "swings" in found.sensors["x"].status
+
+
+# ---- levels
+
+
+def test_levels_of_unequal_length_are_found() -> None:
+    lengths, levels = (700, 1500, 400, 2000), (0.0, 3.0, 2.0, -1.0)
+    values = np.concatenate([np.full(n, y) for n, y in zip(lengths, levels, strict=True)])
+    holds = find_holds(of("load", values + 0.05 * NOISE.standard_normal(values.size)), "load", 4, question="a test")
+    assert [round(hold.level, 1) for hold in holds] == list(levels)
+    ends = list(itertools.accumulate(lengths))
+    assert all(hold.last < end / 1000 for hold, end in zip(holds, ends, strict=True))
+
+
+def test_a_leaking_sensor_is_read_by_its_steps() -> None:
+    time, weights = np.arange(18_000) / 1000, [0.0, 2.0, 4.0, 6.0, 4.0, 0.0]
+    load = sum(
+        (after - before) * np.where(time > 3 * n, np.exp(-np.maximum(time - 3 * n, 0) / 40), 0)
+        for n, (before, after) in enumerate(itertools.pairwise(weights), start=1)
+    )
+    record = of("load", 0.97 * load + 0.002 * NOISE.standard_normal(time.size))
+    leaking = bench.calibrate(record, channel="load", reference=weights, leaks=True)
+    assert leaking.gain.value == pytest.approx(0.97, abs=1e-3)
+    assert abs(bench.calibrate(record, channel="load", reference=weights).gain.value - 0.97) > 5e-3
+
+
+def test_what_does_not_follow_is_refused_and_what_bends_is_told() -> None:
+    levels = np.repeat([0.0, 1.0, 2.0, 3.0, 4.0], 2000)
+    noise = 1e-3 * NOISE.standard_normal(levels.size)
+    with pytest.raises(ss.errors.EstimateError, match="follow"):
+        bench.calibrate(of("load", noise), channel="load", reference=[0, 1, 2, 3, 4])
+    with pytest.raises(ss.errors.EstimateError, match="3 finite levels"):
+        bench.calibrate(of("load", levels), channel="load", reference=[1, 1, 1])
+    assert (
+        "straight line"
+        in bench.calibrate(
+            of("load", levels + 0.05 * levels**2 + noise), channel="load", reference=[0, 1, 2, 3, 4]
+        ).status
+    )
+
+
+# ---- free vibrations
+
+
+def test_mass_and_spring_agree_with_all_that_was_measured() -> None:
+    frequency = ss.Estimate.normal(
+        "natural frequency", math.sqrt(2310 / 2.42) / math.tau, sd=1e-6, unit="Hz", method=""
+    )
+    masses = [ss.Estimate.normal("mass", 2.43, sd=0.01, unit="kg", method="")]
+    springs = [ss.Estimate.normal("spring stiffness", 2310, sd=2.0, unit="N/m", method="")]
+    found = bench.best_constants(frequency, masses=masses, springs=springs)
+    assert found.stiffness.value / found.mass.value == pytest.approx(2310 / 2.42, rel=1e-6)
+    assert abs(found.mass.value - 2.42) < 0.003  # the spring is known better
+    assert found.status == "ok"
+    off = [ss.Estimate.normal("mass", 2.6, sd=0.01, unit="kg", method="")]
+    assert "agree" in bench.best_constants(frequency, masses=off, springs=springs).status
+    with pytest.raises(ss.errors.EstimateError, match="neither"):
+        bench.best_constants(frequency)
+
+
+def test_an_added_mass_that_adds_nothing_is_refused() -> None:
+    same = ss.Estimate.normal("f", 4.9, sd=0.01, unit="Hz", method="")
+    with pytest.raises(ss.errors.EstimateError, match="lowers"):
+        bench.added_mass(same, same, 0.5)
+
+
+# ---- discharge
+
+
+@pytest.mark.parametrize("constant", [5.0, 50.0, 500.0])
+def test_time_constants_shorter_and_longer_than_the_record(constant: float) -> None:
+    held = 0
+    for seed in range(20):
+        time, chance = np.arange(20_000) / 500, np.random.default_rng(seed)
+        load = 0.1 + np.where(time > 7, 4 * np.exp(-np.maximum(time - 7, 0) / constant), 0)
+        record = of("load", load + 0.002 * chance.standard_normal(time.size), 500.0)
+        held += bench.discharge_test(record).time_constant.includes(constant)
+    assert held >= 17  # of 20: chance leaves 17 or more of 95 % in 98.4 % of all cases
+
+
+def test_a_cell_that_does_not_leak_has_a_lower_bound_only() -> None:
+    time = np.arange(40_000) / 1000
+    found = bench.discharge_test(of("load", np.where(time > 10, 5.0, 0.0) + 0.01 * NOISE.standard_normal(time.size)))
+    assert found.time_constant.interval[0] > 1000 or math.isinf(found.time_constant.interval[1])
+    with pytest.raises(ss.errors.EstimateError, match="step"):
+        bench.discharge_test(of("load", NOISE.standard_normal(40_000)))
+
+
+# ---- frequency response
+
+
+def _driven(on: str, damping: float, fs: float = 400.0) -> ss.Record:
+    chance = np.random.default_rng(3)
+    time = np.arange(int(30 * fs)) / fs
+    sweep = np.sin(2 * np.pi * (1.0 * time + 9.0 * time**2 / 60)) * np.minimum(1, time)
+    size = 2e-4 if on == "base" else 0.5
+    drive = ss.drives.Recorded(size * sweep, fs, on=on)
+    slider = ss.Oscillator(mass=2.42, stiffness=2310, damping=damping, law=ss.laws.Coulomb(0.0), drive=drive)
+    rig = ss.Rig.perfect("x", "z" if on == "base" else "force")
+    record = rig.measure(ss.simulate(slider, duration=29.0), fs=fs)
+    noisy = {name: record[name] + 1e-3 * np.std(record[name]) * chance.standard_normal(len(record)) for name in record}
+    return ss.Record.of(noisy, fs=fs)
+
+
+@pytest.mark.parametrize("damping", [0.2, 12.0])
+def test_modal_fit_finds_a_force_driven_oscillator(damping: float) -> None:
+    found = bench.modal_fit(_driven("force", damping), channels=("force", "x"))
+    assert found.mass.value == pytest.approx(2.42, rel=2e-3)
+    assert found.stiffness.value == pytest.approx(2310, rel=2e-3)
+    assert found.damping.value == pytest.approx(damping, rel=0.02)
+    assert found.status == "ok"
+
+
+def test_modal_fit_of_a_base_needs_a_mass_and_finds_delays_and_gains() -> None:
+    record = _driven("base", 3.0)
+    assert bench.modal_fit(record).mass is None
+    late = ss.Record.of({"x": record["x"], "z": 1.05 * record["z"]}, fs=record.fs).with_details("x", delay=0.0)
+    found = bench.modal_fit(late, stiffness="2310 ± 1 N/m")
+    assert found.mass.value == pytest.approx(2.42, rel=2e-3)
+    assert found.gain.value == pytest.approx(1 / 1.05, rel=2e-3)
+    assert abs(found.delay.value) < 1e-4
+
+
+def test_h1_is_the_closed_form_where_the_window_is_long_enough() -> None:
+    record = _driven("force", 12.0)
+    found = bench.frequency_response(record, channels=("force", "x"), segment=6.0)
+    w = 2 * np.pi * found.frequency
+    exact = 1 / (2310 - 2.42 * w**2 + 12j * w)
+    middle = (found.frequency > 2) & (found.frequency < 9)
+    assert np.median(np.abs(found.h1[middle] / exact[middle] - 1)) < 0.05
+    assert np.all(np.abs(found.h1) <= np.abs(found.h2) * (1 + 1e-9))
+    assert np.median(found.coherence[middle]) > 0.98
+
+
+def test_stepped_sine_is_the_closed_form_at_its_tones() -> None:
+    fs, tones, hold = 500.0, (2.0, 4.0, 8.0), 20.0
+    time = np.arange(int(hold * fs)) / fs
+    force = np.concatenate([np.sin(2 * np.pi * tone * time) for tone in tones])
+    drive = ss.drives.Recorded(force, fs, on="force")
+    slider = ss.Oscillator(mass=2.42, stiffness=2310, damping=12.0, law=ss.laws.Coulomb(0.0), drive=drive)
+    record = ss.Rig.perfect("x", "force").measure(ss.simulate(slider, duration=59.9), fs=fs)
+    found = bench.frequency_response(record, channels=("force", "x"), frequencies=tones)
+    w = 2 * np.pi * found.frequency
+    assert np.abs(found.h1 * (2310 - 2.42 * w**2 + 12j * w) - 1).max() < 0.01
+    assert found.coherence.min() > 0.999
+
+
+# ---- the shaker
+
+
+def test_the_limits_of_a_shaker() -> None:
+    shaker = ss.rig.Shaker(force=20.0, moving_mass=1.5, velocity=0.2)
+    assert shaker.largest(1.0) == 8e-3
+    assert shaker.largest(6.0) == pytest.approx(0.2 / (2 * math.pi * 6))
+    assert shaker.largest(20.0) == pytest.approx(20 / (1.5 * (2 * math.pi * 20) ** 2))
+    assert (shaker.bound(1.0), shaker.bound(6.0), shaker.bound(20.0)) == ("stroke", "velocity", "force")
+    assert shaker.largest(0.5) == 0.0
+    with pytest.raises(ss.errors.ModelError, match="stroke allows 8 mm"):
+        shaker.require(1.0, 9e-3)
+    with pytest.raises(ss.errors.ModelError, match="from 1 to"):
+        shaker.require(0.5, 1e-3)
+    shaker.require(2.5, 0.65e-3)
+
+
+# ---- all of it
+
+
+def test_every_step_finds_the_truth_on_simulated_rigs() -> None:
+    """A short form of benchmarks/commission.py, on a seed of its own: one rig, some fifty numbers."""
+    script = loaded("benchmarks/commission.py")
+    held, refused = [], []
+    for seed in (9001,):
+        rig = script.random_rig(seed, fs=2000.0)
+        done = bench.commission(rig.step, truth=rig.truth)
+        refused += list(done.refused.values())
+        for step, each in script.numbers(done):
+            true = done.true_value(each.name, step)
+            held += [] if true is None else [each.includes(true)]
+    assert not refused
+    assert len(held) > 45
+    assert sum(held) > 0.85 * len(held)
