@@ -24,7 +24,7 @@ def test_beta_is_the_quotient_and_not_the_printed_product() -> None:
 
 def test_the_effective_bound_as_printed_does_not_give_its_tables() -> None:
     errors = np.round(TRUE - RANDOM + 1e-12, 4)
-    held = ex.effective_rate_bound(RANDOM, errors, i=2, m=1)
+    held = ex.effective_rate_bound(RANDOM, errors=errors, i=2, m=1)
     printed = held * np.exp(-np.pi * ex.rate(RANDOM, i=2, m=1))  # equation 6.25 without e^m in the denominator
     assert round(held, 4) == 0.0047
     assert round(printed, 4) == 0.0042

@@ -37,7 +37,7 @@ def test_a_branch_of_twice_the_period_comes_off(branch: solve.Branch) -> None:
 
 
 def test_the_doubling_moves_with_the_damping(branch: solve.Branch) -> None:
-    curve = solve.locus(branch, "doubling", "damping", [0.03, 0.05])
+    curve = solve.locus(branch, kind="doubling", parameter="damping", values=[0.03, 0.05])
     assert curve.parameters == ("amplitude", "damping")
     for (amplitude, damping), orbit in zip(curve.points, curve.orbits, strict=True):
         assert orbit is not None
@@ -46,12 +46,14 @@ def test_the_doubling_moves_with_the_damping(branch: solve.Branch) -> None:
         assert orbit.orbit.system.damping == damping
     assert curve.points[1, 0] > curve.points[0, 0]
     with pytest.raises(ss.errors.ModelError, match="without a fold"):
-        solve.locus(branch, "fold", "damping", [0.03])
+        solve.locus(branch, kind="fold", parameter="damping", values=[0.03])
 
 
 def test_grazing_moves_as_den_hartogs_boundary() -> None:
     """Where the slips of Den Hartog's motion begin to stop: r_b of 'DH-2' at b = 0.8 and 0.9, to its digits."""
     first = ss.steady_state(ss.scenarios.forced(0.8, 0.7))
     branch = solve.continue_orbit(first, "kinetic", to=0.9)
-    curve = solve.locus(branch, "grazing", "drive.frequency", [0.8 / (2 * math.pi), 0.9 / (2 * math.pi)])
+    curve = solve.locus(
+        branch, kind="grazing", parameter="drive.frequency", values=[0.8 / (2 * math.pi), 0.9 / (2 * math.pi)]
+    )
     np.testing.assert_allclose(curve.points[:, 0], [0.81740638571088274, 0.81965037767283014], atol=1e-8)

@@ -35,7 +35,7 @@ def test_a_low_pass_has_butterworths_gain_and_no_phase(frequency: float) -> None
 
 
 def test_a_mode_is_taken_out_and_its_neighbours_stay() -> None:
-    out = [gain(tone(f), ss.signals.remove_mode(tone(f), 50.0)) for f in (5.0, 50.0, 200.0)]
+    out = [gain(tone(f), ss.signals.remove_mode(tone(f), frequency=50.0)) for f in (5.0, 50.0, 200.0)]
     np.testing.assert_allclose(out, [1, 0, 1], atol=1e-3)
 
 
@@ -62,7 +62,7 @@ def test_a_trend_of_the_degree_asked_for_goes() -> None:
         (lambda r: ss.signals.keep_band(r), "low=, high="), (lambda r: ss.signals.keep_band(r, high=500.0), "half the"),
         (lambda r: ss.signals.keep_band(r, low=20, high=10), "lower first"),
         (lambda r: ss.signals.keep_band(r, low=0.1), "needs at least 30001"),
-        (lambda r: ss.signals.remove_mode(r, 490.0), "correct the frequency"),
+        (lambda r: ss.signals.remove_mode(r, frequency=490.0), "correct the frequency"),
         (lambda r: ss.signals.remove_trend(r, degree=9), "degree 0 to 6"),
         (lambda r: ss.signals.keep_band(r, high=5.0, channels=["w"]), "channel w is missing"),
     ],

@@ -27,10 +27,10 @@ FIRST = ("index.html", "lab.css", "data.css", "lab.js", "play.js", "controls.js"
 
 
 def test_the_first_page_is_light() -> None:
-    """What a browser loads before anything is chosen, the catalog too; Map and Data load their parts when opened."""
+    """What a browser loads before anything is chosen, with the catalog; Map, Data, Live load theirs when opened."""
     catalog, _ = forms.catalog({}, None)
     page = sum((PAGE / name).stat().st_size for name in FIRST)
-    assert page + len(json.dumps(catalog, ensure_ascii=False, separators=(",", ":")).encode()) < 150_000
+    assert page + len(json.dumps(catalog, ensure_ascii=False, separators=(",", ":")).encode()) < 160_000
     assert "Permission is hereby granted" in (PAGE / "vendor" / "uPlot.LICENSE.txt").read_text("utf-8")
 
 

@@ -222,16 +222,21 @@ def test_modes_that_chase_each_other_are_named() -> None:
 
 
 class _Unheld(Rigid):
-    """Coulomb's law without a mode that holds the mass."""
+    """Coulomb's law without a mode that holds the mass, with a mark set at each turn: no mixture of the two is one."""
+
+    @property
+    def memory(self) -> dict[str, dict[str, float]]:
+        return {"mark": {}}
 
     @property
     def entry(self) -> tuple[str, str, str]:
         return "back", "forward", "forward"
 
     def modes(self) -> tuple[Mode, ...]:
+        mark = {"mark": {"1": 1.0}}
         return (
-            Mode("back", "slip", -1, {"1": -1.0}, (Exit({"v": 1.0}, "forward"),)),
-            Mode("forward", "slip", 1, {"1": 1.0}, (Exit({"v": -1.0}, "back"),)),
+            Mode("back", "slip", -1, {"1": -1.0}, (Exit({"v": 1.0}, "forward", mark),)),
+            Mode("forward", "slip", 1, {"1": 1.0}, (Exit({"v": -1.0}, "back", mark),)),
         )
 
 

@@ -315,6 +315,13 @@ def test_the_history_names_the_source(csv: Callable[..., Path]) -> None:
     assert str(path.parent) not in json.dumps(step.to_dict())
 
 
+def test_the_history_names_a_folder_as_it_was_typed(csv: Callable[..., Path], monkeypatch: pytest.MonkeyPatch) -> None:
+    path = csv("t [s],x [mm]\n0,1\n1,2\n")
+    monkeypatch.chdir(path.parent.parent)
+    (file,) = ss.read_record(f"{path.parent.name}/{path.name}").history[0].arguments["files"]
+    assert file["folder"] == path.parent.name
+
+
 # ---- JSON and LVM
 
 

@@ -85,7 +85,7 @@ def find_holds(record: Record, channel: str, count: int, *, question: str) -> tu
     --------
     >>> levels = np.repeat([0.0, 2.0, 5.0], 400) + 0.01 * np.random.default_rng(1).standard_normal(1200)
     >>> [round(hold.level, 1) for hold in find_holds(Record.of({"x": levels}, fs=100), "x", 3, question="an example")]
-    [0.0, 2.0, 5.0]
+    [-0.0, 2.0, 5.0]
     """
     record.require_clean(channel, question=question, samples=2 * LEAST * count)
     values = record[channel]

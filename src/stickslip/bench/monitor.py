@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
@@ -62,7 +61,6 @@ class Cycle(NamedTuple):
     flaws: tuple[Flaw, ...]
 
 
-@dataclass
 class Monitor:
     """Watches the blocks of one device. Lives as long as it is open.
 
@@ -74,10 +72,8 @@ class Monitor:
         mass [kg], stiffness [N/m] and damping [N s/m] of the rig, where known.
     """
 
-    device: Device
-    constants: Mapping[str, float] = field(default_factory=dict)
-
-    def __post_init__(self) -> None:
+    def __init__(self, device: Device, constants: Mapping[str, float] | None = None) -> None:
+        self.device, self.constants = device, constants or {}
         self.names = [one.name for one in self.device.inputs]
         self.held: deque[tuple[int, Array]] = deque()
         self.begins: deque[int] = deque(maxlen=TOLD + 1)  # counters at which cycles began

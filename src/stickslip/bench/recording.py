@@ -73,19 +73,15 @@ class Trigger:
         return int(passed[0]) if len(passed) and not math.isnan(last) else None
 
 
-@dataclass
 class Seen:
     """What went wrong while one device was recorded; grows with every block."""
 
-    inputs: Sequence[Input]
-    samples: int = 0
-    gaps: list[tuple[int, int]] = field(default_factory=list)  # first lost sample and how many, the first thousand
-    lost: int = 0
-    clipped: dict[str, tuple[int, int]] = field(default_factory=dict)  # how many, and the first one's counter
-    after: int | None = None  # counter of the sample that should come
-
-    def __post_init__(self) -> None:
-        counts = [min(one.limit / one.scale, 1e300) for one in self.inputs]
+    def __init__(self, inputs: Sequence[Input]) -> None:
+        self.inputs, self.samples, self.lost = inputs, 0, 0
+        self.gaps: list[tuple[int, int]] = []  # first lost sample and how many, the first thousand
+        self.clipped: dict[str, tuple[int, int]] = {}  # how many, and the first one's counter
+        self.after: int | None = None  # counter of the sample that should come
+        counts = [min(one.limit / one.scale, 1e300) for one in inputs]
         self.edges = np.array(counts)[:, None] * (1 - EDGE)
 
     def look(self, block: Block) -> None:

@@ -263,12 +263,12 @@ def modal_fit(
     Examples
     --------
     >>> import stickslip as ss
-    >>> drive = ss.drives.Recorded(np.random.default_rng(1).standard_normal(400).cumsum(), 20.0, on="force")
+    >>> drive = ss.drives.Recorded(np.random.default_rng(1).standard_normal(800).cumsum(), 20.0, on="force")
     >>> slider = ss.Oscillator(mass=2.42, stiffness=2310, damping=3.0, law=ss.laws.Coulomb(0.0), drive=drive)
-    >>> record = ss.Rig.perfect("x", "force").measure(ss.simulate(slider, duration=19.0), fs=500)
+    >>> record = ss.Rig.perfect("x", "force").measure(ss.simulate(slider, duration=39.0), fs=500)
     >>> found = modal_fit(record, channels=("force", "x"))
     >>> round(found.mass.value, 2), round(found.stiffness.value), round(found.damping.value, 1)
-    (2.42, 2310, 3.0)
+    (2.42, 2310, 3.1)
     """
     if channels[0] not in INPUTS or damper not in ("ground", "base"):
         raise EstimateError(

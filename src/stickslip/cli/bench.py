@@ -34,7 +34,7 @@ def tour(fast: bool, seed: int, output: Path, as_json: bool, everything: bool) -
     and wet; all is recorded, analysed, laws are compared, and DIR/report/report.html is what a lab would hand in, with
     the true values beside.
     """
-    from stickslip import bench as room
+    import stickslip.bench as room
 
     report = output / "report"
     usable(click.get_current_context(), None, report)  # type: ignore[arg-type]
@@ -67,7 +67,7 @@ def following(
     stickslip bench next rigid-fit compliant-fit --config rig.toml --output next.toml
     stickslip acquire --device daq --config rig.toml --runs next.toml --output records
     """
-    from stickslip import bench as room
+    import stickslip.bench as room
 
     rig = ss.rig.read_rig(config) if config else None
     left = {Path(law).stem or law: ss.answers.read_fitted(law, rig=rig) for law in laws}

@@ -57,7 +57,7 @@ def commission(
     stickslip commission --device daq --config rig.toml --step rest --step tap
     stickslip commission tap=hammer.csv --config rig.toml
     """
-    from stickslip import bench
+    import stickslip.bench as bench
 
     chosen = [bench.step_named(name) for name in options["steps"]] or list(bench.STEPS)
     if listed:
@@ -84,14 +84,14 @@ def commission(
 
 def _given(text: str) -> tuple[str, Path]:
     """A step and the file that answers it."""
-    from stickslip import bench
+    import stickslip.bench as bench
 
     name, file = pair(text, "STEP=FILE")
     return bench.step_named(name).name, groups_of(file)[0][0]
 
 
 def _device(name: str, rig: RigSettings, config: Path | None) -> Device:
-    from stickslip import bench
+    import stickslip.bench as bench
 
     return bench.find_device(name, rig.devices, folder=config.parent if config else None)
 
@@ -130,7 +130,7 @@ def _kept(folder: Path, name: str) -> Path:
 
 def _simulated(device: Device | None, rig: RigSettings, seed: int) -> SimulatedBench | None:
     """The bench that stands behind a simulated device: it can be weighed, tapped and loaded too."""
-    from stickslip import bench
+    import stickslip.bench as bench
 
     if not isinstance(device, bench.Sim):
         return None
@@ -141,7 +141,7 @@ def _simulated(device: Device | None, rig: RigSettings, seed: int) -> SimulatedB
 
 def _asked(device: Device, step: BenchStep, kept: Path | None, rig: RigSettings) -> Record | None:
     """The record of a step at a real rig, once its hands are ready."""
-    from stickslip import bench
+    import stickslip.bench as bench
 
     if any(name not in [one.name for one in device.inputs] for name in step.needs):
         return None

@@ -196,6 +196,11 @@ def _told(rig: RigSettings) -> dict[str, Any]:
     return {key: getattr(rig, key) or None for key in ("channels", "fs", "units", "time", "delimiter", "decimal")}
 
 
+def _folder(path: Path) -> dict[str, str]:
+    """As it was typed, unless that says where this machine keeps it."""
+    return {} if path.parent == Path() or path.is_absolute() else {"folder": printable(str(path.parent))}
+
+
 def _with_source(record: Record, files: Sequence[Path], names: Sequence[str]) -> Record:
     """The record with its files in the history, called as told; one that write_record kept comes back without."""
     own = [printable(path.name) for path in files]
@@ -204,7 +209,7 @@ def _with_source(record: Record, files: Sequence[Path], names: Sequence[str]) ->
     if called.keys() <= known:
         return dataclasses.replace(record, history=tuple(_called(step, called) for step in record.history))
     sources = [
-        {"name": name, **({} if path.parent == Path() else {"folder": str(path.parent)}), "sha256": checksum(path)}
+        {"name": name, **_folder(path), "sha256": checksum(path)}
         for name, path in zip(called.values(), files, strict=True)
     ]
     step = ss.record.Step("read_record", {"files": sources}, "a record as it was written")

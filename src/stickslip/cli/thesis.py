@@ -31,7 +31,7 @@ def thesis(chapters: tuple[str, ...], output: Path | None, as_json: bool) -> Non
 
     The exit code is 1 where a verdict no longer holds.
     """
-    from stickslip_thesis import page as pages  # the chapters compute and draw: they take a second to load
+    import stickslip_thesis.page as pages  # the chapters compute and draw: they take a second to load
 
     wanted = chapters or tuple(pages.CHAPTERS)
     if strangers := [name for name in wanted if name not in pages.CHAPTERS]:

@@ -119,7 +119,7 @@ def rate_worst(extremes: ArrayLike, *, i: int, m: int, error: float | Array) -> 
     return -math.log((1 - off[i - 1 + m]) / (1 + off[i - 1])) / (m * math.pi)
 
 
-def effective_rate_bound(extremes: ArrayLike, errors: ArrayLike, *, i: int, m: int) -> float:
+def effective_rate_bound(extremes: ArrayLike, *, errors: ArrayLike, i: int, m: int) -> float:
     """By how much can the viscous rate be off, if the errors of the extremes are known?
 
     To first order, by the larger error of the two differences (thesis, equation 6.25): ``alpha_e = 2 (1 + e^m) d /
@@ -147,8 +147,8 @@ def effective_rate_bound(extremes: ArrayLike, errors: ArrayLike, *, i: int, m: i
     Examples
     --------
     >>> x = [1.0, -0.86, 0.74, -0.63, 0.54]
-    >>> round(effective_rate_bound(x, [0.001, 0.001, -0.001, -0.001, 0.001], i=1, m=1), 4)
-    0.0051
+    >>> round(effective_rate_bound(x, errors=[0.001, 0.001, -0.001, -0.001, 0.001], i=1, m=1), 4)
+    0.0052
     """
     x = np.asarray(extremes, dtype=float)
     off = np.abs(differences(np.asarray(errors, dtype=float)))

@@ -106,11 +106,11 @@ class Source:
             return hashlib.file_digest(file, "sha256").hexdigest()
 
     def to_dict(self) -> dict[str, str | int]:
-        """Plain data for the history; the folder as it was typed."""
+        """Plain data for the history; with the folder as it was typed, unless that says where this machine keeps it."""
         folder = printable(str(self.path.parent))
         entry: dict[str, str | int] = {
             "name": printable(self.path.name),
-            **({} if folder == "." else {"folder": folder}),
+            **({} if folder == "." or self.path.is_absolute() else {"folder": folder}),
             "sha256": self.sha256,
             "bytes": self.bytes,
             "format": self.format,

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,10 +15,13 @@ from numpy.typing import NDArray
 from stickslip.errors import FormatError, ModelError
 from stickslip.files.table import Table, optional
 from stickslip.record.metadata import (
+    BEFORE,
     BEGINS,
     KEY,
+    OF,
     Digests,
     described_beside,
+    read_beside,
     record_to_metadata,
     time_column,
     units_told,
@@ -27,6 +32,7 @@ from stickslip.whole import whole_file
 Array = NDArray[np.float64]
 
 ROWS_AT_ONCE = 200_000
+Columns = dict[str, tuple[str, Array]]
 
 
 def write_record(record: Record, path: str | Path, *, overwrite: bool = False) -> Path:
@@ -73,18 +79,47 @@ def write_record(record: Record, path: str | Path, *, overwrite: bool = False) -
             f"a record is written as {', '.join(WRITERS)}",
             "choose one of these endings",
         )
-    beside = [described_beside(path)] if writer is _write_csv else []
-    for file in () if overwrite else (path, *beside):
+    beside = described_beside(path) if writer is _write_csv else None
+    for file in () if overwrite else (path, *filter(None, [beside])):
         require_free(file)
     columns = {time_column(record): ("s", record.time)}
     columns |= {name: (record.channels[name].unit, values) for name, values in record.samples.items()}
     metadata = json.dumps(record_to_metadata(record))
-    with ExitStack() as files:
-        part = files.enter_context(whole(path, replace=overwrite))
-        for file in beside:  # there first: numbers without history are read as they are, not the other way round
-            files.enter_context(whole(file, replace=overwrite)).write_text(f"{BEGINS}{metadata}}}\n", "utf-8")
+    if beside is not None:
+        return _write_with_beside(path, beside, columns, metadata, overwrite=overwrite)
+    with whole(path, replace=overwrite) as part:
         writer(part, columns, metadata)
     return path
+
+
+def _write_with_beside(path: Path, beside: Path, columns: Columns, metadata: str, *, overwrite: bool) -> Path:
+    """A text file and the one beside it, which is there first and tells of both until the new numbers are there."""
+    before = read_beside(path) if overwrite and path.exists() else {}
+    new = False
+    try:
+        with whole(path, replace=overwrite) as part:
+            _write_csv(part, columns, metadata)
+            _describe(beside, metadata, {OF: _checksum(part), BEFORE: before} if before else {}, replace=overwrite)
+            new = not before
+    except FormatError:
+        if new:
+            beside.unlink(missing_ok=True)
+        raise
+    if before:
+        _describe(beside, metadata, {}, replace=True)
+    return path
+
+
+def _describe(path: Path, metadata: str, more: dict[str, Any], *, replace: bool) -> None:
+    """Write the file beside a text file."""
+    added = "".join(f", {json.dumps(key)}: {json.dumps(value)}" for key, value in more.items())
+    with whole(path, replace=replace) as part:
+        part.write_text(f"{BEGINS}{metadata}{added}}}\n", "utf-8")
+
+
+def _checksum(path: Path) -> str:
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 @contextmanager
@@ -113,9 +148,6 @@ def _taken(path: Path) -> FormatError:
     return FormatError(
         f"'{path.name}' is there already", "no file is replaced unasked", "choose another name, or overwrite=True"
     )
-
-
-Columns = dict[str, tuple[str, Array]]
 
 
 def _write_csv(path: Path, columns: Columns, _: str) -> None:

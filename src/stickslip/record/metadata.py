@@ -30,6 +30,7 @@ Array = NDArray[np.float64]
 VERSION = 1
 KEY = "stickslip record"  # of the HDF5 attribute, the Parquet entry, and the file beside a CSV
 BEGINS = f'{{"{KEY}": '
+OF, BEFORE = "of", "before"  # while a text file is replaced: the new one's checksum, and what was told of the old one
 LONGEST = 1 << 26  # bytes of a description in a file of its own
 
 
@@ -39,7 +40,10 @@ def described_beside(path: Path) -> Path:
 
 
 def read_beside(path: Path) -> dict[str, Any]:
-    """What stands in the file beside a text file; nothing where there is none, or one of somebody else's."""
+    """What stands in the file beside a text file; nothing where there is none, or one of somebody else's.
+
+    While a text file is replaced, what is told of the old one stands there too: its bytes say which one it is.
+    """
     beside = described_beside(path)
     if not beside.is_file():
         return {}
@@ -47,7 +51,11 @@ def read_beside(path: Path) -> dict[str, Any]:
         if file.read(len(BEGINS)) != BEGINS.encode():
             return {}
         file.seek(0)
-        told = parse_metadata(file.read(LONGEST)).get(KEY)
+        held = parse_metadata(file.read(LONGEST))
+    told = held.get(KEY)
+    if BEFORE in held:
+        with path.open("rb") as text:
+            told = told if hashlib.file_digest(text, "sha256").hexdigest() == held.get(OF) else held[BEFORE]
     return told if isinstance(told, dict) else {}
 
 

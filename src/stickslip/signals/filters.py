@@ -69,7 +69,7 @@ def keep_band(
 
 
 def remove_mode(
-    record: Record, frequency: float, *, width: float = 0.2, channels: Iterable[str] | None = None
+    record: Record, *, frequency: float, width: float = 0.2, channels: Iterable[str] | None = None
 ) -> Record:
     """Take out one mode of vibration: what lies about its frequency, as the ringing of a mount or of a frame.
 
@@ -97,7 +97,7 @@ def remove_mode(
     --------
     >>> t = np.arange(4000) / 1000
     >>> slow, ringing = np.sin(2 * np.pi * 2 * t), 0.3 * np.sin(2 * np.pi * 60 * t)
-    >>> record = remove_mode(Record.of({"x": slow + ringing}, fs=1000), 60)
+    >>> record = remove_mode(Record.of({"x": slow + ringing}, fs=1000), frequency=60)
     >>> bool(np.abs(record["x"] - slow)[300:-300].max() < 1e-3), record.history[-1].outcome
     (True, 'taken out 54 to 66 Hz')
     """

@@ -21,14 +21,14 @@ ROUNDING = 1e-13  # of the largest value: a polynomial that stays farther from t
 TRIED = 4.0  # periods of the first of the spans, each twice the one before, in which a run's end is looked for
 
 
-def crossings(run: Trajectory, output: str, *, level: float = 0.0, side: int = 0, contact: int = 0) -> Array:
+def crossings(run: Trajectory, channel: str, *, level: float = 0.0, side: int = 0, contact: int = 0) -> Array:
     """When does an output cross a level?
 
     Parameters
     ----------
     run : Trajectory
         Any run.
-    output : str
+    channel : str
         A name that :meth:`Trajectory.sample` knows: "x", "v", "friction", "slip", the law's memory ...
     level : float
         In the output's unit.
@@ -63,9 +63,9 @@ def crossings(run: Trajectory, output: str, *, level: float = 0.0, side: int = 0
     begins, widths = run.cells
     points = np.cos(np.pi * (np.arange(ORDER + 1) + 0.5) / (ORDER + 1))[::-1]
     times = begins[:, None] + widths[:, None] * (points + 1) / 2
-    values, _ = run.sample(np.maximum.accumulate(np.minimum(times.ravel(), run.duration)), (output,))
+    values, _ = run.sample(np.maximum.accumulate(np.minimum(times.ravel(), run.duration)), (channel,))
     if not 0 <= contact < len(values):
-        raise ModelError(f"contact = {contact}", f"'{output}' has {len(values)} rows, from 0", "correct it")
+        raise ModelError(f"contact = {contact}", f"'{channel}' has {len(values)} rows, from 0", "correct it")
     series = np.polynomial.chebyshev.chebfit(points, values[contact].reshape(-1, ORDER + 1).T - level, ORDER)
     found = [*_within(series, begins, widths, side), *_jumped(series, begins, side)]
     return np.unique(np.array(found, dtype=np.float64))

@@ -40,7 +40,7 @@ class Locus:
     orbits: tuple[SteadyState | None, ...]
 
 
-def locus(branch: Branch, kind: str, parameter: str, values: Sequence[float], *, number: int = 0) -> Locus:
+def locus(branch: Branch, *, kind: str, parameter: str, values: Sequence[float], number: int = 0) -> Locus:
     """How does a change of a branch move with a second parameter?
 
     The branch's first orbit is carried to each value of the second parameter in turn, and continued along the first
@@ -74,7 +74,7 @@ def locus(branch: Branch, kind: str, parameter: str, values: Sequence[float], *,
 
     >>> import stickslip as ss
     >>> branch = ss.solve.continue_orbit(ss.steady_state(ss.scenarios.forced(0.8, 0.7)), "kinetic", to=0.9)
-    >>> curve = locus(branch, "grazing", "drive.frequency", [0.8 / 6.283185307179586])
+    >>> curve = locus(branch, kind="grazing", parameter="drive.frequency", values=[0.8 / 6.283185307179586])
     >>> curve.points.round(6).tolist()
     [[0.817406, 0.127324]]
     """
