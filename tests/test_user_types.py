@@ -50,6 +50,7 @@ drives: list[ss.Oscillator] = [
         ss.drives.MultiTone([(1.0, 2.0, 0.0)]), ss.drives.Belt(0.1), ss.drives.Ramp(0.1),
         ss.drives.Recorded([0.0, 1.0, 0.0, 1.0], fs=10.0),
         ss.drives.SpeedProfile([0.0, 1.0], [0.0, 0.1]),
+        ss.drives.Later(ss.drives.Belt(0.1), 1.0),
         ss.drives.Dithered(ss.drives.Belt(0.1), amplitude=1e-5, frequency=200.0),
     )
 ]

@@ -15,6 +15,7 @@ from stickslip.answers.long_records import analyze_blocks as analyze_blocks
 from stickslip.answers.many import Batch as Batch
 from stickslip.answers.many import Kept as Kept
 from stickslip.answers.many import Row as Row
+from stickslip.answers.many import require_engine as require_engine
 from stickslip.answers.many import spread as spread
 from stickslip.answers.mending import mend as mend
 from stickslip.answers.squeaks import Condition as Condition

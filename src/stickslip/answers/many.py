@@ -161,12 +161,18 @@ def spread(
     >>> [row.name for row in spread(lambda name: Row(name, name), tasks=["a.csv", "b.csv"], workers=1)]
     ['a.csv', 'b.csv']
     """
-    word, _, address = engine.partition("://")
-    if word == "processes" and not address:
+    word, _, address = require_engine(engine).partition("://")
+    if word == "processes":
         return _by_processes(answer, tasks, workers or processors())
-    if word in CLUSTERS:
-        return _by_cluster(answer, tasks, address or None)
-    raise ModelError(f"engine '{engine}'", "it is processes, cluster or cluster://HOST:PORT", "choose one of them")
+    return _by_cluster(answer, tasks, address or None)
+
+
+def require_engine(engine: str) -> str:
+    """The name of an engine that works on many records, or a refusal."""
+    word, _, address = engine.partition("://")
+    if word not in CLUSTERS and (word != "processes" or address):
+        raise ModelError(f"engine '{engine}'", "it is processes, cluster or cluster://HOST:PORT", "choose one of them")
+    return engine
 
 
 def _by_processes(answer: Callable[[Task], Row], tasks: Sequence[Task], count: int) -> Iterator[Row]:

@@ -50,7 +50,8 @@ class Places:
     @classmethod
     def of(cls, options: dict[str, Any]) -> Places:
         """Taken out of a command's options."""
-        return cls(options.pop("workers"), options.pop("engine"), options.pop("table"))
+        engine = ss.answers.require_engine(options.pop("engine"))
+        return cls(options.pop("workers"), engine, options.pop("table"))
 
     def wanted(self, groups: Sequence[Sequence[Path]]) -> bool:
         """Whether the records are so many, or the table is asked for."""

@@ -91,8 +91,7 @@ function presets(offered, chosen) {
     const button = $("pictured").appendChild(document.createElement("button"));
     button.type = "button";
     button.dataset.name = name;
-    button.innerHTML = `<svg viewBox="0 0 60 34" aria-hidden="true"><path d="${path}"/></svg><span></span>`;
-    button.lastChild.textContent = title;
+    button.append(picture(path), title);
     button.addEventListener("click", () => begin(name, true));
   }
   const begin = async (name, short = false) => {
@@ -112,6 +111,14 @@ function presets(offered, chosen) {
     if (words.has(name)) begin(name);
     else if (name) lab.say(`No scenario is called “${name}”; choose one of the list.`, true);
   });
+}
+function picture(path) {
+  const [svg, line] = ["svg", "path"].map((name) => document.createElementNS("http" + "://www.w3.org/2000/svg", name));
+  svg.setAttribute("viewBox", "0 0 60 34");
+  svg.setAttribute("aria-hidden", "true");
+  line.setAttribute("d", path);
+  svg.append(line);
+  return svg;
 }
 function pressed() {
   for (const button of $("pictured").children) button.setAttribute("aria-pressed", button.dataset.name === begun);
