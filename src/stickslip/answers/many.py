@@ -168,7 +168,28 @@ def spread(
 
 
 def require_engine(engine: str) -> str:
-    """The name of an engine that works on many records, or a refusal."""
+    """Is this an engine that works on many records?
+
+    Parameters
+    ----------
+    engine : str
+        "processes", "cluster" or "cluster://HOST:PORT", as :func:`spread` takes it.
+
+    Returns
+    -------
+    str
+        The same.
+
+    Raises
+    ------
+    ModelError
+        It is none.
+
+    Examples
+    --------
+    >>> require_engine("cluster://localhost:8786")
+    'cluster://localhost:8786'
+    """
     word, _, address = engine.partition("://")
     if word not in CLUSTERS and (word != "processes" or address):
         raise ModelError(f"engine '{engine}'", "it is processes, cluster or cluster://HOST:PORT", "choose one of them")
