@@ -22,15 +22,15 @@ from stickslip.lab.frames import frame
 COMPLIANT = ss.systems.scenario_case("THESIS compliant 2.5Hz fk=1.1 Ky=192000 z.0174(k+Ky)").lasting(cycles=40)
 STATE = json.loads(ss.systems.export_system(COMPLIANT, format="json"))
 PAGE = Path(ss.__file__).parent / "lab" / "page"
-FIRST = ("index.html", "lab.css", "data.css", "lab.js", "play.js", "controls.js", "stage.js", "canvas.js",
+FIRST = ("index.html", "lab.css", "lab.js", "play.js", "controls.js", "stage.js", "canvas.js",
          "socket.js", "vendor/uPlot.min.js", "vendor/uPlot.min.css")  # fmt: skip
 
 
 def test_the_first_page_is_light() -> None:
-    """What a browser loads before anything is chosen, with the catalog; Map, Data, Live load theirs when opened."""
+    """What a browser loads before anything is chosen, with the catalog; what is opened or asked for loads its part."""
     catalog, _ = forms.catalog({}, None)
     page = sum((PAGE / name).stat().st_size for name in FIRST)
-    assert page + len(json.dumps(catalog, ensure_ascii=False, separators=(",", ":")).encode()) < 160_000
+    assert page + len(json.dumps(catalog, ensure_ascii=False, separators=(",", ":")).encode()) < 150_000
     assert "Permission is hereby granted" in (PAGE / "vendor" / "uPlot.LICENSE.txt").read_text("utf-8")
 
 

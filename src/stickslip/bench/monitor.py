@@ -233,9 +233,9 @@ def _late(
     period, fs = times
     omega = 2 * math.pi / period
     expected = {one.name: _expected(one) for one in inputs}
-    if not all(_settled(values, omega, fs) for values in channels.values()):
+    lines = {name: _steady_line(values, omega, fs) for name, values in channels.items()}
+    if not all(math.isfinite(sd) for _, sd in lines.values()):
         return []
-    lines = {name: _line(values, omega, fs) for name, values in channels.items()}
     a, sd = lines["a"]
     x, noise = lines["x"]
     lag, error = -float(np.angle(-(omega**2) * x / a)) / omega, math.hypot(noise / abs(x), sd / abs(a)) / omega
@@ -249,7 +249,8 @@ def _late(
         stated = any(one.name == "z" and "delay" in one.details for one in inputs)
         late = expected["z"] if stated else lag  # of the same make as x, where nothing is stated
         spring = stiffness * (x * np.exp(turn * lag) - z * np.exp(turn * late))
-        due = -(mass * a * np.exp(turn * expected["a"]) + spring)
+        moving = constants.get("damping", 0.0) * turn * x * np.exp(turn * lag)
+        due = -(mass * a * np.exp(turn * expected["a"]) + moving + spring)
         if abs(due) > CLEAR * abs(spring):
             own = math.hypot(mass * sd, stiffness * noise) / abs(due) / omega
             error = math.hypot(own, error * abs(spring) / abs(due), lines["load"][1] / abs(lines["load"][0]) / omega)
@@ -261,14 +262,21 @@ def _judged(name: str, lag: float, error: float, fs: float) -> list[Flaw]:
     """Whether a channel is late by more than chance and a sample; told with twice its deviation."""
     if lag <= LATE * error or lag <= LEAST_LATE / fs:
         return []
-    return [Flaw(name, "late", f"{name} comes {1e3 * lag:.2f} ± {2e3 * error:.2f} ms late")]
+    return [Flaw(name, "late", f"{name} comes {1e3 * lag:.2f} ± {max(2e3 * error, 0.01):.2f} ms late")]
 
 
-def _settled(values: Array, omega: float, fs: float) -> bool:
-    """Whether the first half, a cycle or more, is like the second: else its harmonics are no steady ones."""
+def _steady_line(values: Array, omega: float, fs: float) -> tuple[complex, float]:
+    """As :func:`_line`, its deviation with what the first half, a cycle or more, is unlike the second.
+
+    Infinite where they are so unlike that the line is that of no steady motion.
+    """
     half = len(values) // 2
     (first, noise), (second, _) = (_line(part, omega, fs) for part in (values[:half], values[half : 2 * half]))
-    return abs(first - second) <= ALIKE * abs(second) + 2 * LATE * noise
+    unlike = abs(first - second)
+    if unlike > ALIKE * abs(second) + 2 * LATE * noise:
+        return second, math.inf
+    line, sd = _line(values, omega, fs)
+    return line, math.hypot(sd, unlike / 2)
 
 
 def _expected(one: Input) -> float:

@@ -268,7 +268,7 @@ def modal_fit(
     >>> record = ss.Rig.perfect("x", "force").measure(ss.simulate(slider, duration=39.0), fs=500)
     >>> found = modal_fit(record, channels=("force", "x"))
     >>> round(found.mass.value, 2), round(found.stiffness.value), round(found.damping.value, 1)
-    (2.42, 2310, 3.1)
+    (2.42, 2310, 3.0)
     """
     if channels[0] not in INPUTS or damper not in ("ground", "base"):
         raise EstimateError(
@@ -282,7 +282,7 @@ def modal_fit(
     solve: Any = _least_squares()
     fit = solve(lines.misfit, begin, x_scale=np.maximum(np.abs(begin), 1e-6))
     power = float(fit.fun @ fit.fun) / (len(fit.fun) - len(begin))
-    cover = max(1.0, power) * np.linalg.inv(fit.jac.T @ fit.jac)
+    cover = max(1.0, power) * np.linalg.inv(fit.jac.T @ fit.jac)[:4, :4]
     given = {name: Estimate.stated(name, value, unit) for name, value, unit in (
         ("mass", mass, "kg"), ("stiffness", stiffness, "N/m")) if value is not None}  # fmt: skip
     doubt = Doubt(
@@ -312,6 +312,7 @@ class _Lines:
     turn: Complex
     x: Complex
     u: Complex
+    level: Complex  # of what is one throughout: zeros of the sensors, and means taken off that do not balance
     noise: tuple[float, float]
     of_base: bool
     damper: str
@@ -335,14 +336,15 @@ class _Lines:
                 "sweep, or shake longer",
             )
         turn = 2j * np.pi * frequency[kept]
-        return cls(turn, x[:, kept], u[:, kept], (noise[0], noise[1]), channels[0] == "z", damper)
+        level = derivative_spectra(np.ones(len(record)), fs=record.fs, orders=[0])[0, kept]
+        return cls(turn, x[:, kept], u[:, kept], level, (noise[0], noise[1]), channels[0] == "z", damper)
 
     def start(self) -> Array:
-        """By linear least squares without a delay: of a base (w^2, c/m, delay, gain), of a force (m, c, delay, k)."""
+        """By least squares, no delay. A base: (w^2, c/m, delay, gain, level), a force: (m, c, delay, k, level)."""
         if self.of_base:
-            columns, known = [self.x[0] - self.u[0], self.x[1]], -self.x[2]
+            columns, known = [self.x[0] - self.u[0], self.x[1], -self.level], -self.x[2]
         else:
-            columns, known = [self.x[2], self.x[1], self.x[0]], self.u[0]
+            columns, known = [self.x[2], self.x[1], self.x[0], -self.level], self.u[0]
         design = np.column_stack(columns)
         design, target = np.vstack([design.real, design.imag]), np.concatenate([known.real, known.imag])
         scale = np.linalg.norm(design, axis=0)
@@ -350,12 +352,12 @@ class _Lines:
         if self.of_base:
             if fit[0] <= 0:
                 raise EstimateError("no spring between base and mass", f"{MODAL} needs one", "check signs and channels")
-            return np.array([fit[0], max(fit[1], 1e-3 * math.sqrt(fit[0])), 0.0, 1.0])
+            return np.array([fit[0], max(fit[1], 1e-3 * math.sqrt(fit[0])), 0.0, 1.0, fit[2]])
         if fit[0] <= 0 or fit[2] <= 0:
             raise EstimateError(
                 "no mass on a spring", f"{MODAL} needs one", "check the signs of force and displacement"
             )
-        return np.array([fit[0], max(fit[1], 1e-3 * math.sqrt(fit[0] * fit[2])), 0.0, fit[2]])
+        return np.array([fit[0], max(fit[1], 1e-3 * math.sqrt(fit[0] * fit[2])), 0.0, fit[2], fit[3]])
 
     def misfit(self, p: Array) -> Array:
         """The relation's residual in standard deviations, real and imaginary parts."""
@@ -370,7 +372,7 @@ class _Lines:
             factor = p[0] * self.turn**2 + p[1] * self.turn + p[3]
             pushed, of_input = self.u[0], np.ones(len(self.turn), dtype=complex)
         sd = np.sqrt((np.abs(factor) * self.noise[0]) ** 2 + (np.abs(of_input) * self.noise[1]) ** 2) / math.sqrt(2)
-        residual = (left - late * pushed) / sd
+        residual = (left - late * pushed - p[4] * self.level) / sd
         return np.concatenate([residual.real, residual.imag])
 
 

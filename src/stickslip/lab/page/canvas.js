@@ -89,10 +89,3 @@ export function line(plan, xs, ys, { from = 0, to = xs.length, colour, width = 1
   for (let k = from; k < to; k++) { const x = plan.x(xs[k]), y = plan.y(ys[k]); if (k === from) pen.moveTo(x, y); else pen.lineTo(x, y); }
   pen.stroke();
 }
-
-// Cividis: even in lightness, alike for all eyes; `share` from 0 to 1.
-const CIVIDIS = [[0, 34, 78], [18, 53, 112], [59, 73, 108], [87, 93, 109], [112, 113, 115], [138, 134, 120], [165, 156, 116], [195, 179, 105], [225, 204, 85], [254, 232, 56]];
-export function cividis(share) {
-  const place = Math.min(1, Math.max(0, share)) * (CIVIDIS.length - 1), low = Math.min(CIVIDIS.length - 2, Math.floor(place));
-  return CIVIDIS[low].map((value, j) => Math.round(value + (CIVIDIS[low + 1][j] - value) * (place - low)));
-}

@@ -1,6 +1,6 @@
 // The records: files dropped, channels looked at, a question asked, its answer shown.
 
-import { prefixed } from "./canvas.js";
+import { prefixed, tick } from "./canvas.js";
 
 const ROLES = {
   x: "displacement", v: "velocity", a: "acceleration", z: "base displacement", friction: "friction force",
@@ -579,14 +579,14 @@ function playIt(state) {
 // ---- charts, drawn again when the theme changes
 
 function draw(place, told) {
-  charts.push({ place, told, chart: lab.plot(place, told) });
+  charts.push({ place, told, chart: plot(place, told) });
 }
 
 function redraw() {
   charts = charts.filter(({ place }) => place.isConnected);
   for (const each of charts) {
     each.chart.destroy();
-    each.chart = lab.plot(each.place, each.told);
+    each.chart = plot(each.place, each.told);
   }
 }
 
@@ -630,4 +630,24 @@ function amount(value, unit) {
   if (value === null) return "";
   const [factor, words] = prefixed(Math.abs(value), unit);
   return `${Number((value * factor).toPrecision(4))} ${words}`;
+}
+
+// A chart over time: {title, unit, time, series: [{label, values, colour, dash}]}.
+function plot(element, { title, unit, time, series, chosen }) {
+  const palette = lab.colours();
+  const axis = {
+    stroke: palette.soft, grid: { stroke: palette.line, width: 1 }, ticks: { stroke: palette.line },
+    values: (chart, splits) => splits.map(tick),
+  };
+  const inks = ["blue", "orange", "green", "purple", "sky", "ink"];
+  const lines = series.map(({ label, colour, dash }, j) =>
+    ({ label, stroke: colour ?? palette[inks[j % 6]], width: 1.4, dash, points: { show: false } }));
+  const chart = new uPlot({
+    width: element.clientWidth || 600, height: 220, title, legend: { show: true }, scales: { x: { time: false } },
+    axes: [{ ...axis, label: "time [s]" }, { ...axis, label: unit, size: 70 }], series: [{ label: "time" }, ...lines],
+    cursor: { drag: { x: true, y: false, setScale: !chosen } },
+    hooks: chosen ? { setSelect: [({ select: { left, width }, posToVal }) => { if (width > 4) chosen(posToVal(left, "x"), posToVal(left + width, "x")); }] } : {},
+  }, [time, ...series.map((line) => line.values)], element);
+  new ResizeObserver(() => chart.setSize({ width: element.clientWidth, height: 220 })).observe(element);
+  return chart;
 }

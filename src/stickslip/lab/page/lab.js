@@ -1,5 +1,4 @@
 // The page itself: tabs, theme, what is said aloud, and how the lab is asked.
-import { tick } from "./canvas.js";
 import { start as startPlay } from "./play.js";
 
 if (location.pathname !== "/") localStorage.setItem("inside", location.pathname); // for enter.js; other ports do not see it
@@ -66,43 +65,18 @@ export function show(name) {
   lab.onShow[name]?.();
 }
 
-const opened = {
-  map: () => {
-    opened.map = null;
-    ready.then(() => import("./map.js")).then((page) => page.start($("map"), lab));
-  },
-  data: () => {
-    opened.data = null;
-    import("./data.js").then((page) => page.start($("data"), lab));
-  },
-  live: () => {
-    opened.live = null;
-    import("./live.js").then((page) => page.start($("live"), lab));
-  },
-};
-
-// A chart over time for any tab: {title, unit, time, series: [{label, values, colour, dash}]}.
-function plot(element, { title, unit, time, series, chosen }) {
-  const palette = colours();
-  const axis = {
-    stroke: palette.soft, grid: { stroke: palette.line, width: 1 }, ticks: { stroke: palette.line },
-    values: (chart, splits) => splits.map(tick),
-  };
-  const inks = ["blue", "orange", "green", "purple", "sky", "ink"];
-  const lines = series.map(({ label, colour, dash }, j) =>
-    ({ label, stroke: colour ?? palette[inks[j % 6]], width: 1.4, dash, points: { show: false } }));
-  const chart = new uPlot({
-    width: element.clientWidth || 600, height: 220, title, legend: { show: true }, scales: { x: { time: false } },
-    axes: [{ ...axis, label: "time [s]" }, { ...axis, label: unit, size: 70 }], series: [{ label: "time" }, ...lines],
-    cursor: { drag: { x: true, y: false, setScale: !chosen } },
-    hooks: chosen ? { setSelect: [({ select: { left, width }, posToVal }) => { if (width > 4) chosen(posToVal(left, "x"), posToVal(left + width, "x")); }] } : {},
-  }, [time, ...series.map((line) => line.values)], element);
-  new ResizeObserver(() => chart.setSize({ width: element.clientWidth, height: 220 })).observe(element);
-  return chart;
-}
+// Tabs that are opened later: each loads its part, and what they wear.
+const dressed = () => new Promise((done) => {
+  document.head.append(Object.assign(document.createElement("link"), { rel: "stylesheet", href: "tabs.css", onload: done, onerror: done }));
+});
+let dress = null;
+const opened = Object.fromEntries(["map", "data", "live"].map((name) => [name, () => {
+  opened[name] = null;
+  Promise.all([import(`./${name}.js`), dress ??= dressed(), name === "map" && ready]).then(([page]) => page.start($(name), lab));
+}]));
 
 export const lab = {
-  ask, say, busy, COMPILES, colours, show, plot,
+  ask, say, busy, COMPILES, colours, show,
   onTheme: (then) => onTheme.push(then),
   openInPlay: null, // by play.js
   sessions: {}, // by tab: {save, load} of what a session's file holds of it

@@ -1,7 +1,8 @@
 // Map: which motion is where, computed while one looks; a click plays the point.
 import { Conversation } from "./socket.js";
 import { at, put, readable, written } from "./controls.js";
-import { axes, cividis, line, shortly } from "./canvas.js";
+import { axes, line, shortly } from "./canvas.js";
+import { cividis } from "./pictures.js";
 import { current } from "./play.js";
 
 const MEASURES = {

@@ -2,7 +2,7 @@
 import { Controls } from "./controls.js";
 import { Conversation } from "./socket.js";
 import { Stage } from "./stage.js";
-import { axes, cividis, line, prefixed, range, shortly, tick } from "./canvas.js";
+import { axes, line, prefixed, range, shortly, tick } from "./canvas.js";
 
 const $ = (id) => document.getElementById(id);
 const PANELS = [["x", "displacement"], ["x", "angle", true], ["v", "velocity"], ["v", "angular velocity", true],
@@ -19,7 +19,7 @@ const FONT = "12px system-ui, sans-serif";
 const newest = {}; // number of the last request of each kind
 let lab, state, controls, stage, conversation, run, charts = [], plans = {}, number = 0, flying = null, next = null;
 let begun = "", ghost = null, rested = null, kept = null;
-let changedLast = null, patience = 0, resting = 0, idling = 0, player = null;
+let changedLast = null, patience = 0, resting = 0, idling = 0, silenced = null; // ends the sound that is heard
 
 export async function start(given) {
   lab = given;
@@ -167,7 +167,7 @@ function plainly(name, about) {
 
 // One run is under way at a time, and the newest state waits; one that takes long is overtaken.
 function ask(since, afresh = false) {
-  if (player) silence();
+  if (silenced) silence();
   next = { since, afresh: afresh || next?.afresh, state: structuredClone(state) };
   clearTimeout(resting);
   clearTimeout(idling);
@@ -448,7 +448,7 @@ function drawViews() {
   plans.loopV = portrait("loop-v", ["slip", unitOf("slip"), "sliding velocity"], [friction, "N", "friction"], palette);
   const [x, v] = [one("x"), one("v")];
   plans.phase = portrait("phase", [x, unitOf("x"), "displacement"], [v, unitOf("v"), "velocity"], palette);
-  spectrum(palette);
+  drawSpectrum();
 }
 
 function portrait(id, [x, xUnit, xWords], [y, yUnit, yWords], palette) {
@@ -475,39 +475,10 @@ function dotOf(canvas) {
   return dot;
 }
 
-function spectrum(palette) {
-  const { frequency, amplitude } = run.arrays;
-  const most = amplitude.reduce((high, value) => Math.max(high, value), 1e-300);
-  let end = Math.min(frequency.length, frequency.findIndex((each) => each > 60 / run.cycle) >>> 0);
-  end = Math.max(end, Math.min(frequency.length, 60));
-  const low = most * 1e-4;
-  const across = { low: 0, high: frequency[end - 1], label: "frequency", unit: "Hz" };
-  const upwards = { low, high: most * 1.6, label: "amplitude [m/s²]", factor: 1, unit: "", log: true };
-  const plan = axes($("spectrum"), across, upwards, palette);
-  line(plan, frequency, amplitude.map((value) => Math.max(value, low)), { to: end, colour: palette.purple });
-}
-
-function drawWavelet() {
-  const map = plans.map;
-  if (!map) return;
-  const { levels, frequency, time } = map.arrays, columns = time.length, image = new ImageData(columns, map.rows);
-  const up = frequency[0] > frequency[1];
-  for (let row = 0; row < map.rows; row++) {
-    const from = (up ? row : map.rows - 1 - row) * columns;
-    for (let k = 0; k < columns; k++) {
-      const [red, green, blue] = cividis(levels[from + k] / 255);
-      image.data.set([red, green, blue, 255], 4 * (row * columns + k));
-    }
-  }
-  const picture = new OffscreenCanvas(columns, map.rows);
-  picture.getContext("2d").putImageData(image, 0, 0);
-  const low = Math.min(frequency[0], frequency.at(-1)), high = Math.max(frequency[0], frequency.at(-1));
-  const across = { low: time[0], high: time.at(-1), label: "time", unit: "s" };
-  const upwards = { low, high, label: "frequency [Hz]", factor: 1, unit: "", log: true };
-  const plan = axes($("wavelet"), across, upwards, lab.colours());
-  const { left, right, top, bottom } = plan.box;
-  plan.pen.drawImage(picture, left, top, right - left, bottom - top);
-}
+// The slower pictures, whose part is loaded after the traces are drawn.
+const pictures = (then) => import("./pictures.js").then(then).catch(failed);
+const drawSpectrum = () => { const shown = run; pictures((part) => { if (run === shown) part.spectrum($("spectrum"), run, lab.colours()); }); };
+const drawWavelet = () => { if (plans.map) pictures((part) => part.wavelet($("wavelet"), plans.map, lab.colours())); };
 
 // What is shown is not what is asked for.
 function stale(is) {
@@ -554,8 +525,6 @@ function pace() {
 function buttons() {
   motionButtons();
   textButtons();
-  $("file").addEventListener("change", openFile);
-  $("session").addEventListener("click", () => saved(JSON.stringify(session(), null, 1), "session.json"));
   $("keep").addEventListener("click", keep);
   $("swap").addEventListener("click", swap);
   new ResizeObserver(resized).observe($("traces"));
@@ -568,46 +537,26 @@ function motionButtons() {
   still();
   $("pause").addEventListener("click", () => { stage.playing = !stage.playing; still(); });
   $("pace").addEventListener("change", pace);
-  $("hear").addEventListener("click", () => { if (player) silence(); else more("sound"); });
+  $("hear").addEventListener("click", () => { if (silenced) silence(); else more("sound"); });
 }
+// What leaves the page as text or a file, and comes back from one: its part is loaded when it is first asked for.
 function textButtons() {
-  $("share").addEventListener("click", async () => {
-    history.replaceState(null, "", link());
-    const words = "The link is copied: it opens this very system in any lab at this address.";
-    await copied(`${location.origin}/${link()}`, words);
-  });
-  $("python").addEventListener("click", () => texts("python", "The Python that does this", "lab.py"));
-  $("toml").addEventListener("click", () => texts("toml", "The system's file", "system.toml"));
-  $("text-close").addEventListener("click", () => $("text").close());
-  $("text-copy").addEventListener("click", () => copied($("text-body").textContent, "Copied."));
-  $("text-save").addEventListener("click", () => saved($("text-body").textContent, $("text").dataset.file));
+  const files = (then) => () => import("./files.js").then(then).catch(failed);
+  const within = {
+    lab, link, restored,
+    current: () => state,
+    kept: () => kept?.state ?? null,
+    opened: (given) => { own(); use(given); },
+  };
+  $("share").addEventListener("click", files((part) => part.shared(within)));
+  $("python").addEventListener("click", files((part) => part.texts(within, "python", "The Python that does this", "lab.py")));
+  $("toml").addEventListener("click", files((part) => part.texts(within, "toml", "The system's file", "system.toml")));
+  $("session").addEventListener("click", files((part) => part.saveSession(within)));
+  $("file").addEventListener("change", files((part) => part.openFile(within)));
 }
-async function openFile() {
-  const [file] = $("file").files;
-  $("file").value = "";
-  if (!file) return;
-  const headers = { "content-type": "text/plain" };
-  try {
-    const text = await file.text();
-    if (file.name.endsWith(".json")) restored(text);
-    else use((await lab.ask("open", { method: "POST", body: text, headers })).state);
-    own();
-    lab.say(`${file.name} is open.`);
-  } catch (error) { failed(error); }
-}
-// What a file holds of the lab: what plays, what was kept as A, and what each other tab says of itself.
-function session() {
-  const others = Object.entries(lab.sessions).map(([name, { save }]) => [name, save()]);
-  return { program: "stickslip lab", play: state, a: kept?.state ?? null, ...Object.fromEntries(others) };
-}
-function restored(text) {
-  const held = JSON.parse(text);
-  if (held.program !== "stickslip lab" || !held.play) throw new Error("The file holds no session of the lab; open one that it saved.");
-  kept = held.a ? { state: held.a, run: null } : null;
+function restored(a) {
+  kept = a ? { state: a, run: null } : null;
   compared();
-  for (const [name, { load }] of Object.entries(lab.sessions)) if (held[name]) load(held[name]);
-  lab.restored = held;
-  use(held.play);
 }
 
 // A is kept and drawn behind what plays; showing it makes what plays the other.
@@ -639,27 +588,6 @@ function resized() {
   if (stage.run) stage.draw();
 }
 
-async function texts(form, title, file) {
-  try {
-    const headers = { "content-type": "application/json" };
-    const held = await lab.ask("export", { method: "POST", body: JSON.stringify(state), headers });
-    $("text-title").textContent = title;
-    $("text-body").textContent = held[form];
-    $("text").dataset.file = file;
-    $("text").showModal();
-  } catch (error) { failed(error); }
-}
-function saved(text, name) {
-  const href = URL.createObjectURL(new Blob([text], { type: "text/plain" }));
-  const anchor = Object.assign(document.createElement("a"), { href, download: name });
-  anchor.click();
-  setTimeout(() => URL.revokeObjectURL(anchor.href), 1000);
-}
-async function copied(text, words) {
-  const refused = () => lab.say("The browser does not let the page copy; the address bar holds the link.", true);
-  await Promise.resolve().then(() => navigator.clipboard.writeText(text)).then(() => lab.say(words), refused);
-}
-
 function link() {
   const text = btoa(String.fromCharCode(...new TextEncoder().encode(JSON.stringify(state))));
   return `#${text.replaceAll("+", "-").replaceAll("/", "_").replace(/=+$/, "")}`;
@@ -676,26 +604,17 @@ function fromLink() {
 }
 
 /* ---------- sound ---------- */
-function sounded({ fs, words, arrays }) {
+async function sounded({ fs, words, arrays }) {
   silence();
-  const context = new AudioContext();
-  const buffer = context.createBuffer(1, arrays.sound.length, fs);
-  const fade = Math.min(400, arrays.sound.length >> 2), values = Float32Array.from(arrays.sound);
-  for (let k = 0; k < fade; k++) { values[k] *= k / fade; values[values.length - 1 - k] *= k / fade; }
-  buffer.copyToChannel(values, 0);
-  const source = new AudioBufferSourceNode(context, { buffer, loop: true });
-  const quieter = new GainNode(context, { gain: 0.5 });
-  source.connect(quieter).connect(context.destination);
-  source.start();
-  player = { context, source };
+  const { played } = await import("./sound.js");
+  silenced = played(arrays.sound, fs);
   $("hear").textContent = "Silence";
   $("hear").setAttribute("aria-pressed", true);
   lab.say(`You hear ${words}.`);
 }
 function silence() {
-  player?.source.stop();
-  player?.context.close();
-  player = null;
+  silenced?.();
+  silenced = null;
   $("hear").textContent = "Hear it";
   $("hear").setAttribute("aria-pressed", false);
 }
