@@ -1,5 +1,7 @@
 from stickslip.cycle.before_slip import Presliding as Presliding
 from stickslip.cycle.before_slip import presliding as presliding
+from stickslip.cycle.joint import JointFriction as JointFriction
+from stickslip.cycle.joint import regress_joint as regress_joint
 from stickslip.cycle.onset import Breakaway as Breakaway
 from stickslip.cycle.onset import breakaway as breakaway
 from stickslip.cycle.parts import Stretch as Stretch
