@@ -1,7 +1,8 @@
 """How often do the intervals of a joint's friction hold, on joints of an integrator of our own (`tests/joints.py`)?
 
-Counted are the numbers that stand without a grave doubt. Seven servos' published parameters as centres, encoders of 8 to 16 bit, 50 Hz to 1 kHz, gravity, currents with noise; with
-the torque measured to 1 %, or by the controller's kp alone, known to 1 %, its kd unknown.
+Seven servos' published parameters as centres, encoders of 8 to 16 bit, 50 Hz to 1 kHz, gravity, currents with noise;
+with the torque measured to 1 %, or by the controller's kp alone, known to 1 %, its kd unknown. Counted are the numbers
+that stand without a grave doubt.
 
     python benchmarks/joints.py --draws 100 --first 1000
 """
@@ -70,11 +71,12 @@ def main() -> None:
                 held[name].append(estimate.includes(true[name]))
                 wide[name].append((estimate.interval[1] - estimate.interval[0]) / 2 / true[name])
                 if options.misses and not held[name][-1] and name in ("level", "load"):
-                    print(f"{seed} {joint.servo} {joint.record.fs:.0f} Hz {len(found.time)} rows: {true[name]:.4g}, {estimate}")
+                    print(f"{seed} {joint.servo} {joint.record.fs:.0f} Hz: {true[name]:.4g}, {estimate}")
         print(f"{kind}: {options.draws - refused} of {options.draws} answered, {np.mean(spent):.2f} s each")
         for name in TOLD:
             if held[name]:
-                print(f"  {name:8} held {np.mean(held[name]):6.1%} of {len(held[name])}, half width {np.median(wide[name]):.1%}")
+                told = f"{np.mean(held[name]):6.1%} of {len(held[name])}"
+                print(f"  {name:9} held {told}, half width {np.median(wide[name]):.1%}")
 
 
 if __name__ == "__main__":

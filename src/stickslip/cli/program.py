@@ -18,6 +18,7 @@ from stickslip.cli.fit import fit
 from stickslip.cli.impact import impact
 from stickslip.cli.init import init
 from stickslip.cli.interrupted import INTERRUPTED, SENTENCE
+from stickslip.cli.joint import joint
 from stickslip.cli.lab import lab
 from stickslip.cli.mended import mended
 from stickslip.cli.predict import predict
@@ -100,6 +101,7 @@ for _command in (
     fit,
     impact,
     init,
+    joint,
     lab,
     predict,
     rig,

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,17 +27,20 @@ ROWS = 20  # instants at which it slides
 ROUNDS = 25  # of the regression about a load part: six are enough where the log tells it
 SETTLED = 1e-6  # of the load part between two rounds
 STARTS = (0.0, 0.3)  # of the load part: from none alone one joint in a hundred ended where gravity has the wrong sign
+SURELY = 4.0  # deviations, by which the viscous friction of both directions differs: chance gives that once in 15000
 BARELY = 0.5  # of a value: an interval that is wider on either side hardly tells it
 BIASED = 0.01  # share of noise in the power of the acceleration above which the inertia is visibly low
+WAYS = ((1.0, "forward"), (-1.0, "back"))
 CONFOUNDED, NOISY, LOADED = "confounded", "noisy", "loaded"  # kinds of doubt
 WORDS = {
-    "inertia": "inertia", "viscous": "viscous friction", "forward": "Coulomb friction forward",
-    "back": "Coulomb friction back", "load": "friction per load", "sine": "gravity, sine part",
+    "inertia": "inertia", "viscous": "viscous friction", "uneven": "uneven viscous friction",
+    "forward": "Coulomb friction forward", "back": "Coulomb friction back", "load": "friction per load", "sine": "gravity, sine part",
     "cosine": "gravity, cosine part", "damping": "damping of the controller",
 }  # fmt: skip
 ADVICE = {
     "inertia": "accelerate harder, by steps or faster swings",
     "viscous": "slide at several speeds, slow ones and fast ones",
+    "uneven": "slide at several speeds either way, slow ones and fast ones",
     "forward": "pass the same places both ways, slowly and fast",
     "back": "pass the same places both ways, slowly and fast",
     "load": "carry another payload, or turn farther, so that gravity's torque changes",
@@ -46,7 +48,10 @@ ADVICE = {
     "cosine": "turn farther, a quarter turn at least",
     "damping": "log the torque or the motor's current, or state kd",
 }
-OPTIONAL = (("load",), ("sine", "cosine"))  # left out in this order where the motion can not tell all of them apart
+OPTIONAL: tuple[tuple[str, ...], ...] = (
+    ("load",),
+    ("sine", "cosine"),
+)  # left out in this order where the motion can not tell all of them apart
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -60,7 +65,9 @@ class JointFriction(Result):
     forward, back : Estimate
         Coulomb friction either way [N m], without load.
     viscous : Estimate
-        Torque per speed [N m s/rad].
+        Torque per speed [N m s/rad], the mean of both directions.
+    viscous_forward, viscous_back : Estimate or None
+        Of each direction, where they differ surely.
     load : Estimate or None
         Friction per torque that gravity puts on the joint; None where the log does not tell it.
     inertia : Estimate
@@ -69,6 +76,10 @@ class JointFriction(Result):
         Gravity's torque [N m] over the sine and the cosine of the angle.
     damping : Estimate or None
         Of the controller [N m s/rad], where it was neither stated nor in the torque.
+    torque : ndarray, shape (n,)
+        The motor's torque [N m] at each sample.
+    gain : float
+        Torque per angle that enters it [N m/rad]: of a controller whose torque is not measured its kp, else 0.
     carried : float
         Mean torque [N m] that gravity puts on the joint while it slides.
     residual : float
@@ -79,7 +90,7 @@ class JointFriction(Result):
         Time [s] and speed [rad/s] of each instant at which it slides, the smoothed torque there, and what is made of
         it.
     friction : ndarray, shape (m,)
-        The torque less inertia and gravity.
+        The torque less inertia and gravity, smoothed as that.
     left_out : tuple of str
         What the motion can not tell, and which motion would.
     source : str
@@ -92,11 +103,15 @@ class JointFriction(Result):
     forward: Estimate
     back: Estimate
     viscous: Estimate
+    viscous_forward: Estimate | None
+    viscous_back: Estimate | None
     load: Estimate | None
     inertia: Estimate
     sine: Estimate | None
     cosine: Estimate | None
     damping: Estimate | None
+    torque: Array
+    gain: float
     carried: float
     residual: float
     condition: float
@@ -109,6 +124,18 @@ class JointFriction(Result):
     source: str
     status: str
 
+    def weight(self, position: Array) -> Array:
+        """Gravity's torque [N m] at positions."""
+        if self.sine is None or self.cosine is None:
+            return np.zeros_like(position)
+        return np.asarray(self.sine.value * np.sin(position) + self.cosine.value * np.cos(position))
+
+    def sliding_at(self, place: float) -> float:
+        """Sliding friction [N m] at vanishing speed, at a place."""
+        share = 0.0 if self.load is None or not self.load.known else self.load.value
+        carried = abs(float(self.weight(np.array([place]))[0]))
+        return self.level.value + share * (carried - self.carried)
+
 
 @dataclass(frozen=True)
 class _Asked:
@@ -118,6 +145,7 @@ class _Asked:
     torque: Array
     terms: tuple[str, ...]
     source: str
+    raw: Array
     known: Array
     unsure: tuple[Array, ...] = ()
     stated: dict[str, Estimate] = field(default_factory=dict)
@@ -221,7 +249,9 @@ def _torqued(record: Record, constants: dict[str, Estimate]) -> Record:
         constant = constants["torque_constant"]
         step = Step("regress_joint", {"torque_constant": constant.value}, "torque of the current")
         unit = "N m" if _turning(record) else "N"
-        record = record.with_channel("force", constant.value * record["current"], unit=unit, source="current", step=step)
+        record = record.with_channel(
+            "force", constant.value * record["current"], unit=unit, source="current", step=step
+        )
     if "force" in record:
         require_fit(record, "force", length="rad" if position == "theta" else "m", question=QUESTION)
         return record
@@ -237,7 +267,8 @@ def _torqued(record: Record, constants: dict[str, Estimate]) -> Record:
 
 def _asked(record: Record, constants: dict[str, Estimate], gravity: bool) -> _Asked:
     position = record["theta" if _turning(record) else "x"]
-    reference = record["reference"] if "reference" in record else None
+    followed = "reference" in record
+    reference = record["reference"] if followed else None
     if np.ptp(position) == 0:
         raise EstimateError("the position never changes", f"{QUESTION} needs motion", "check the column")
     slides = sliding(position, record.fs)
@@ -252,15 +283,18 @@ def _asked(record: Record, constants: dict[str, Estimate], gravity: bool) -> _As
     else:
         terms.insert(0, "inertia")
     if "force" in record:
-        torque = window.apply(record["force"])[rows]
+        raw = record["force"]
+        torque = window.apply(raw)[rows]
         scale = constants.get("torque_constant") if record.channels["force"].source == "current" else None
         source = "current" if scale else "force"
     else:
         assert reference is not None
         scale, source = constants["kp"], "reference"
-        torque = scale.value * window.apply(reference - position)[rows]
+        raw = scale.value * (reference - position)
+        torque = window.apply(raw)[rows]
         if "kd" in constants:
             rate = window.apply(reference - position, 1)[rows]
+            raw = raw + constants["kd"].value * window.apply(reference - position, 1)
             torque, unsure = torque + constants["kd"].value * rate, [*unsure, constants["kd"].sd * rate]
         else:
             terms.append("damping")
@@ -269,7 +303,7 @@ def _asked(record: Record, constants: dict[str, Estimate], gravity: bool) -> _As
     gain_sd = max((record.channels[name].gain_sd for name in ("force", "current") if name in record), default=0.0)
     unsure.append(gain_sd * torque)
     moving = tuple(column for column in unsure if np.any(column))
-    return _Asked(told, torque, tuple(terms), source, known, moving, constants)
+    return _Asked(told, torque, tuple(terms), source, np.asarray(raw), known, moving, constants)
 
 
 def _refuse_still(slides: Sliding, record: Record) -> None:
@@ -285,8 +319,21 @@ def _refuse_still(slides: Sliding, record: Record) -> None:
 
 
 def _fitted(asked: _Asked) -> tuple[LeastSquares, tuple[str, ...], tuple[float, float], tuple[str, ...]]:
+    """The regression, with viscous friction of each direction where these differ surely."""
+    fit, terms, pull, left_out = _separable(asked)
+    try:
+        richer = (*terms, "uneven")
+        fit_both, pull_both = _about_load(asked, richer)
+    except EstimateError:
+        return fit, terms, pull, left_out
+    uneven = fit_both.combined(np.eye(len(richer))[-1], "", "", "")
+    sure = abs(uneven.value) > SURELY * uneven.sd
+    return (fit_both, richer, pull_both, left_out) if sure else (fit, terms, pull, left_out)
+
+
+def _separable(asked: _Asked) -> tuple[LeastSquares, tuple[str, ...], tuple[float, float], tuple[str, ...]]:
     """The regression with as many terms as the motion tells apart, and what was left out."""
-    terms, left_out = asked.terms, []
+    terms, left_out = asked.terms, list[str]()
     for optional in (*OPTIONAL, ()):
         try:
             fit, pull = _about_load(asked, terms)
@@ -308,13 +355,13 @@ def _about_load(asked: _Asked, terms: tuple[str, ...]) -> tuple[LeastSquares, tu
         return fit, _pull(fit, terms)
     settled = [one for start in STARTS if (one := _settled(asked, terms, start)) is not None]
     if not settled:
-        raise EstimateError("the load part does not settle", "gravity's torque is known while it slides", ADVICE["load"])
+        raise EstimateError(
+            "the load part does not settle", "gravity's torque is known while it slides", ADVICE["load"]
+        )
     return min(settled, key=lambda one: float(np.linalg.norm(one[0].residual)))
 
 
-def _settled(
-    asked: _Asked, terms: tuple[str, ...], start: float
-) -> tuple[LeastSquares, tuple[float, float]] | None:
+def _settled(asked: _Asked, terms: tuple[str, ...], start: float) -> tuple[LeastSquares, tuple[float, float]] | None:
     """From a load part that is guessed; gravity's torque is first that of a joint with just so much of it."""
     bare = tuple(term for term in terms if term != "load")
     pull = _pull(_solved(asked, bare, 0.0, (0.0, 0.0)), bare)
@@ -369,34 +416,60 @@ def _answer(
 ) -> JointFriction:  # fmt: skip
     slides = asked.told.sliding
     rows, window = slides.rows, slides.window
-    position = asked.told.position[rows]
-    carried = float(np.mean(np.abs(pull[0] * np.sin(position) + pull[1] * np.cos(position))))
+    carried = _carried(asked, pull)
     status = Status(*_worries(asked, fit, terms, record))
     tell = _Telling(asked, fit, terms, _turning(record), status)
-    known = {term: tell.one(term) for term in terms}
+    known = {term: tell.one(term) for term in terms if term != "uneven"}
     if "load" in known:
         known["load"] = known["load"].within(0.0)
     forward, back = known["forward"].within(0.0), known["back"].within(0.0)
-    level = tell.sum({"forward": 0.5, "back": 0.5, **({"load": carried} if "load" in terms else {})}, "sliding friction")
+    level = _level(tell, pull, known.get("load"))
+    ways: list[Estimate | None] = [None, None]
+    if "uneven" in terms:
+        ways = [tell.sum({"viscous": 1, "uneven": by}, f"viscous friction {way}") for by, way in WAYS]
     inertia = replace(asked.stated["inertia"], name="inertia") if "inertia" in asked.stated else known["inertia"]
     speed, acceleration = (window.apply(asked.told.position, order)[rows] for order in (1, 2))
     weight = pull[0] * window.apply(np.sin(asked.told.position))[rows]
     weight += pull[1] * window.apply(np.cos(asked.told.position))[rows]
-    held = asked.torque + (known["damping"].value * _rate(asked) if "damping" in known else 0.0)
+    damped = known["damping"].value * _error_rate(asked) if "damping" in known else np.zeros(len(asked.raw))
     return JointFriction(
-        level=level.within(0.0), forward=forward, back=back, viscous=known["viscous"], load=known.get("load"),
+        level=level.within(0.0), forward=forward, back=back, viscous=known["viscous"], viscous_forward=ways[0],
+        viscous_back=ways[1], load=known.get("load"),
         inertia=inertia.within(0.0), sine=known.get("sine"), cosine=known.get("cosine"), damping=known.get("damping"),
+        torque=asked.raw + damped, gain=asked.stated["kp"].value if asked.source == "reference" else 0.0,
         carried=carried, residual=float(np.linalg.norm(fit.residual) / np.linalg.norm(asked.torque)),
         condition=fit.condition, time=record.start + rows / record.fs, speed=speed, measured=asked.torque,
-        explained=asked.torque - fit.residual, friction=held - inertia.value * acceleration - weight,
+        explained=asked.torque - fit.residual,
+        friction=asked.torque + damped[rows] - inertia.value * acceleration - weight,
         left_out=left_out, source=asked.source, status=status,
     )  # fmt: skip
 
 
-def _rate(asked: _Asked) -> Array:
-    slides = asked.told.sliding
+def _carried(asked: _Asked, pull: tuple[float, float]) -> float:
+    """Mean size of gravity's torque while it slides."""
+    place = asked.told.position[asked.told.sliding.rows]
+    return float(np.mean(np.abs(pull[0] * np.sin(place) + pull[1] * np.cos(place))))
+
+
+def _level(tell: _Telling, pull: tuple[float, float], load: Estimate | None) -> Estimate:
+    """Sliding friction under the mean load, which gravity's torque is part of, so that it is as unsure as that too."""
+    weights = {"forward": 0.5, "back": 0.5}
+    if load is None or not load.known:
+        return tell.sum(weights, "sliding friction")
+    place = tell.asked.told.position[tell.asked.told.sliding.rows]
+    side = np.sign(pull[0] * np.sin(place) + pull[1] * np.cos(place))
+    carried, share = _carried(tell.asked, pull), load.value
+    weights |= {"load": carried, "sine": share * float(np.mean(side * np.sin(place)))}
+    level = tell.sum(weights | {"cosine": share * float(np.mean(side * np.cos(place)))}, "sliding friction")
+    more = share * carried  # its product counts twice in a sum of both factors
+    low, high = level.interval
+    return replace(level, value=level.value - more, interval=(low - more, high - more))
+
+
+def _error_rate(asked: _Asked) -> Array:
+    """How the error of the position changes."""
     assert asked.told.reference is not None
-    return slides.window.apply(asked.told.reference - asked.told.position, 1)[slides.rows]
+    return asked.told.sliding.window.apply(asked.told.reference - asked.told.position, 1)
 
 
 @dataclass(frozen=True)
@@ -446,7 +519,9 @@ class _Telling:
 def _worries(asked: _Asked, fit: LeastSquares, terms: tuple[str, ...], record: Record) -> list[Doubt | str]:
     worries: list[Doubt | str] = []
     if "load" in asked.terms and "load" not in terms:
-        worries.append(Doubt(f"friction may grow with the load, which this log does not tell: {ADVICE['load']}", LOADED))
+        worries.append(
+            Doubt(f"friction may grow with the load, which this log does not tell: {ADVICE['load']}", LOADED)
+        )
     if fit.independent < FEW_INDEPENDENT * len(terms):
         worries.append(f"only {fit.independent:.0f} independent samples for {len(terms)} coefficients")
     if asked.told.reference is None and "inertia" in terms:

@@ -15,7 +15,9 @@ from stickslip.signals.noise import quantisation_step
 
 Array = NDArray[np.float64]
 
-SHARE = 0.15  # of a stroke's length, that the window has on either side; of 0.1 to 0.25 it held most on simulated joints
+SHARE = (
+    0.08  # of a stroke's length, that the window has on either side: with 0.15 the accelerations of an axis fall out
+)
 SHORTEST = 4  # samples of the window on either side
 REACH = 2  # samples that a difference adds to it
 NOISY = 4.0  # deviations of the velocity's noise, below which it may be at rest
@@ -128,13 +130,13 @@ class Told:
     def columns(self, terms: tuple[str, ...], load: float, pull: tuple[float, float], *, told: bool = False) -> Array:
         r"""The balance's columns at the rows.
 
-        Of :math:`\tau = J \ddot q + F_v \dot q \pm F_c + g_s \sin q + g_c \cos q + \mathrm{sgn}(\dot q) \mu |g|
-        - k_d \dot e`, linear about a load part `load` and gravity's torque `pull`.
+        Of :math:`\tau = J \ddot q + F_v \dot q + F_u |\dot q| \pm F_c + g_s \sin q + g_c \cos q +
+        \mathrm{sgn}(\dot q) \mu |g| - k_d \dot e`, linear about a load part `load` and gravity's torque `pull`.
 
         Parameters
         ----------
         terms : tuple of str
-            Of inertia, viscous, forward, back, sine, cosine, load, damping.
+            Of inertia, viscous, uneven, forward, back, sine, cosine, load, damping.
         load : float
             The load part about which gravity's columns are linear.
         pull : (float, float)
@@ -149,6 +151,7 @@ class Told:
         made = {
             "inertia": lambda: window.apply(position, 2),
             "viscous": lambda: window.apply(position, 1),
+            "uneven": lambda: window.apply(side * five_point_difference(position, 1) * window.fs),
             "forward": lambda: window.apply(np.maximum(side, 0.0)),
             "back": lambda: window.apply(np.minimum(side, 0.0)),
             "sine": lambda: window.apply(np.sin(position) * stronger),

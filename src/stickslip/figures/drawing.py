@@ -39,7 +39,8 @@ if TYPE_CHECKING:
 # What draws each kind of result, the file of this room and the function. One that takes no `ax` fills a whole figure.
 DRAWN = {
     "Record": "drawing.of_record", "Findings": "drawing.of_findings", "Comparison": "drawing.of_comparison",
-    "Loops": "drawing.of_loops", "DecayFit": "drawing.of_decay", "Decrement": "decay.plot_differences",
+    "Loops": "drawing.of_loops", "JointFriction": "joint.plot_joint",
+    "DecayFit": "drawing.of_decay", "Decrement": "decay.plot_differences",
     "ForceComparison": "traces.plot_force_comparison", "Consistency": "friction.plot_consistency",
     "TransitionSpeed": "contact.plot_transition_speed", "Trial": "traces.plot_twin", "Squeaks": "squeak.plot_squeaks",
     "TimeFrequency": "drawing.of_frequencies", "DataArray": "wavelet.plot_wavelet",
@@ -134,9 +135,10 @@ def of_record(record: Record, *, ax: Axes | None = None, channels: Sequence[str]
 
 
 def of_findings(findings: Findings, *, ax: Axes | None = None) -> Figure | Axes:
-    """The friction loop, the decay, the squeaks, or else the record."""
+    """The friction loop, the decay, the joint, the squeaks, or else the record."""
     from stickslip.figures.contact import plot_displacement_loop
     from stickslip.figures.decay import plot_decay
+    from stickslip.figures.joint import plot_joint
     from stickslip.figures.squeak import plot_squeaks
 
     results = findings.results
@@ -144,6 +146,8 @@ def of_findings(findings: Findings, *, ax: Axes | None = None) -> Figure | Axes:
         return plot_displacement_loop(findings, ax=ax)
     if results.get("decay") is not None:
         return plot_decay(findings.decay, ax=ax)
+    if results.get("joint") is not None:
+        return plot_joint(findings.joint, ax=ax)
     if results.get("squeaks") is not None and ax is None:
         return plot_squeaks(findings.squeaks)
     return of_record(findings.record, ax=ax)
