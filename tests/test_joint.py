@@ -257,3 +257,32 @@ def test_a_unit_that_nobody_stated_is_flagged():
     assert "nobody stated a unit" in found.joint.level.status
     assert not stands(found.joint.level.status)
     assert kinds(found.joint.level.status) == {""}
+
+
+def test_a_log_of_lerobot(tmp_path):
+    """Parquet whose cells hold a number for each joint, at 30 Hz: positions, and actions as reference."""
+    pyarrow = pytest.importorskip("pyarrow")
+    from pyarrow import parquet
+
+    q, v, a = motion(fs=30.0)
+    reference = q + torque(q, v, a) / 18.0
+    cells = {"observation.state": np.stack([0 * q, q], axis=1), "action": np.stack([0 * q, reference], axis=1)}
+    lists = {name: pyarrow.array(list(values.astype(np.float32))) for name, values in cells.items()}
+    path = tmp_path / "episode_000000.parquet"
+    parquet.write_table(pyarrow.table({**lists, "timestamp": np.arange(len(q)) / 30.0}), path)
+    record = axis_record(ss.read_record(path), axis="1")
+    assert list(record) == ["theta", "reference"]
+    assert record["theta"] == pytest.approx(q, abs=1e-6)
+    found = regress_joint(record, kp=18.0, kd=0.0)
+    assert found.forward.value == pytest.approx(0.07, rel=0.1)
+    assert found.load.value == pytest.approx(0.15, rel=0.1)
+
+
+def test_cells_that_are_not_alike_are_refused_in_a_sentence(tmp_path):
+    pyarrow = pytest.importorskip("pyarrow")
+    from pyarrow import parquet
+
+    path = tmp_path / "ragged.parquet"
+    parquet.write_table(pyarrow.table({"q": [[1.0, 2.0], [1.0]], "timestamp": [0.0, 0.1]}), path)
+    with pytest.raises(ss.StickslipError, match=r"ragged\.parquet"):
+        ss.read_record(path)
