@@ -140,7 +140,7 @@ def test_breakaway_of_a_joint_that_creeps_away():
 
 def test_breakaway_is_not_told_of_a_fast_joint():
     with pytest.raises(EstimateError, match="rests tell"):
-        joint_breakaway(log(), regress_joint(log()))
+        joint_breakaway(log(), joint=regress_joint(log()))
 
 
 def emps(dataset, **channels):

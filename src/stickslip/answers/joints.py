@@ -62,6 +62,7 @@ def analyze_joint(
 
     Examples
     --------
+    >>> import numpy as np
     >>> t = np.arange(6000) / 200
     >>> q = 1.2 * np.sin(2 * np.pi * 0.2 * t) + 0.4 * np.sin(2 * np.pi * 0.7 * t)
     >>> v, a = np.gradient(q, 1 / 200), np.gradient(np.gradient(q, 1 / 200), 1 / 200)
@@ -77,7 +78,7 @@ def analyze_joint(
     log = without_delays(log, question="the friction of a joint")
     joint = regress_joint(log, gravity=gravity, **given)
     whole = _with_friction(log, joint)
-    breakaway = asked.ask("Breakaway", partial(joint_breakaway, whole, joint), aside=True)
+    breakaway = asked.ask("Breakaway", partial(joint_breakaway, whole, joint=joint), aside=True)
     sticks = asked.ask("Sticks and slips", partial(find_sticks, whole, method="speed"), aside=True)
     results = {"joint": joint, "breakaway": breakaway, "sticks": sticks}
     unstated = [f"{key} is read as {each.unit}" for key, each in log.channels.items() if each.assumed]

@@ -34,8 +34,8 @@ WAYS = ((1.0, "forward"), (-1.0, "back"))
 CONFOUNDED, NOISY, LOADED = "confounded", "noisy", "loaded"  # kinds of doubt
 WORDS = {
     "inertia": "inertia", "viscous": "viscous friction", "uneven": "uneven viscous friction",
-    "forward": "Coulomb friction forward", "back": "Coulomb friction back", "load": "friction per load", "sine": "gravity, sine part",
-    "cosine": "gravity, cosine part", "damping": "damping of the controller",
+    "forward": "Coulomb friction forward", "back": "Coulomb friction back", "load": "friction per load",
+    "sine": "gravity, sine part", "cosine": "gravity, cosine part", "damping": "damping of the controller",
 }  # fmt: skip
 ADVICE = {
     "inertia": "accelerate harder, by steps or faster swings",

@@ -48,7 +48,7 @@ class JointBreakaway(Result):
     count: int
 
 
-def joint_breakaway(record: Record, joint: JointFriction) -> JointBreakaway:
+def joint_breakaway(record: Record, *, joint: JointFriction) -> JointBreakaway:
     r"""How much torque does a joint bear before it moves, over what it slides against?
 
     At rest the friction is the torque less gravity's, whatever the inertia. It breaks away between the first count that
@@ -75,8 +75,17 @@ def joint_breakaway(record: Record, joint: JointFriction) -> JointBreakaway:
 
     Examples
     --------
-    >>> joint_breakaway.__name__
-    'joint_breakaway'
+    >>> from stickslip.cycle.joint import regress_joint
+    >>> t = np.arange(40000) / 1000
+    >>> v = 0.2 * np.where(t % 4 < 3, 0.0, np.sin(np.pi * (t % 4 - 3)) * np.where(t % 8 < 4, 1.0, -1.0))
+    >>> q = np.round(np.cumsum(v) / 1000 / 1e-5) * 1e-5
+    >>> moving, way = v != 0, np.where(t % 8 < 4, 1.0, -1.0)
+    >>> torque = np.where(moving, 3.0 * way + 0.01 * np.gradient(v, t), way * 1.4 * (t % 4))
+    >>> torque += np.random.default_rng(0).normal(0, 0.02, t.size)
+    >>> log = Record.of({"theta": q, "force": torque}, fs=1000, units={"force": "N m"})
+    >>> found = joint_breakaway(log, joint=regress_joint(log, gravity=False))
+    >>> 1.35 < found.ratio.value < 1.45
+    True
     """
     require_record(record)
     ends = list(_ends(record, joint))
