@@ -1,9 +1,9 @@
 """The rig of chapter 2 with the flange as a mass of its own: friction enters there, and the cell passes it on.
 
-Section 2.4 takes the flange's inertia off the cell's reading, so that the flange stands between contact and cell; section
-2.5 gives the cell with its mounting 250 Hz. Contact and mounting are two springs in series, and in series they have the
-stiffness of section 3.5. What the cell feels is then the force on the slider, and the flange shakes the slider: its
-250 Hz are heard in the acceleration too.
+Section 2.4 takes the flange's inertia off the cell's reading, so that the flange stands between contact and cell;
+section 2.5 gives the cell with its mounting 250 Hz. Contact and mounting are two springs in series, and in series they
+have the stiffness of section 3.5. What the cell feels is then the force on the slider, and the flange shakes the
+slider: its 250 Hz are heard in the acceleration too.
 """
 
 from __future__ import annotations
