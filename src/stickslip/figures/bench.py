@@ -22,15 +22,6 @@ COLOURS, MARKS = (BLUE, ORANGE, GREEN, PURPLE), ("o", "s", "^", "D")
 def plot_calibrations(found: Mapping[str, Calibration]) -> Figure:
     """How far each sensor is off the straight line through its levels, as a part of its range.
 
-    Parameters
-    ----------
-    found : mapping of str to Calibration
-        By channel.
-
-    Returns
-    -------
-    Figure
-
     Examples
     --------
     >>> from stickslip import Record, bench
@@ -55,15 +46,6 @@ def plot_calibrations(found: Mapping[str, Calibration]) -> Figure:
 @styled
 def plot_response(found: ModalFit) -> Figure:
     """The frequency response: H1, H2, the fitted oscillator, and the coherence.
-
-    Parameters
-    ----------
-    found : ModalFit
-        With its ``response``.
-
-    Returns
-    -------
-    Figure
 
     Examples
     --------
