@@ -10,12 +10,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from stickslip.errors import ModelError
+from stickslip.figures.plate import Plate, drawable
 from stickslip.printing import html_table
 from stickslip.story.words import Caution, flags, interval_of, value_of
 
 if TYPE_CHECKING:
     from stickslip.estimate import Estimate
-    from stickslip.figures.plate import Plate
     from stickslip.record.channels import Channel
     from stickslip.record.record import Record, Step
     from stickslip.squeak.spectra import Clip
@@ -259,8 +259,6 @@ class Story:
 
     def drawn(self, *, png: bool = False) -> Story:
         """With the figures that can be drawn, as PNG too where these are asked for, and of the others a note."""
-        from stickslip.figures.plate import drawable
-
         plates, lost = drawable(self.plates, png=png)
         return replace(self, notes=(*self.notes, *lost), draw=lambda: plates)
 
