@@ -227,7 +227,7 @@ class Stream(Protocol):
 class Listening:
     """An open device that is read and moves nothing, as most are; what derives from it reads, and may hold a port."""
 
-    device: Device
+    device: Any  # the one that is open
 
     def __enter__(self) -> Self:
         return self

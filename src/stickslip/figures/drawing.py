@@ -109,10 +109,10 @@ def _drawer(thing: Any) -> Callable[..., Figure | Axes]:
     return _named(place)
 
 
-def _named(place: str) -> Callable[..., Any]:
+def _named(place: str) -> Callable[..., Figure | Axes]:
     """A function of this room by its file and its name; a file is loaded when it first draws, as each loads much."""
     file, name = place.split(".")
-    draw: Callable[..., Any] = getattr(importlib.import_module(f"stickslip.figures.{file}"), name)
+    draw: Callable[..., Figure | Axes] = getattr(importlib.import_module(f"stickslip.figures.{file}"), name)
     return draw
 
 
@@ -173,7 +173,7 @@ def of_loops(loops: Loops, *, ax: Axes | None = None, against: str = "displaceme
     return ax
 
 
-def of_frequencies(findings: TimeFrequency) -> Figure:
+def of_frequencies(findings: TimeFrequency) -> Figure | Axes:
     """The map of a channel, with the signal above it."""
     return _named("wavelet.plot_wavelet")(findings.wavelets, record=findings.record)
 

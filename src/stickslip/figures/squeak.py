@@ -42,8 +42,8 @@ if TYPE_CHECKING:
 
     from stickslip.answers.findings import Comparison, Findings
     from stickslip.record.record import Record
-    from stickslip.squeak.bursts import Squeak, Squeaks
     from stickslip.squeak.spectra import BurstSpectra
+    from stickslip.squeak.squeaks import Squeak, Squeaks
 
 MARKS = {
     "squeaks": (ORANGE, "D"), "squeals": (ORANGE, "D"), "creaks": (PURPLE, "^"), "does not squeak": (BLUE, "o"),
