@@ -18,8 +18,7 @@ from stickslip.bench.recording import Wanted, acquire
 from stickslip.bench.runs import Proposal, Run, next_runs, run_list
 from stickslip.bench.sim import Sim
 from stickslip.bench.simulated import SimulatedBench, thesis_oscillator
-from stickslip.bench.steps import STEPS
-from stickslip.bench.walk import Commissioned, commission
+from stickslip.bench.steps import STEPS, Commissioned, commission
 from stickslip.drives.kinds import HarmonicBase, Release
 from stickslip.estimate import Estimate, Result
 from stickslip.files.read import read_record

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any
 import click
 
 import stickslip as ss
-from stickslip.cli.interrupted import INTERRUPTED
 from stickslip.cli.many import Places, ask_many, finish, many_options
 from stickslip.cli.options import all_option, reading_options, result_options, usable
 from stickslip.cli.progress import progress
@@ -26,6 +25,7 @@ from stickslip.cli.records import (
 )
 from stickslip.cli.show import show
 from stickslip.cli.terminal import complain
+from stickslip.errors import INTERRUPTED
 from stickslip.workers import processors
 
 if TYPE_CHECKING:

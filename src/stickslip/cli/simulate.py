@@ -9,11 +9,11 @@ from typing import Any
 import click
 
 import stickslip as ss
-from stickslip.cli.interrupted import INTERRUPTED
 from stickslip.cli.options import case_options, folder_name, result_options, wanted_case
 from stickslip.cli.progress import progress
 from stickslip.cli.show import show
 from stickslip.cli.terminal import say, say_json, wrapped
+from stickslip.errors import INTERRUPTED
 
 LIST_WIDTH = 100
 

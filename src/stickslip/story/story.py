@@ -28,7 +28,7 @@ TELLERS = {
     "LawComparison": "fit.of_laws", "LawFit": "fit.of_law", "CurveFit": "fit.of_curve",
     "Predictions": "prediction.of_predictions", "Batch": "many.of_batch",
     "Outcome": "simulation.of_outcome", "Trajectory": "simulation.of_run",
-    "Record": "rig.of_record", "ExperimentPlan": "rig.of_plan",
+    "Record": "bench.of_record", "ExperimentPlan": "bench.of_plan",
     "Bifurcation": "maps.of_bifurcation", "Basins": "maps.of_basins", "Boundary": "maps.of_boundary",
     "Dither": "maps.of_dither", "Stability": "maps.of_stability",
     "ImpactTest": "estimates.of_tap", "Dataset": "maps.of_map",
