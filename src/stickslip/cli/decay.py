@@ -8,7 +8,7 @@ from typing import Any
 import click
 
 import stickslip as ss
-from stickslip.cli.many import Places, ask_many, finish, many_options
+from stickslip.cli.many import Places, answer_many, many_options
 from stickslip.cli.options import reading_options, result_options
 from stickslip.cli.progress import progress
 from stickslip.cli.records import (
@@ -78,9 +78,18 @@ def decay(files: tuple[str, ...], output: Path | None, as_json: bool, everything
     folder = output or (default_folder(groups) if len(groups) == 1 else Path("decays-stickslip"))
     asked |= {key: getattr(rig, key) for key in ("mass", "stiffness") if asked[key] is None}
     if places.wanted(groups):
-        with progress(len(groups)) as tell:
-            batch = ask_many("decay", groups, rig, asked, places, folder=folder, tell=tell)
-        finish(batch, places, folder if output or not as_json else None, folder, as_json=as_json, everything=everything)
+        published = bool(output) or not as_json
+        answer_many(
+            "decay",
+            groups,
+            rig,
+            asked,
+            places,
+            folder=folder,
+            published=published,
+            as_json=as_json,
+            everything=everything,
+        )
         return
     with progress(2 * len(groups) + 1) as tell:
         found, refused = answers(groups, rig, lambda record: ss.analyze_decay(record, **asked), tell)

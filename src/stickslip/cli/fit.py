@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 import stickslip as ss
-from stickslip.cli.options import reading_options, result_options
+from stickslip.cli.options import constants_options, reading_options, result_options
 from stickslip.cli.progress import progress
 from stickslip.cli.records import answers, default_folder, groups_of, name_left_out, read, rig_of
 from stickslip.cli.show import show
@@ -26,11 +26,7 @@ CURVES = (
 
 @click.command()
 @click.argument("files", nargs=-1, required=True, metavar="FILES...")
-@click.option("--mass", metavar="VALUE", help='Oscillating mass in kg, or with its unit ("250 g", "2.42 ± 0.02 kg").')
-@click.option("--stiffness", metavar="VALUE", help="Spring in N/m, or with its unit.")
-@click.option("--damping", metavar="VALUE", help="Viscous damping of the suspension in N s/m.")
-@click.option("--damper", type=click.Choice(["ground", "base"]), help="What the damper ends on.")
-@click.option("--contact", type=click.Choice(["ground", "base"]), help="What the mass slides on.")
+@constants_options()
 @click.option(
     "--system",
     type=click.Path(path_type=Path),
@@ -109,11 +105,7 @@ def _oscillator(file: Path | None) -> object:
 @click.command()
 @click.argument("law", type=click.Path(path_type=Path, exists=True), metavar="LAW")
 @click.argument("files", nargs=-1, required=True, metavar="FILES...")
-@click.option("--mass", metavar="VALUE", help="Oscillating mass in kg; that of LAW unless given.")
-@click.option("--stiffness", metavar="VALUE", help="Spring in N/m, or with its unit.")
-@click.option("--damping", metavar="VALUE", help="Viscous damping of the suspension in N s/m.")
-@click.option("--damper", type=click.Choice(["ground", "base"]), help="What the damper ends on.")
-@click.option("--contact", type=click.Choice(["ground", "base"]), help="What the mass slides on.")
+@constants_options("Oscillating mass in kg; that of LAW unless given.")
 @click.option(
     "--plain/--no-plain", default=True, show_default=True,
     help="Fit Coulomb friction and a damper to each record, to stand beside a richer law.",

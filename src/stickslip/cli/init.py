@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 import stickslip as ss
-from stickslip.cli.options import reading_options
+from stickslip.cli.options import constants_options, reading_options
 from stickslip.cli.records import RIG_FILE, groups_of, read, rig_of
 from stickslip.cli.terminal import aligned, complain, say, wrapped
 from stickslip.cli.words import spoken
@@ -36,11 +36,7 @@ CONSTANTS = {
 
 @click.command()
 @click.argument("files", nargs=-1, required=True, metavar="FILES...")
-@click.option("--mass", metavar="VALUE", help='Oscillating mass in kg, or with its unit ("2.42 ± 0.02 kg").')
-@click.option("--stiffness", metavar="VALUE", help="Spring in N/m, or with its unit.")
-@click.option("--damping", metavar="VALUE", help="Viscous damping of the suspension in N s/m.")
-@click.option("--damper", type=click.Choice(["ground", "base"]), help="What the damper ends on.")
-@click.option("--contact", type=click.Choice(["ground", "base"]), help="What the mass slides on.")
+@constants_options()
 @click.option("--yes", is_flag=True, help="Ask nothing: take what was recognised and what the options say.")
 @click.option("--output", type=click.Path(path_type=Path), default=Path(RIG_FILE), show_default=True, metavar="FILE",
               help="The file to write.")  # fmt: skip

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 import click
 
 import stickslip as ss
-from stickslip.cli.many import Places, ask_many, finish, many_options
-from stickslip.cli.options import reading_options, result_options
+from stickslip.cli.many import Places, answer_many, many_options
+from stickslip.cli.options import contact_option, normal_option, reading_options, result_options
 from stickslip.cli.progress import progress
 from stickslip.cli.records import (
     answers,
@@ -33,13 +33,8 @@ if TYPE_CHECKING:
     "--channel", metavar="NAME", help="Where to listen; sound, normal_acceleration, a, friction unless given."
 )
 @click.option("--frequencies", metavar="LOW:HIGH", help="What is listened to in Hz; from 50 Hz up unless given.")
-@click.option("--contact", type=click.Choice(["ground", "base"]), help="What the mass slides on.")
-@click.option(
-    "--normal",
-    multiple=True,
-    metavar='LOAD or "PATTERN=LOAD"',
-    help="Normal load in N, for all files or for those whose name fits. Repeatable.",
-)
+@contact_option
+@normal_option
 @click.option(
     "--lever",
     metavar="VALUE",
@@ -78,9 +73,18 @@ def squeak(
 
     if places.wanted(groups):
         asked = {"channel": channel, "frequencies": frequencies, "lever": lever}
-        with progress(len(groups)) as tell:
-            batch = ask_many("squeak", groups, rig, asked, places, folder=folder, tell=tell)
-        finish(batch, places, folder if output or not as_json else None, folder, as_json=as_json, everything=everything)
+        published = bool(output) or not as_json
+        answer_many(
+            "squeak",
+            groups,
+            rig,
+            asked,
+            places,
+            folder=folder,
+            published=published,
+            as_json=as_json,
+            everything=everything,
+        )
         return
 
     def ask(record: Record) -> Findings:
