@@ -23,7 +23,6 @@ from stickslip.squeak.squeaks import Squeaks
 from stickslip.units import parse_constant, parse_range, parse_value
 
 HEARD_AT_ONCE = 5.0  # s
-OF_MEDIAN = math.sqrt(math.pi / 2)  # its standard deviation over that of the mean
 VIBRATING = (*HEARD, "torsion_velocity", "load")
 
 

@@ -18,7 +18,7 @@ from stickslip.statistics import student
 
 Array = NDArray[np.float64]
 
-QUESTION, BY_WEIGHTS = "the sensitivity of a sensor", "a spring by weights"
+QUESTION = "the sensitivity of a sensor"
 LEAST = 3  # levels
 BENT = 0.01  # of the range, from which a sensor is not called straight
 

@@ -174,9 +174,6 @@ def step_named(name: str) -> BenchStep:
     raise ModelError(f"no step '{name}'", f"there are {', '.join(names)}", nearest(name, names))
 
 
-BESIDE = "not asked"
-
-
 @dataclass(frozen=True, repr=False)
 class Commissioned(Result):
     """A rig that was commissioned.

@@ -83,7 +83,7 @@ def analyze(
     stickslip analyze run.csv --channels "x=disp [mm]" --mass 3.08 --stiffness "1.19 N/mm"
     stickslip analyze "run_*.csv" --config rig.toml --normal "*250g*=2.45" --normal "*450g*=4.41"
     """
-    places = Places.of(options)
+    places, shown = Places.of(options), {"as_json": as_json, "everything": everything}
     rig = rig_of(**options)
     groups = [group for argument in files for group in groups_of(argument)]
     require_fits(options["normal"], groups)
@@ -91,18 +91,7 @@ def analyze(
     if places.wanted(groups):
         chosen = click.get_current_context().get_parameter_source("twins") is not click.core.ParameterSource.DEFAULT
         asked = {"method": method, "twins": twins if chosen else 0}
-        published = bool(output) or not as_json
-        answer_many(
-            "analyze",
-            groups,
-            rig,
-            asked,
-            places,
-            folder=folder,
-            published=published,
-            as_json=as_json,
-            everything=everything,
-        )
+        answer_many("analyze", groups, rig, asked, places, folder=folder, output=output, **shown)
         return
     with progress(2 * len(groups) + 1) as tell:
         found, refused = answers(
@@ -119,7 +108,7 @@ def analyze(
         tell("drawing and writing", 2 * len(groups))
         results, written = _sure(found, twins, told, folder if output or not as_json else None, tell)
     name_left_out(refused)
-    show(results, written, as_json=as_json, everything=everything)
+    show(results, written, **shown)
 
 
 def _sure(

@@ -109,13 +109,13 @@ def answer_many(
     places: Places,
     *,
     folder: Path,
-    published: bool,
+    output: Path | None,
     **shown: bool,
 ) -> None:
-    """Ask all records, write what was found where it is to be `published`, show it, forget what was kept of a run."""
+    """Ask all records, write what was found into `folder` (not of JSON alone), show it, forget what was kept of it."""
     with progress(len(groups)) as tell:
         batch = ask_many(question, groups, rig, asked, places, folder=folder, tell=tell)
-    written = ss.publish(batch, folder=folder) if published else None
+    written = ss.publish(batch, folder=folder) if output or not shown["as_json"] else None
     if places.table is not None:
         ss.story.write_table(batch, places.table)
     _kept(folder).unlink(missing_ok=True)

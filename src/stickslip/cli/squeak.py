@@ -65,7 +65,7 @@ def squeak(
     stickslip squeak squeal.wav --channels "sound=sound * 2.5 [Pa]"
     stickslip squeak wet_6N.csv wet_1N.csv --normal "*6N*=6.13" --normal "*1N*=1.23"
     """
-    places = Places.of(options)
+    places, shown = Places.of(options), {"as_json": as_json, "everything": everything}
     rig = rig_of(**options)
     groups = [group for argument in files for group in groups_of(argument)]
     require_fits(options["normal"], groups)
@@ -73,18 +73,7 @@ def squeak(
 
     if places.wanted(groups):
         asked = {"channel": channel, "frequencies": frequencies, "lever": lever}
-        published = bool(output) or not as_json
-        answer_many(
-            "squeak",
-            groups,
-            rig,
-            asked,
-            places,
-            folder=folder,
-            published=published,
-            as_json=as_json,
-            everything=everything,
-        )
+        answer_many("squeak", groups, rig, asked, places, folder=folder, output=output, **shown)
         return
 
     def ask(record: Record) -> Findings:
@@ -98,4 +87,4 @@ def squeak(
         tell("drawing and writing", 2 * len(groups))
         written = ss.publish(results, folder=folder) if output or not as_json else None
     name_left_out(refused)
-    show(results, written, as_json=as_json, everything=everything)
+    show(results, written, **shown)
