@@ -40,7 +40,7 @@ from stickslip.errors import TOO_SHORT, EstimateError, StickslipError
 from stickslip.estimate import Constant, Doubt
 from stickslip.record.flaws import constant
 from stickslip.record.record import RIG_UNITS, Record, require_record
-from stickslip.rig.settings import RigSettings
+from stickslip.rig.settings import RigSettings, rig_settings
 from stickslip.twin.search import lacking
 
 STRETCH = 1 << 14  # samples in which the contact is fitted
@@ -228,8 +228,6 @@ QUESTIONS = (
 
 
 def _settings(rig: RigSettings | None, given: Mapping[str, Any]) -> RigSettings:
-    from stickslip.rig.settings import rig_settings
-
     return rig_settings({**(rig.model_dump(exclude_unset=True) if rig is not None else {}), **given}, source="the call")
 
 
