@@ -129,7 +129,11 @@ class Decay(Result):
     @property
     def viscous_residual(self) -> float | None:
         """What viscous damping alone leaves of the motion, over what it leaves together with dry friction (RMS)."""
-        fits = {} if self.motion is None else {each.name: each.fitted for each in self.motion.choice.candidates}
+        fits = (
+            {}
+            if self.motion is None
+            else {candidate.name: candidate.fitted for candidate in self.motion.choice.candidates}
+        )
         if not {"viscous", "both"} <= set(fits) or fits["both"].cost == 0:
             return None
         return math.sqrt(fits["viscous"].cost / fits["both"].cost)
@@ -158,7 +162,7 @@ class Decay(Result):
         """
         dry = self.best.dry_displacement
         fits = self.waveform.motions if self.waveform is not None and self.waveform.motions else ()
-        tried = [each.choice for each in fits or ([] if self.motion is None else [self.motion])]
+        tried = [fit.choice for fit in fits or ([] if self.motion is None else [self.motion])]
         without = [
             len(tried) * min(choice.candidate(each.name).p_value for choice in tried)
             for each in (tried[0].candidates if tried else ())
@@ -189,7 +193,7 @@ class Decay(Result):
         elif self.waveform is None:
             found += self.best.estimates
         else:
-            found += [each for each in self.waveform.estimates if each is not self.waveform.dry_force]
+            found += [estimate for estimate in self.waveform.estimates if estimate is not self.waveform.dry_force]
             found += [] if self.waveform.motions else self.whichever
         other = self._other_ratio
         return tuple(each for each in found if each is not other)
@@ -435,7 +439,7 @@ def _jointly(findings: Sequence[Findings], way: dict[str, Any]) -> DecayFit:
     """All releases at once, with the intervals that hold whichever motion no record speaks against."""
     joint = fit_decay([each.record for each in findings], **way)
     waveforms = [each.decay.waveform for each in findings]
-    motions = [() if each is None else each.motions for each in waveforms]
+    motions = [() if waveform is None else waveform.motions for waveform in waveforms]
     if not all(motions):
         return joint
     choices = [motion.choice for each in motions for motion in each]

@@ -343,7 +343,7 @@ def _asked(truth: float, error: Callable[[], Array | float]) -> _Answer:
 
 def _accuracies(answers: Sequence[Mapping[str, _Answer]]) -> dict[str, Accuracy]:
     """All draws together, by question."""
-    return {question: _accuracy([each[question] for each in answers], UNITS[question]) for question in answers[0]}
+    return {question: _accuracy([answer[question] for answer in answers], UNITS[question]) for question in answers[0]}
 
 
 def _accuracy(answers: Sequence[_Answer], unit: str) -> Accuracy:

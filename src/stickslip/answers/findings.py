@@ -182,7 +182,7 @@ class Comparison(Answers):
             (each.name, next(iter(each.quoted), None) if each.level is None else each.level) for each in self.findings
         ]
         rows = [(name, *(each.cells if each is not None else ("", "", ""))) for name, each in first]
-        rows += [("together", *each.cells) for each in self.estimates]
+        rows += [("together", *estimate.cells) for estimate in self.estimates]
         return html_table("Comparison", ("record", "quantity", "value", "95 % interval"), rows)
 
 
@@ -230,7 +230,7 @@ def _each(found: Any, change: Callable[[Estimate], Estimate]) -> Any:
     """An answer with each of its numbers changed, but for that of the drive."""
     if found is None:
         return None
-    numbers = {each.name: getattr(found, each.name) for each in fields(found)}
+    numbers = {field.name: getattr(found, field.name) for field in fields(found)}
     return replace(
         found,
         **{

@@ -84,7 +84,7 @@ class TimeFrequency(Result):
     def estimates(self) -> tuple[Estimate, ...]:
         """Every number found in the sticks, and after the slips begin."""
         answers = (self.transition, self.microslips, self.slip_ringing)
-        return tuple(each for answer in answers if answer is not None for each in answer.estimates)
+        return tuple(estimate for answer in answers if answer is not None for estimate in answer.estimates)
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON: the answers, not the map."""
@@ -195,7 +195,7 @@ def _spikes_and_sticks(
         return {}, [f"{len(record)} samples are mapped, and too few to ask about spikes and sticks: give {LEAST}."]
     found: dict[str, Any] = {"spikes": find_spikes(record, name)}
     clocks = [each for each in record if name not in CHOSEN and _runs_on(record[each])]
-    notes = [f"Channel {each} only rises or only falls, as times do: {name} is mapped." for each in clocks[:1]]
+    notes = [f"Channel {clock} only rises or only falls, as times do: {name} is mapped." for clock in clocks[:1]]
 
     def asked(what: str, question: Callable[[], Answer]) -> Answer | None:
         try:

@@ -144,15 +144,15 @@ def _mean(estimates: Sequence[Estimate]) -> Estimate:
     count = len(estimates)
     if count == 1:
         return estimates[0]
-    values = np.array([each.value for each in estimates])
-    halves = np.array([np.subtract(*each.interval[::-1]) / 2 for each in estimates])
+    values = np.array([estimate.value for estimate in estimates])
+    halves = np.array([np.subtract(*estimate.interval[::-1]) / 2 for estimate in estimates])
     mean = float(values.mean())
     own = float(np.sqrt(np.sum(halves**2))) / count
     apart = student(count - 1) * float(values.std(ddof=1)) / math.sqrt(count)
-    low, high = (float(np.mean([each.interval[end] - each.value for each in estimates])) for end in (0, 1))
+    low, high = (float(np.mean([estimate.interval[end] - estimate.value for estimate in estimates])) for end in (0, 1))
     skew = (high + low) / 2  # of an interval that is not symmetric, in which a method's own error stands
     half = max(own, apart) + abs(skew)
-    status = Counter(each.status for each in estimates).most_common(1)[0][0]
+    status = Counter(estimate.status for estimate in estimates).most_common(1)[0][0]
     checks = (f"{count} blocks, which scatter by {values.std(ddof=1):.3g}", *estimates[count // 2].checks)
     return replace(
         estimates[count // 2], value=mean, interval=(mean - half + min(skew, 0), mean + half + max(skew, 0)),

@@ -83,7 +83,7 @@ def analyze_squeaks(
     asked = Asked(list(squeaks.notes))
     others = [each for each in VIBRATING if each in record and each != squeaks.channel]
     listen = partial(find_squeaks, record, frequencies=band)
-    beside = [asked.ask(f"Bursts in {each}", partial(listen, channel=each)) for each in others]
+    beside = [asked.ask(f"Bursts in {other}", partial(listen, channel=other)) for other in others]
     loops = None
     if "friction" in record and any(each in record for each in ("x", "v", "theta")):
         loops = asked.ask("Friction over the cycle", partial(friction_loops, record, contact=contact))
@@ -118,7 +118,7 @@ def _quality(record: Record, squeaks: Squeaks, asked: Asked) -> SoundQuality | N
     if record.channels[squeaks.channel].unit != "Pa" or not squeaks.bursts:
         return None
     if record.duration > HEARD_AT_ONCE:
-        loudest = max(squeaks.bursts, key=lambda each: np.nan_to_num(each.level, nan=-math.inf))
+        loudest = max(squeaks.bursts, key=lambda burst: np.nan_to_num(burst.level, nan=-math.inf))
         end = record.start + record.duration
         begin = min(max(record.start, loudest.start - HEARD_AT_ONCE / 2), end - HEARD_AT_ONCE)
         record = record.between(begin, begin + HEARD_AT_ONCE)
@@ -255,7 +255,7 @@ def compare_squeaks(findings: Sequence[Findings]) -> Comparison:
     """
     require_several(findings)
     conditions = tuple(_condition(each) for each in findings)
-    squeaking = tuple(each.name for each in conditions if each.squeaks)
+    squeaking = tuple(condition.name for condition in conditions if condition.squeaks)
     results = {"conditions": conditions, "verdicts": tuple(_verdicts(conditions)), "squeaking": squeaking}
     return Comparison(tuple(findings), results=results)
 
@@ -278,7 +278,7 @@ def _condition(found: Findings) -> Condition:
 
 def _verdicts(conditions: Sequence[Condition]) -> list[str]:
     """Which squeak, and what their slopes say of that."""
-    loud = [each for each in conditions if each.squeaks]
+    loud = [condition for condition in conditions if condition.squeaks]
     quiet, untold = _answering(conditions, "does not squeak"), _answering(conditions, "can not be told")
     creaking = _answering(conditions, "creaks")
     if not loud and not untold:
@@ -303,7 +303,7 @@ def _verdicts(conditions: Sequence[Condition]) -> list[str]:
 
 
 def _answering(conditions: Sequence[Condition], answer: str) -> list[Condition]:
-    return [each for each in conditions if each.answer == answer]
+    return [condition for condition in conditions if condition.answer == answer]
 
 
 def _say(conditions: Sequence[Condition], one: str, several: str) -> list[str]:
@@ -312,5 +312,5 @@ def _say(conditions: Sequence[Condition], one: str, several: str) -> list[str]:
 
 
 def _names(conditions: Sequence[Condition]) -> str:
-    names = [each.name for each in conditions]
+    names = [condition.name for condition in conditions]
     return " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)

@@ -298,7 +298,7 @@ def best_constants(
     """
     if not masses and not springs:
         raise EstimateError("neither a mass nor a spring", "a frequency tells their ratio alone", "weigh one of them")
-    rows = [([1.0, 0.0], each) for each in masses] + [([0.0, 1.0], each) for each in springs]
+    rows = [([1.0, 0.0], mass) for mass in masses] + [([0.0, 1.0], spring) for spring in springs]
     design = np.array([row for row, _ in rows] + [[-1.0, 1.0]])
     read = np.array([math.log(each.value) for _, each in rows] + [2 * math.log(2 * math.pi * frequency.value)])
     sd = np.array([each.spread / each.value for _, each in rows] + [2 * frequency.spread / frequency.value])
@@ -381,7 +381,7 @@ def onto_stick(record: Record, *, mass: Constant, stiffness: Constant) -> OntoSt
     weight, spring = Estimate.stated("mass", mass, "kg"), Estimate.stated("stiffness", stiffness, "N/m")
     record.require_clean("x", "a", question=STICKS, samples=100)
     found, begin = _rung(record, weight, _stop(record))
-    coupled = min(found.resonances, key=lambda each: (COUPLED not in each.name, each.frequency.spread))
+    coupled = min(found.resonances, key=lambda resonance: (COUPLED not in resonance.name, resonance.frequency.spread))
     turn, of_mass = (2 * math.pi * coupled.frequency.value) ** 2, weight.value
     value = of_mass * turn - spring.value
     sd = math.hypot(

@@ -203,7 +203,7 @@ class Commissioned(Result):
         known = self.known
         constants = known.constants
         first = [*(constants.estimates if constants else ()), *([known.damping] if known.damping else [])]
-        return (*first, *(each for result in self.results.values() for each in result.estimates))
+        return (*first, *(estimate for result in self.results.values() for estimate in result.estimates))
 
     def true_value(self, name: str, step: str = "") -> float | None:
         """The true value behind an estimate of a step, of a simulated rig."""
@@ -212,10 +212,10 @@ class Commissioned(Result):
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON."""
         steps = {
-            name: [each.to_dict() for each in result.estimates] for name, result in self.results.items()
+            name: [estimate.to_dict() for estimate in result.estimates] for name, result in self.results.items()
         }  # fmt: skip
         constants = self.known.constants
-        own = [each.to_dict() for each in constants.estimates] if constants else []
+        own = [estimate.to_dict() for estimate in constants.estimates] if constants else []
         return {"constants": own, "steps": steps, "refused": dict(self.refused), "truth": dict(self.truth)}
 
 

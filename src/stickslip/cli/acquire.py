@@ -161,8 +161,8 @@ def devices(config: Path | None, as_json: bool) -> None:
         say_json({"kinds": kinds, "named": said})
         return
     for name, one in mine.items():
-        inputs = ", ".join(f"{each.name} [{each.unit}]" for each in one.inputs)
-        outputs = "".join(f"; moves {each.name}" for each in one.outputs)
+        inputs = ", ".join(f"{entry.name} [{entry.unit}]" for entry in one.inputs)
+        outputs = "".join(f"; moves {output.name}" for output in one.outputs)
         say("\n".join(wrapped(f"{one.model}, {one.fs:g} Hz: {inputs}{outputs}", f"{name:<8} ")))
     for each in found:
         there = f"missing: {each.missing}" if each.missing else "; ".join(each.there) or "nothing found"

@@ -64,7 +64,7 @@ def commission(
         return
     config: Path | None = options["config"]
     rig = ss.rig.read_rig(config) if config else ss.rig.rig_settings({})
-    given = dict(_given(each) for each in files)
+    given = dict(_given(file) for file in files)
     if given and not options["steps"]:
         chosen = [step for step in bench.STEPS if step.name in given]
     folder = output or (None if given or as_json else Path("commission"))

@@ -164,7 +164,7 @@ def dither(case: str, output: Path | None, as_json: bool, everything: bool, **op
     system = wanted.system
     if not isinstance(system, ss.Oscillator):
         raise click.BadParameter("dither is found for a single mass; give an oscillator", param_hint="CASE")
-    tones = [_number(each, "Hz", "--frequency") for each in options["frequencies"]] or None
+    tones = [_number(frequency, "Hz", "--frequency") for frequency in options["frequencies"]] or None
     chosen = {key: options[key] for key in ("on", "cycles", "precision")}
     _answer(
         wanted, "dither", lambda: ss.dither(system, frequency=tones, start=wanted.start or None, **chosen),

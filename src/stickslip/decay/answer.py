@@ -192,7 +192,7 @@ def fit_pendulum(
     fitted = chosen.fitted
     blocks, model = fitted.blocks, f"{fitted.motion.words}, spring sin x"
     kind = "white" if chosen.noise.whiteness >= COLOURED else "correlated"
-    choices = [each.choice for each in motions]
+    choices = [motion.choice for motion in motions]
     estimate = _estimator(chosen, status, kind)
     begins, far = beginning(ring_down.held and not later)
     damping = estimate("damping_ratio", "damping ratio", "1")

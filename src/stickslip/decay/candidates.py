@@ -226,9 +226,9 @@ def fit_motion(
             return tried[best]
         allowed = blocks.motion(tried[best].parameters)[2]
         new = [
-            each
-            for each in dict.fromkeys((allowed, best - 1, best + 1, best - 2, best + 2))
-            if each > 0 and each not in tried
+            count
+            for count in dict.fromkeys((allowed, best - 1, best + 1, best - 2, best + 2))
+            if count > 0 and count not in tried
         ]
         if not new:
             break

@@ -174,9 +174,10 @@ class Releases:
 
     def __repr__(self) -> str:
         told = [
-            f"{each.release:.4g} to {each.stop:.4g} s: {len(each.turns)} extremes at {each.frequency:.4g} Hz"
-            f" from {each.amplitude:.3g} {each.unit}" + ("" if each.stopped else ", still moving at the end")
-            for each in self.ring_downs
+            f"{ring_down.release:.4g} to {ring_down.stop:.4g} s: {len(ring_down.turns)} extremes"
+            f" at {ring_down.frequency:.4g} Hz from {ring_down.amplitude:.3g} {ring_down.unit}"
+            + ("" if ring_down.stopped else ", still moving at the end")
+            for ring_down in self.ring_downs
         ]
         return "\n  ".join([f"{len(told)} release{'s' * (len(told) > 1)}:", *told])
 

@@ -278,7 +278,7 @@ def _answer(choice: Choice, ring_down: RingDown) -> DecayMotion:
         whichever((choice,), damping, "damping_ratio"),
         whichever((choice,), dry, "dry_displacement"),
         choice.model,
-        tuple((each.name, each.fitted.motion.words, each.verdict) for each in choice.candidates),
+        tuple((candidate.name, candidate.fitted.motion.words, candidate.verdict) for candidate in choice.candidates),
         choice,
         told(ring_down, "" if choice.status == "ok" else choice.status),
         _terms(chosen, unit),

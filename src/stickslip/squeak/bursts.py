@@ -403,18 +403,18 @@ def _unlike_a_contact(bursts: list[Squeak], claimed: list[Squeak]) -> str:
     A contact squeaks at one pitch, each time for as long as it happens to; notes differ in pitch, signals come at even
     intervals, and what goes on may be a drive, a whistle or a kettle.
     """
-    clear = [each for each in bursts if each.kind != "noise" and each.tonality > CLEAR]
+    clear = [burst for burst in bursts if burst.kind != "noise" and burst.tonality > CLEAR]
     tones = [each for each in clear if each in claimed or each.duration * each.frequency > LASTS]
     if not tones:
         return f"less than {CLEAR:.0%} of its power is in its tones"
-    pitch = float(np.median([each.frequency for each in tones]))
-    if any(abs(each.frequency / pitch - 1) > ONE_PITCH for each in tones):
+    pitch = float(np.median([tone.frequency for tone in tones]))
+    if any(abs(tone.frequency / pitch - 1) > ONE_PITCH for tone in tones):
         return "it has several pitches, as an instrument, a voice or a bird has"
-    if max(each.duration for each in tones) > GOES_ON:
+    if max(tone.duration for tone in tones) > GOES_ON:
         return f"it goes on for more than {GOES_ON:g} s, as a drive or a whistle does"
     if 2 * len(claimed) <= len(tones):
         return "most of its tones lack what those of a rubbing contact have"
-    gaps = np.diff([each.start for each in tones])
+    gaps = np.diff([tone.start for tone in tones])
     if len(gaps) > 1 and np.ptp(gaps) < EVENLY:
         return "its bursts come at even intervals, as those of a signal do"
     return ""

@@ -154,7 +154,7 @@ class Squeaks(Result):
     def loudest(self) -> Squeak | None:
         """The loudest of the squeaks and squeals, or of all bursts where there are none; if clipped, the longest."""
         bursts = self.of("squeak", "squeal") or self.bursts
-        return max(bursts, key=lambda each: (np.nan_to_num(each.level, nan=-math.inf), each.duration), default=None)
+        return max(bursts, key=lambda burst: (np.nan_to_num(burst.level, nan=-math.inf), burst.duration), default=None)
 
     @property
     def frequency(self) -> Estimate | None:

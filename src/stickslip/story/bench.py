@@ -42,7 +42,7 @@ def of_record(record: Record, *, form: str = "csv") -> Story:
 def of_plan(plan: ExperimentPlan, *, needs: Sequence[tuple[str, str]] = ()) -> Story:
     """Every setup with its accuracy, and the least that is enough for what is needed."""
     rows = [
-        [f"{setup.fs:g}", ", ".join(setup.sensors), *(str(setup.accuracy[each]) for each in plan.questions)]
+        [f"{setup.fs:g}", ", ".join(setup.sensors), *(str(setup.accuracy[question]) for question in plan.questions)]
         for setup in plan.setups
     ]
     errors = f"Root-mean-square errors of {plan.draws} record{'s' * (plan.draws > 1)} at each rate."
@@ -138,7 +138,7 @@ def _tables(done: Commissioned) -> list[Table]:
 
 
 def _numbers(done: Commissioned) -> Iterable[tuple[str, Estimate]]:
-    return ((name, each) for name, result in done.results.items() for each in result.estimates)
+    return ((name, estimate) for name, result in done.results.items() for estimate in result.estimates)
 
 
 def _true(done: Commissioned, step: str, each: Estimate) -> str:
@@ -154,7 +154,7 @@ def _short(done: Commissioned, step: BenchStep) -> str:
 
 
 def _first(result: Result) -> tuple[Estimate, ...]:
-    return tuple(each for each in result.estimates if each.known)[:3]
+    return tuple(estimate for estimate in result.estimates if estimate.known)[:3]
 
 
 def _settings(done: Commissioned) -> dict[str, str]:
@@ -167,7 +167,7 @@ def _settings(done: Commissioned) -> dict[str, str]:
 
 
 def _plates(done: Commissioned) -> list[Plate]:
-    sensors = {each.channel: each for each in done.results.values() if isinstance(each, Calibration)}
+    sensors = {result.channel: result for result in done.results.values() if isinstance(result, Calibration)}
     plates = []
     sweep = done.results.get("sweep")
     if isinstance(sweep, ModalFit) and sweep.response is not None:

@@ -52,12 +52,12 @@ def of_law(found: LawFit, *, record: Records = ()) -> Story:
 
 def of_laws(found: LawComparison, *, record: Records = ()) -> Story:
     """Several laws compared."""
-    laws = sorted(found.candidates, key=lambda each: each.standing.misfit)
+    laws = sorted(found.candidates, key=lambda candidate: candidate.standing.misfit)
     rows = [
-        (each.name, _ratio(each.standing.misfit), "yes" if each.standing.kept else "no", _values(each.oscillator.law))
-        for each in laws
+        (law.name, _ratio(law.standing.misfit), "yes" if law.standing.kept else "no", _values(law.oscillator.law))
+        for law in laws
     ]
-    verdicts = [(each.name, each.standing.verdict) for each in laws]
+    verdicts = [(law.name, law.standing.verdict) for law in laws]
     note = "Misfit: mean square left over, in channels and records together, over the least that any law leaves."
     ranked = Table("Laws by misfit", ("law", "misfit", "possible", "parameters"), rows, note)
     why = Table("Why each law is possible or not", ("law", "verdict"), verdicts, folded=True)
@@ -129,7 +129,7 @@ def _curve_numbers(found: CurveFit) -> dict[str, object]:
         "curve": found.curve, "formula": found.formula, "residual": found.residual,
         "unexplained": found.unexplained, "model_error": found.model_error, "follows": found.follows,
         "unit": found.unit, "status": found.status,
-        "estimates": [each.to_dict() for each in found.estimates],
+        "estimates": [estimate.to_dict() for estimate in found.estimates],
     }  # fmt: skip
 
 
@@ -236,7 +236,7 @@ def _of_one(part: Prediction, law: str) -> Story:
     note = f"{DEFINITION} {COMPARED}" if part.plain else DEFINITION
     tables = [Table("How much is followed", headings, rows, note)]
     if part.sticks:
-        of = [(each.per_cycle, each.share) for each in part.sticks]
+        of = [(stick.per_cycle, stick.share) for stick in part.sticks]
         stops = [
             (pair[0].name, *(text for each in pair for text in (value_of(each), interval_of(each))))
             for pair in zip(*of, strict=True)
@@ -285,7 +285,7 @@ def _law(found: Predictions) -> str:
 
 def _stops(part: Prediction) -> Sequence[str]:
     """Per cycle, as measured and as predicted."""
-    return [value_of(each.per_cycle) for each in part.sticks] or [UNKNOWN, UNKNOWN]
+    return [value_of(stick.per_cycle) for stick in part.sticks] or [UNKNOWN, UNKNOWN]
 
 
 def _left(part: Prediction, name: str) -> str:

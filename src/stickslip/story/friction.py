@@ -104,7 +104,7 @@ def _wrong(findings: Findings) -> Iterator[str]:
     """What is stated wrongly, or not at all, and leaves no force to be given."""
     slips, missing = findings.results.get("slips") or (), findings.results.get("lacking") or ()
     if slips:
-        yield f"Probably {' or '.join(each.words for each in slips)}: until that is mended no force is given."
+        yield f"Probably {' or '.join(slip.words for slip in slips)}: until that is mended no force is given."
     elif apart := hopeless(findings.consistency):
         yield f"{sentence(apart)}. Until that is mended no force is given."
     elif missing:

@@ -108,7 +108,7 @@ def _settings(attributes: Mapping[str, Any]) -> dict[str, str]:
 
 def of_bifurcation(found: Bifurcation) -> Story:
     """Attractors along a parameter."""
-    rows = [(each.direction, f"{each.value:.6g}", each.before, each.after) for each in found.changes]
+    rows = [(change.direction, f"{change.value:.6g}", change.before, change.after) for change in found.changes]
     ways = (("up", found.up), ("down", found.down))
     return _story(
         "Motion along a parameter", "bifurcation", partial(plot_bifurcation, found),
@@ -119,7 +119,7 @@ def of_bifurcation(found: Bifurcation) -> Story:
         data=lambda: {
             "parameter": found.parameter, "values": found.values.tolist(), "coexisting": found.coexisting.tolist(),
             "regimes": {name: [each.regime for each in way] for name, way in ways},
-            "changes": [vars(each) for each in found.changes],
+            "changes": [vars(change) for change in found.changes],
         },
     )  # fmt: skip
 
@@ -141,14 +141,14 @@ def _along(found: Bifurcation) -> Iterator[str]:
 
 def of_stability(found: Stability) -> Story:
     """Whether steady sliding lasts, mode by mode."""
-    rows = [(f"{each.frequency:.5g} Hz", f"{each.growth:.4g} 1/s", f"{each.damping_ratio:.3g}") for each in found.modes]
+    rows = [(f"{mode.frequency:.5g} Hz", f"{mode.growth:.4g} 1/s", f"{mode.damping_ratio:.3g}") for mode in found.modes]
     tone = f"at {found.frequency:.5g} Hz"
     if found.stable:
         told = f"Steady sliding is stable: the slowest vibration, {tone}, dies away by {abs(found.growth):.4g} 1/s."
     else:
         told = f"Steady sliding is unstable by {found.mechanism}: a vibration {tone} grows by {found.growth:.4g} 1/s."
     keys = ("stable", "mechanism", "growth", "without_coupling", "without_slope", "place", "loads", "status")
-    modes = [{key: getattr(each, key) for key in ("frequency", "growth", "damping_ratio")} for each in found.modes]
+    modes = [{key: getattr(mode, key) for key in ("frequency", "growth", "damping_ratio")} for mode in found.modes]
     return Story(
         "Stability of steady sliding", [told], [] if found.status == "ok" else [found.status],
         tables=[Table("Modes", ("frequency", "growth", "damping ratio"), rows)],

@@ -65,10 +65,10 @@ def _data(found: Findings) -> dict[str, Any]:
 def _together(comparison: Comparison) -> dict[str, Any]:
     """The conditions and what they say together, for JSON."""
     rows = [
-        {key: value.to_dict() if isinstance(value, Estimate) else value for key, value in vars(each).items()}
-        for each in comparison.conditions
+        {key: value.to_dict() if isinstance(value, Estimate) else value for key, value in vars(condition).items()}
+        for condition in comparison.conditions
     ]
-    told = [{**row, "trend": each.trend} for row, each in zip(rows, comparison.conditions, strict=True)]
+    told = [{**row, "trend": condition.trend} for row, condition in zip(rows, comparison.conditions, strict=True)]
     return {"conditions": told, "verdicts": comparison.verdicts}
 
 
@@ -333,7 +333,7 @@ def _pair(pair: Pair, *, rest: bool) -> list[str]:
 def _condition_table(comparison: Comparison) -> tuple[Sequence[str], list[list[str]]]:
     """Headings and a row for each condition; a column that is known of none is left out."""
     headings = ["condition", "load", "driven, stroke", "friction", "slope against speed (95 %)", "heard", "Hz", "dB"]
-    rows = [_condition(each) for each in comparison.conditions]
+    rows = [_condition(condition) for condition in comparison.conditions]
     known = [place for place in range(len(headings)) if any(row[place] != NONE for row in rows)]
     return [headings[place] for place in known], [[row[place] for place in known] for row in rows]
 

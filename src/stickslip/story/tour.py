@@ -63,7 +63,7 @@ def _abstract(found: Tour) -> list[str]:
 
 
 def _of(estimates: tuple[Estimate, ...], name: str) -> Estimate | None:
-    return next((each for each in estimates if each.name == name and each.known), None)
+    return next((estimate for estimate in estimates if estimate.name == name and estimate.known), None)
 
 
 def _ratio(found: Tour) -> str:
@@ -91,7 +91,7 @@ def _share(found: Findings) -> Estimate | None:
 
 def _squeaked(found: Tour) -> list[str]:
     conditions = getattr(found.squeaks, "conditions", ())
-    return [f"The {each.name} {each.answer}." for each in conditions]
+    return [f"The {condition.name} {condition.answer}." for condition in conditions]
 
 
 def _advice(first: Proposal) -> str:
@@ -105,7 +105,7 @@ def _lines(found: Tour) -> list[Line]:
     """The numbers that a reader looks for, with the truth beside."""
     done, truth = found.commissioned, found.truth
     constants = done.known.require_constants()
-    lines = [Line.of(each, truth.get(each.name)) for each in constants.estimates]
+    lines = [Line.of(estimate, truth.get(estimate.name)) for estimate in constants.estimates]
     if done.known.damping is not None:
         lines.append(Line.of(done.known.damping, truth.get("damping of the suspension")))
     for name, key in (("sliding friction", "kinetic friction"), ("contact stiffness", "contact stiffness")):
@@ -161,6 +161,6 @@ def _data(found: Tour) -> dict[str, object]:
         "decay": of_findings(found.decay).data(),
         "laws": found.laws.to_dict(),
         "squeaks": of_comparison(found.squeaks).data(),
-        "next": [vars(each) for each in found.proposals],
+        "next": [vars(proposal) for proposal in found.proposals],
         "truth": dict(found.truth),
     }
