@@ -112,10 +112,10 @@ class Findings(Answers):
         loops = self.results.get("loops")
         return loops and self._over_load(loops.slope, "s/m", "slope of the friction coefficient against speed")
 
-    def _over_load(self, found: Estimate | None, unit: str, name: str) -> Estimate | None:
-        if found is None or self.normal is None or self.level is None or self.level.unit != "N":
+    def _over_load(self, estimate: Estimate | None, unit: str, name: str) -> Estimate | None:
+        if estimate is None or self.normal is None or self.level is None or self.level.unit != "N":
             return None
-        return found.scaled(1 / self.normal, unit, name)
+        return estimate.scaled(1 / self.normal, unit, name)
 
     @property
     def estimates(self) -> tuple[Estimate, ...]:

@@ -260,16 +260,16 @@ def compare_squeaks(findings: Sequence[Findings]) -> Comparison:
     return Comparison(tuple(findings), results=results)
 
 
-def _condition(found: Findings) -> Condition:
-    squeaks, loops, record = found.squeaks, found.loops, found.record
+def _condition(findings: Findings) -> Condition:
+    squeaks, loops, record = findings.squeaks, findings.loops, findings.record
     heard = squeaks.of("squeak", "squeal")
     levels = [burst.level for burst in heard if np.isfinite(burst.level)]
     path = next((each for each in ("x", "theta") if each in record), None)
     return Condition(
-        name=found.name, normal=found.normal, forcing=squeaks.forcing,
+        name=findings.name, normal=findings.normal, forcing=squeaks.forcing,
         stroke=float(np.nanmax(record[path]) - np.nanmin(record[path])) / 2 if path else float("nan"),
         level=None if loops is None else loops.level, slope=None if loops is None else loops.slope,
-        coefficient=found.coefficient, slope_of_coefficient=found.slope_of_coefficient,
+        coefficient=findings.coefficient, slope_of_coefficient=findings.slope_of_coefficient,
         answer=squeaks.answer, kind=squeaks.kind, count=len(heard), rate=len(heard) / record.duration,
         pulses=max(squeaks.of("creak"), key=lambda burst: burst.duration).rate if squeaks.of("creak") else float("nan"),
         frequency=squeaks.frequency, sound=max(levels, default=float("nan")), reference=squeaks.reference,

@@ -183,9 +183,9 @@ def _mount(mount: Resonance | tuple[float, float]) -> tuple[tuple[float, float],
     return (frequency.value, damping.value), delay * math.hypot(*parts)
 
 
-def _lead(found: SensorDelay, name: str, frequency: Estimate, unsure: float) -> tuple[Estimate, Estimate]:
+def _lead(delay: SensorDelay, name: str, frequency: Estimate, unsure: float) -> tuple[Estimate, Estimate]:
     """By which time, and which angle, a sensor leads; its mount is not known better than `unsure` [s]."""
-    late = found.delay
+    late = delay.delay
     lead = Estimate.normal(
         f"lead of {name} over x", -late.value, sd=math.hypot(late.spread, unsure), unit="s", method=late.method,
         status=late.status, checks=late.checks,
@@ -431,6 +431,6 @@ def _rung(record: Record, mass: Estimate, stop: int) -> tuple[ImpactTest, float]
     return best, best.time
 
 
-def _disorder(found: ImpactTest) -> float:
+def _disorder(test: ImpactTest) -> float:
     """How far the ringing is from that of one contact and two mounts: slips look like many short modes."""
-    return found.residual * max(1.0, len(found.resonances) / MOST_MODES)
+    return test.residual * max(1.0, len(test.resonances) / MOST_MODES)

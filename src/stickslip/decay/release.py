@@ -240,14 +240,14 @@ def find_releases(record: Record, *, channel: str | None = None) -> Releases:
     return Releases(kept, (*many, *lost, *dict.fromkeys(note for each in kept for note in each.notes)))
 
 
-def _as_let_go(found: tuple[RingDown, ...]) -> tuple[RingDown, ...]:
+def _as_let_go(ring_downs: tuple[RingDown, ...]) -> tuple[RingDown, ...]:
     """The releases, each up to where something caught it: friction holds no mass where another release went on."""
-    longest = max(found, key=lambda each: len(each.turns))
+    longest = max(ring_downs, key=lambda each: len(each.turns))
     if longest.order > 0 or not longest.stopped:
-        return found
+        return ring_downs
     turned = abs(float(longest.samples[longest.turns[-2]]) - longest.rest)
     kept = []
-    for each in found:
+    for each in ring_downs:
         stayed = abs(float(each.samples[each.turns[-1]]) - longest.rest)
         if each.stopped and stayed > HELD * turned + SEEN * each.noise:
             last = int(each.turns[-2])

@@ -58,7 +58,7 @@ def plot_calibrations(found: Mapping[str, Calibration]) -> Figure:
 
 
 @styled
-def plot_response(found: ModalFit) -> Figure:
+def plot_response(fit: ModalFit) -> Figure:
     """The frequency response: H1, H2, the fitted oscillator, and the coherence.
 
     Examples
@@ -68,13 +68,13 @@ def plot_response(found: ModalFit) -> Figure:
     >>> len(plot_response(bench.modal_fit(sweep, mass=2.42)).axes)
     2
     """
-    response = found.response
+    response = fit.response
     assert response is not None
     figure, (above, below) = new_figure(2, height=4.2, heights=[3, 1])
     f = response.frequency
     above.plot(f, np.abs(response.h1), color=BLUE, label="H1, averaged")
     above.plot(f, np.abs(response.h2), color=ORANGE, linestyle=":", label="H2, averaged")
-    above.plot(f, np.abs(found.model(f)), color=INK, linewidth=0.9, label="fitted oscillator")
+    above.plot(f, np.abs(fit.model(f)), color=INK, linewidth=0.9, label="fitted oscillator")
     above.set_yscale("log")
     plain_decades(above.yaxis)
     unit = "1" if response.channels[0] == "z" else "m/N"

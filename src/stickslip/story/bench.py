@@ -141,9 +141,9 @@ def _numbers(done: Commissioned) -> Iterable[tuple[str, Estimate]]:
     return ((name, estimate) for name, result in done.results.items() for estimate in result.estimates)
 
 
-def _true(done: Commissioned, step: str, each: Estimate) -> str:
-    true = done.true_value(each.name, step)
-    return "–" if true is None else value_of(each, true)
+def _true(done: Commissioned, step: str, estimate: Estimate) -> str:
+    true = done.true_value(estimate.name, step)
+    return "–" if true is None else value_of(estimate, true)
 
 
 def _short(done: Commissioned, step: BenchStep) -> str:

@@ -108,20 +108,20 @@ def _data(decay: Decay) -> dict[str, Any]:
     }
 
 
-def _decrements(found: Decrement) -> dict[str, Any]:
+def _decrements(decrement: Decrement) -> dict[str, Any]:
     """Extremes, and the table of the bounds."""
-    bounds = found.bounds
+    bounds = decrement.bounds
     rows = ("m", "rate", "rate_first_order", "rate_worst", "dry", "dry_first_order", "dry_worst")
     return {
-        "extremes": {"time": found.time, "value": found.extremes, "sd": found.sd},
-        "differences": found.differences,
+        "extremes": {"time": decrement.time, "value": decrement.extremes, "sd": decrement.sd},
+        "differences": decrement.differences,
         "bounds": {
             "i": bounds.i, "best_m": bounds.best, "error": bounds.error,
             **{name: getattr(bounds, name) for name in rows},
         },
         "scatter": {
             name: {"mean": values.mean(), "sd": values.std()}
-            for name, values in vars(found.scatter).items() if len(values)
+            for name, values in vars(decrement.scatter).items() if len(values)
         },
     }  # fmt: skip
 

@@ -40,19 +40,19 @@ STEADY = 0.05  # of its spread that a base may stray from a straight line: a ton
 ALONE = "# a law alone: to simulate it, add [system] with its mass and stiffness, and [drive]"
 
 
-def of_curve(found: CurveFit, *, record: Records = ()) -> Story:
+def of_curve(fit: CurveFit, *, record: Records = ()) -> Story:
     """A curve of friction."""
-    return _story(found, record, list(_curve_told(found)), data=partial(_curve_numbers, found))
+    return _story(fit, record, list(_curve_told(fit)), data=partial(_curve_numbers, fit))
 
 
-def of_law(found: LawFit, *, record: Records = ()) -> Story:
+def of_law(fit: LawFit, *, record: Records = ()) -> Story:
     """One law."""
-    return _story(found, record, list(_law_told(found)), notes=list(found.checks), data=found.to_dict)
+    return _story(fit, record, list(_law_told(fit)), notes=list(fit.checks), data=fit.to_dict)
 
 
-def of_laws(found: LawComparison, *, record: Records = ()) -> Story:
+def of_laws(comparison: LawComparison, *, record: Records = ()) -> Story:
     """Several laws compared."""
-    laws = sorted(found.candidates, key=lambda candidate: candidate.standing.misfit)
+    laws = sorted(comparison.candidates, key=lambda candidate: candidate.standing.misfit)
     rows = [
         (law.name, _ratio(law.standing.misfit), "yes" if law.standing.kept else "no", _values(law.oscillator.law))
         for law in laws
@@ -62,16 +62,16 @@ def of_laws(found: LawComparison, *, record: Records = ()) -> Story:
     ranked = Table("Laws by misfit", ("law", "misfit", "possible", "parameters"), rows, note)
     why = Table("Why each law is possible or not", ("law", "verdict"), verdicts, folded=True)
     return _story(
-        found, record, [found.verdict], notes=[*found.checks, *found.fit.checks], tables=[ranked, why],
-        history=found.history, data=found.to_dict,
+        comparison, record, [comparison.verdict], notes=[*comparison.checks, *comparison.fit.checks],
+        tables=[ranked, why], history=comparison.history, data=comparison.to_dict,
     )  # fmt: skip
 
 
-def _story(found: Fit, record: Records, headline: list[str], **told: Any) -> Story:
+def _story(fit: Fit, record: Records, headline: list[str], **told: Any) -> Story:
     """What all fits tell of their parameters and of the records that they were made to."""
     records = [record] if isinstance(record, Record) else list(record)
     units = list(dict.fromkeys(words for each in records for words in leading(each.check())))
-    cautions = [*map(Caution, (doubt.words for doubt in doubts_of(found.status))), *doubts(found.estimates)]
+    cautions = [*map(Caution, (doubt.words for doubt in doubts_of(fit.status))), *doubts(fit.estimates)]
     if records:
         first = records[0]
         told = {"channels": list(first.channels.values()), "history": first.history, **told}
@@ -81,9 +81,9 @@ def _story(found: Fit, record: Records, headline: list[str], **told: Any) -> Sto
         }  # fmt: skip
     title = record_name(records[0]) if len(records) == 1 else f"{len(records)} records" if records else "Fit"
     return Story(
-        title, [*units, *headline], cautions, lines=list(map(Line.of, found.estimates)),
-        draw=lambda: law_plates(found), look=lambda: _scope(found, records),
-        write=partial(write_law, result=found, records=records), **told,
+        title, [*units, *headline], cautions, lines=list(map(Line.of, fit.estimates)),
+        draw=lambda: law_plates(fit), look=lambda: _scope(fit, records),
+        write=partial(write_law, result=fit, records=records), **told,
     )  # fmt: skip
 
 
@@ -101,21 +101,21 @@ def _ratio(misfit: float) -> str:
     return f"{misfit:.2f}" if misfit < 10 else f"{misfit:.0f}"
 
 
-def _curve_told(found: CurveFit) -> Iterator[str]:
-    follows = "the friction follows" if found.follows else "the friction does not follow"
-    if found.follows and found.unexplained > LOUD:
+def _curve_told(fit: CurveFit) -> Iterator[str]:
+    follows = "the friction follows" if fit.follows else "the friction does not follow"
+    if fit.follows and fit.unexplained > LOUD:
         follows = f"as far as its noise lets it be seen, {follows}"
-    yield f'{follows[0].upper()}{follows[1:]} the curve "{found.curve}": {found.formula}.'
-    left = f"{found.unexplained:.1%} of the friction, {number(found.residual, found.residual / 100, found.unit)}"
-    what = "It leaves" if found.follows else "The best of that kind leaves"
-    yield f"{what} {left} root mean square; {found.model_error:.1%} is no noise."
+    yield f'{follows[0].upper()}{follows[1:]} the curve "{fit.curve}": {fit.formula}.'
+    left = f"{fit.unexplained:.1%} of the friction, {number(fit.residual, fit.residual / 100, fit.unit)}"
+    what = "It leaves" if fit.follows else "The best of that kind leaves"
+    yield f"{what} {left} root mean square; {fit.model_error:.1%} is no noise."
 
 
-def _law_told(found: LawFit) -> Iterator[str]:
-    how = "fitted to" if found.parameters else "as it was given, predicts"
-    surface = " on a rough surface" if found.surface == "rough" else ""
-    yield f"The law {type(found.law).__name__}{surface}, {how} {', '.join(found.misfit)}: {_values(found.law)}."
-    yield f"It leaves {', '.join(f'{times:.3g} times the noise of {name}' for name, times in found.misfit.items())}."
+def _law_told(fit: LawFit) -> Iterator[str]:
+    how = "fitted to" if fit.parameters else "as it was given, predicts"
+    surface = " on a rough surface" if fit.surface == "rough" else ""
+    yield f"The law {type(fit.law).__name__}{surface}, {how} {', '.join(fit.misfit)}: {_values(fit.law)}."
+    yield f"It leaves {', '.join(f'{times:.3g} times the noise of {name}' for name, times in fit.misfit.items())}."
 
 
 def _values(law: object) -> str:
@@ -123,13 +123,13 @@ def _values(law: object) -> str:
     return ", ".join(f"{key} {number(value, abs(value) / 1000, unit(law, key))}" for key, value in told.items())
 
 
-def _curve_numbers(found: CurveFit) -> dict[str, object]:
+def _curve_numbers(fit: CurveFit) -> dict[str, object]:
     """Plain data for JSON: SI numbers, None where a number does not exist."""
     return {
-        "curve": found.curve, "formula": found.formula, "residual": found.residual,
-        "unexplained": found.unexplained, "model_error": found.model_error, "follows": found.follows,
-        "unit": found.unit, "status": found.status,
-        "estimates": [estimate.to_dict() for estimate in found.estimates],
+        "curve": fit.curve, "formula": fit.formula, "residual": fit.residual,
+        "unexplained": fit.unexplained, "model_error": fit.model_error, "follows": fit.follows,
+        "unit": fit.unit, "status": fit.status,
+        "estimates": [estimate.to_dict() for estimate in fit.estimates],
     }  # fmt: skip
 
 
@@ -204,26 +204,25 @@ DEFINITION = (
 COMPARED = "Coulomb: the same of one level of friction and a viscous damper, both fitted to the record itself."
 
 
-def of_predictions(found: Predictions) -> Story:
+def of_predictions(predictions: Predictions) -> Story:
     """One record by itself; several in a table, a row each, with a section of the page for each."""
-    parts = [_of_one(part, _law(found)) for part in found.parts]
+    parts = [_of_one(part, _law(predictions)) for part in predictions.parts]
     if len(parts) == 1:
-        return _noted(parts[0], found)
-    headline = (
-        f"{_law(found)}, as it was given, follows at least {_listed(found.least)} in each of {len(parts)} records."
-    )
-    first = next(iter(found.least))
+        return _noted(parts[0], predictions)
+    least = _listed(predictions.least)
+    headline = f"{_law(predictions)}, as it was given, follows at least {least} in each of {len(parts)} records."
+    first = next(iter(predictions.least))
     rows = [
-        (part.name, *(_percent(part.follows.get(name)) for name in found.least), _percent(part.plain.get(first)),
-         *_stops(part)) for part in found.parts
+        (part.name, *(_percent(part.follows.get(name)) for name in predictions.least), _percent(part.plain.get(first)),
+         *_stops(part)) for part in predictions.parts
     ]  # fmt: skip
-    headings = ("record", *found.least, f"{first}, Coulomb", "stops per cycle", "predicted")
+    headings = ("record", *predictions.least, f"{first}, Coulomb", "stops per cycle", "predicted")
     table = Table("How much is followed", headings, rows, f"{DEFINITION} {COMPARED}")
-    return _noted(Story(f"{len(parts)} records predicted", [headline], tables=[table], parts=parts), found)
+    return _noted(Story(f"{len(parts)} records predicted", [headline], tables=[table], parts=parts), predictions)
 
 
-def _noted(story: Story, found: Predictions) -> Story:
-    return replace(story, notes=[*story.notes, *found.notes], data=found.to_dict)
+def _noted(story: Story, predictions: Predictions) -> Story:
+    return replace(story, notes=[*story.notes, *predictions.notes], data=predictions.to_dict)
 
 
 def _of_one(part: Prediction, law: str) -> Story:
@@ -279,8 +278,8 @@ def _scope_of(part: Prediction, law: str) -> Scope | None:
     return Scope(record.start, record.fs, panels, f"{law}, as it was given", command=command, first=first)
 
 
-def _law(found: Predictions) -> str:
-    return type(found.oscillator.law).__name__
+def _law(predictions: Predictions) -> str:
+    return type(predictions.oscillator.law).__name__
 
 
 def _stops(part: Prediction) -> Sequence[str]:

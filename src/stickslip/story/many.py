@@ -58,9 +58,11 @@ def _headline(batch: Batch, leading: Sequence[str]) -> Iterator[str]:
         yield Caution(_several(refused, "give no answer", "gives no answer", lambda row: row.refusal.rstrip(".")))
 
 
-def _range(name: str, found: Sequence[Estimate]) -> str:
-    low, middle, high = (value_of(found[0], float(v)) for v in np.percentile([e.value for e in found], [0, 50, 100]))
-    return f"{name} {low} to {high}, median {middle}, in {len(found)}"
+def _range(name: str, estimates: Sequence[Estimate]) -> str:
+    low, middle, high = (
+        value_of(estimates[0], float(v)) for v in np.percentile([e.value for e in estimates], [0, 50, 100])
+    )
+    return f"{name} {low} to {high}, median {middle}, in {len(estimates)}"
 
 
 def _several(rows: Sequence[Row], are: str, is_one: str, word: Any) -> str:
