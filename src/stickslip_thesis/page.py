@@ -15,6 +15,7 @@ from stickslip.figures.plate import Plate
 from stickslip.story.folder import check_folder, results_folder, write_figures
 from stickslip.story.page import templates
 from stickslip_thesis.drawing import caption_of
+from stickslip_thesis.observations import Seen, seen
 from stickslip_thesis.printed import CHANGED as CHANGED
 from stickslip_thesis.printed import MEANINGS, Given, Number, Ours, Table, given, judged, tables
 from stickslip_thesis.starting import starts
@@ -49,6 +50,8 @@ class Chapter:
         What it starts from: sections of given.toml.
     plates : tuple of Plate
         Its figures.
+    seen : tuple of Seen
+        What the text says that one should see in them, ticked where ours shows it.
     """
 
     name: str
@@ -56,6 +59,12 @@ class Chapter:
     start: Given
     tables: tuple[tuple[Table, list[list[tuple[float | None, str]]]], ...]
     plates: tuple[Plate, ...] = ()
+    seen: tuple[Seen, ...] = ()
+
+    def seen_in(self, plate: Plate) -> list[Seen]:
+        """The observations of a figure, told where the first of their figures stands."""
+        number = plate.title.removeprefix("Figure ")
+        return [one for one in self.seen if one.observation.figures[:1] == (number,)]
 
     @property
     def counts(self) -> Counter[str]:
@@ -90,7 +99,8 @@ def run_chapter(name: str, *, start: Given | None = None, draw: bool = True, tel
         if tell:
             tell(f"chapter {name}, {drawn.title.lower()}", len(plates))
     verdicts = tuple((table, judged(table, ours)) for table in tables() if table.chapter == name)
-    return Chapter(name, module.TITLE, {each: start[each] for each in module.STARTS_FROM}, verdicts, tuple(plates))
+    begins = {section: start[section] for section in module.STARTS_FROM}
+    return Chapter(name, module.TITLE, begins, verdicts, tuple(plates), seen(name, start) if draw else ())
 
 
 def module_of(name: str) -> ModuleType:
@@ -128,7 +138,21 @@ def results(chapters: Sequence[Chapter]) -> dict[str, Any]:
         "chapters": {chapter.name: chapter.title for chapter in chapters},
         "verdicts": {verdict: total[verdict] for verdict in VERDICTS},
         "numbers": [entry for chapter in chapters for entry in chapter.entries()],
+        "seen": [_plain(one) for chapter in chapters for one in chapter.seen],
     }
+
+
+def _plain(one: Seen) -> dict[str, Any]:
+    told = one.observation
+    return {
+        "section": told.section, "figures": list(told.figures), "says": told.says, "measure": told.measure,
+        "values": list(one.values), "seen": one.shown, "why": told.why,
+    }  # fmt: skip
+
+
+def holds(found: dict[str, Any]) -> bool:
+    """Whether every verdict holds, and everything is seen that should be."""
+    return not found["verdicts"][CHANGED] and all(one["seen"] == (not one["why"]) for one in found["seen"])
 
 
 def render(chapters: Sequence[Chapter]) -> str:

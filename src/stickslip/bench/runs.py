@@ -223,6 +223,8 @@ def run_list(proposals: Sequence[Proposal], *, seconds: float = 20.0) -> RunList
     >>> run_list([Proposal(4.2, 0.5e-3, 12.0, "", ("rigid", "compliant"))]).run[0].name
     'next-1'
     """
+    if not 0 < seconds < math.inf:
+        raise ModelError(f"seconds = {seconds}", "a recording lasts some time", "give a length in s")
     return RunList(
         run=tuple(
             Run(

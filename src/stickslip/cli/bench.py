@@ -66,6 +66,7 @@ def following(
     stickslip bench next rigid-fit compliant-fit --config rig.toml --output next.toml
     stickslip acquire --device daq --config rig.toml --runs next.toml --output records
     """
+    motions = [_motion(motion) for motion in done]
     rig = ss.rig.read_rig(config) if config else None
     left = {Path(law).stem or law: ss.answers.read_fitted(law, rig=rig) for law in laws}
     sensor = rig.sensors.get("x") if rig else None
@@ -73,7 +74,7 @@ def following(
     shaker = ss.rig.Shaker.of(rig.shaker if rig else None)
     with progress(1) as tell:
         tell("simulating what the shaker can do", 0)
-        found = room.next_runs(left, shaker=shaker, noise=noise, count=count, done=[_motion(each) for each in done])
+        found = room.next_runs(left, shaker=shaker, noise=noise, count=count, done=motions)
     runs = room.run_list(found, seconds=seconds)
     if output:
         output.write_text(runs.toml(), encoding="utf-8")

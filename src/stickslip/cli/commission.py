@@ -59,6 +59,7 @@ def commission(
     stickslip commission tap=hammer.csv --config rig.toml
     """
     chosen = [bench.step_named(name) for name in options["steps"]] or list(bench.STEPS)
+    anew = {bench.step_named(name).name for name in options["again"]}
     if listed:
         say("\n".join(aligned(("step", "question", "at the rig"), [[s.name, s.title, s.todo] for s in chosen])))
         return
@@ -71,7 +72,7 @@ def commission(
     device = _device(options["name"], rig, config) if options["name"] else None
     if device is None and not given and not (folder and (folder / "records").is_dir()):
         raise click.UsageError("nothing measures; name a --device (sim needs no hardware), or STEP=FILE")
-    source, truth = _source(given, device, rig, folder, options)
+    source, truth = _source(given, device, rig, folder, seed=options["seed"], anew=anew)
     with progress(len(chosen) + 1) as tell:
         done = bench.commission(source, rig=rig, steps=chosen, truth=truth, progress=tell)
         tell("drawing and writing", len(chosen))
@@ -92,11 +93,10 @@ def _device(name: str, rig: RigSettings, config: Path | None) -> Device:
 
 
 def _source(
-    given: dict[str, Path], device: Device | None, rig: RigSettings, folder: Path | None, options: dict[str, Any]
+    given: dict[str, Path], device: Device | None, rig: RigSettings, folder: Path | None, *, seed: int, anew: set[str]
 ) -> tuple[Source, dict[str, float]]:
     """What gives the record of a step, and the truth where the rig is simulated."""
-    bench_of = _simulated(device, rig, options["seed"])
-    anew = set(options["again"])
+    bench_of = _simulated(device, rig, seed)
 
     def source(step: BenchStep) -> Record | None:
         if step.name in given:

@@ -52,7 +52,8 @@ class _Commands(click.Group):
             say(INTERRUPTION, err=True)
             ctx.exit(INTERRUPTED)
         except click.UsageError as error:
-            ctx.exit(_misused(error, " ".join(filter(None, (ctx.command_path, ctx.invoked_subcommand)))))
+            within = " ".join(filter(None, (ctx.command_path, ctx.invoked_subcommand)))
+            ctx.exit(_misused(error, error.ctx.command_path if error.ctx else within))
         except ss.StickslipError as error:
             complain(spoken(error))
             for line in mended(ctx.meta.get(ARGUMENTS, ()), error):
