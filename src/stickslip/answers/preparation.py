@@ -226,9 +226,7 @@ def _base_moves(record: Record, comparison: ForceComparison | None, asked: Asked
 
 
 def _constants(rig: RigSettings) -> dict[str, Any]:
-    return {
-        "mass": rig.mass, "stiffness": rig.stiffness, "damping": rig.damping or 0.0, "damper": rig.damper
-    }  # fmt: skip
+    return {"mass": rig.mass, "stiffness": rig.stiffness, "damping": rig.damping or 0.0, "damper": rig.damper}
 
 
 def _aligned(record: Record, asked: Asked) -> tuple[Record, SensorDelay | None]:

@@ -211,9 +211,7 @@ class Commissioned(Result):
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON."""
-        steps = {
-            name: [estimate.to_dict() for estimate in result.estimates] for name, result in self.results.items()
-        }  # fmt: skip
+        steps = {name: [estimate.to_dict() for estimate in result.estimates] for name, result in self.results.items()}
         constants = self.known.constants
         own = [estimate.to_dict() for estimate in constants.estimates] if constants else []
         return {"constants": own, "steps": steps, "refused": dict(self.refused), "truth": dict(self.truth)}
