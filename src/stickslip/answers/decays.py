@@ -10,8 +10,7 @@ from typing import Any, Protocol, cast
 
 import numpy as np
 
-from stickslip.answers.asked import Asked
-from stickslip.answers.findings import BY_DECREMENTS, Comparison, Findings, record_name, require_several
+from stickslip.answers.findings import BY_DECREMENTS, Asked, Comparison, Findings, record_name, require_several
 from stickslip.answers.mistakes import mistakes_of_decay
 from stickslip.decay.answer import DecayFit, rig_units
 from stickslip.decay.decrement import Decrement, decrement

@@ -1,18 +1,20 @@
-"""What was found: of one record every answer by its name, of several what they tell together."""
+"""What was found: of one record every answer by name, and why some have none; of several what they tell together."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any, Self, TypeVar
 
-from stickslip.errors import EstimateError
+from stickslip.errors import EstimateError, ModelError, StickslipError
 from stickslip.estimate import UNTRIED, Doubt, Estimate, Result, Status, doubts_of, kinds, stands
 from stickslip.printing import html_table
 from stickslip.record.record import Record
 
 if TYPE_CHECKING:
     from stickslip.record.check import Fault
+
+Answer = TypeVar("Answer")
 
 # Answers that may be unsure as wholes, and what they are called then.
 WHOLES = {
@@ -29,6 +31,30 @@ NOT_TRIED = Doubt("not tried on twins: rigs that never stick, that slide at one 
                   "to do so as well", UNTRIED)  # fmt: skip
 ONSETS = ("sticks", "breakaway", "presliding")  # when it sticks, and what it does until it slips
 BY_DECREMENTS = ", by decrements"  # behind the name of a number that another method gave already
+
+
+@dataclass(frozen=True)
+class Asked:
+    """What came of the questions so far: notes in words, and the errors behind those that failed.
+
+    A question aside (how late a sensor is, whether two forces agree) helps the others along. Where it has no answer
+    they are asked without it, and it is no reason why a record tells nothing.
+    """
+
+    notes: list[str] = field(default_factory=list)
+    refusals: list[StickslipError] = field(default_factory=list)
+
+    def ask(self, question: str, answer: Callable[[], Answer], *, aside: bool = False) -> Answer | None:
+        """The answer; where the record can not give one, None and a note."""
+        try:
+            return answer()
+        except ModelError:
+            raise
+        except StickslipError as error:
+            self.notes.append(f"{question}: {error}")
+            if not aside:
+                self.refusals.append(error)
+            return None
 
 
 @dataclass(frozen=True, eq=False, repr=False)

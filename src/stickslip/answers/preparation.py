@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.answers.asked import Asked
+from stickslip.answers.findings import Asked
 from stickslip.balance.felt_and_computed import ForceComparison, compare_force
 from stickslip.balance.force import friction_force
 from stickslip.balance.lag import HIDDEN, REPEATS, SensorDelay, sensor_delay

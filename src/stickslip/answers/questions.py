@@ -9,8 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.answers.asked import Asked
-from stickslip.answers.findings import BY_FORCE, NOT_TRIED, ONSETS, Findings, flagged, record_name, with_doubt
+from stickslip.answers.findings import BY_FORCE, NOT_TRIED, ONSETS, Asked, Findings, flagged, record_name, with_doubt
 from stickslip.answers.mistakes import missing, mistakes, slipped, untrue
 from stickslip.answers.preparation import (
     AT_ONCE,

@@ -9,8 +9,7 @@ from functools import partial
 
 import numpy as np
 
-from stickslip.answers.asked import Asked
-from stickslip.answers.findings import Comparison, Findings, record_name, require_several
+from stickslip.answers.findings import Asked, Comparison, Findings, record_name, require_several
 from stickslip.cycle.loops import NO_SLOPE, friction_loops
 from stickslip.errors import EstimateError
 from stickslip.estimate import Estimate, kinds
