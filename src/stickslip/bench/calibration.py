@@ -215,8 +215,8 @@ def spring_by_weights(
     >>> spring_by_weights(Record.of({"x": x}, fs=1000), weights=weights).stiffness.includes(2310)
     True
     """
-    found = calibrate(record, channel=channel, reference=weights, reference_sd=weights_sd)
-    compliance, gain_sd = found.gain, record.channels[channel].gain_sd
+    calibration = calibrate(record, channel=channel, reference=weights, reference_sd=weights_sd)
+    compliance, gain_sd = calibration.gain, record.channels[channel].gain_sd
     if compliance.value <= 0:
         raise EstimateError(
             "a spring that gives against the weight", "displacement and weight have one sign", "turn one of them round"
@@ -226,10 +226,12 @@ def spring_by_weights(
     stiffness = Estimate(
         "spring stiffness", 1 / compliance.value,
         (math.exp(-1.96 * part) / compliance.value, math.exp(1.96 * part) / compliance.value),
-        part / compliance.value, "N/m", f"displacement under {len(found.levels)} weights",
-        checks=(f"off a straight line by {100 * found.linearity.value:.2g} %",),
+        part / compliance.value, "N/m", f"displacement under {len(calibration.levels)} weights",
+        checks=(f"off a straight line by {100 * calibration.linearity.value:.2g} %",),
     )  # fmt: skip
-    return SpringByWeights(replace(stiffness, status=found.status), found.reference, found.levels, found.status)
+    return SpringByWeights(
+        replace(stiffness, status=calibration.status), calibration.reference, calibration.levels, calibration.status
+    )
 
 
 @dataclass(frozen=True)

@@ -119,11 +119,11 @@ def free_vibration(
     doubts: list[Doubt | str] = [decay.status]
     for name in (name for name in FOLLOWED if name in record):
         try:
-            found = sensor_delay(record, channels=("x", name))
+            delay = sensor_delay(record, channels=("x", name))
         except StickslipError as error:
             doubts.append(Doubt(f"the phase of {name} is not told: {error}", lesser=True))
             continue
-        delays[name], phases[name] = _lead(found, name, decay.frequency, unsure.get(name, 0.0))
+        delays[name], phases[name] = _lead(delay, name, decay.frequency, unsure.get(name, 0.0))
     ratio = replace(old.damping_ratio, name="damping ratio by decrement") if old else decay.damping_ratio.unknown(
         "the decrement method is refused"
     )  # fmt: skip
@@ -415,11 +415,11 @@ def _rung(record: Record, mass: Estimate, stop: int) -> tuple[ImpactTest, float]
     step = max(1, round(LATER * record.fs / 45.0))  # the thesis's contact rings at 45 Hz
     for _ in range(TRIES):
         try:
-            found = impact_test(record.rows(begin), mass=mass)
-            step = max(1, round(LATER * record.fs / found.resonances[0].frequency.value))
-            if best is None or _disorder(found) < _disorder(best):
-                best = found
-            if found.residual < CLEAN and len(found.resonances) <= MOST_MODES:
+            test = impact_test(record.rows(begin), mass=mass)
+            step = max(1, round(LATER * record.fs / test.resonances[0].frequency.value))
+            if best is None or _disorder(test) < _disorder(best):
+                best = test
+            if test.residual < CLEAN and len(test.resonances) <= MOST_MODES:
                 break
         except EstimateError as error:
             last = error

@@ -74,8 +74,8 @@ def following(
     shaker = ss.rig.Shaker.of(rig.shaker if rig else None)
     with progress(1) as tell:
         tell("simulating what the shaker can do", 0)
-        found = room.next_runs(left, shaker=shaker, noise=noise, count=count, done=motions)
-    runs = room.run_list(found, seconds=seconds)
+        proposals = room.next_runs(left, shaker=shaker, noise=noise, count=count, done=motions)
+    runs = room.run_list(proposals, seconds=seconds)
     if output:
         output.write_text(runs.toml(), encoding="utf-8")
     if as_json:

@@ -171,8 +171,8 @@ def _decayed(record: Record, rig: RigSettings, **asked: Any) -> Any:
 
 
 def _squeaked(record: Record, rig: RigSettings, **asked: Any) -> Any:
-    found = ss.analyze_squeaks(record, contact=rig.contact, **asked)
-    return replace(found, normal=rig.normal_load(found.name) or found.normal)
+    findings = ss.analyze_squeaks(record, contact=rig.contact, **asked)
+    return replace(findings, normal=rig.normal_load(findings.name) or findings.normal)
 
 
 ASK: dict[str, Callable[..., Any]] = {"analyze": _analyzed, "decay": _decayed, "squeak": _squeaked}

@@ -77,9 +77,11 @@ def squeak(
         return
 
     def ask(record: Record) -> Findings:
-        found = ss.analyze_squeaks(record, channel=channel, frequencies=frequencies, contact=rig.contact, lever=lever)
-        loads = (rig.normal_load(part) for part in (*found.name.split(" + "), found.name))
-        return replace(found, normal=next((load for load in loads if load is not None), found.normal))
+        findings = ss.analyze_squeaks(
+            record, channel=channel, frequencies=frequencies, contact=rig.contact, lever=lever
+        )
+        loads = (rig.normal_load(part) for part in (*findings.name.split(" + "), findings.name))
+        return replace(findings, normal=next((load for load in loads if load is not None), findings.normal))
 
     with progress(2 * len(groups) + 1) as tell:
         found, refused = answers(groups, rig, ask, tell)

@@ -269,7 +269,7 @@ def _search(motion: Motion, blocks: BlockMeans, start: Array, half_cycles: int |
     def slope_at(free: Array) -> Array:
         return -at(free)[1]
 
-    found = least_squares(
+    solved = least_squares(
         residual_at,
         np.clip(parameters[columns] / units, low, high),
         jac=slope_at,
@@ -280,8 +280,8 @@ def _search(motion: Motion, blocks: BlockMeans, start: Array, half_cycles: int |
         gtol=None,
         max_nfev=EVALUATIONS,
     )
-    parameters[columns] = units * found.x
-    residual, jacobian, begun = at(found.x)
+    parameters[columns] = units * solved.x
+    residual, jacobian, begun = at(solved.x)
     return Fitted(motion, parameters, begun, half_cycles is not None, residual, jacobian / units, blocks)
 
 

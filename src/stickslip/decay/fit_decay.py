@@ -230,17 +230,17 @@ def _alone(release: Release) -> _Motion:
 
 
 def _together(releases: list[Release]) -> _Motion:
-    found = fit_together(releases)
-    least = min(each.value for each in found)
+    fits = fit_together(releases)
+    least = min(fit.value for fit in fits)
     freedom = sum(release.blocks.freedom for release in releases)
-    share = np.exp(-0.5 * np.array([each.value - least for each in found]))
-    best = found[int(np.argmax(share))]
+    share = np.exp(-0.5 * np.array([fit.value - least for fit in fits]))
+    best = fits[int(np.argmax(share))]
     covariance = np.asarray(np.linalg.pinv(best.curvature)[:6, :6], dtype=np.float64)
-    limits = ends_together(found, least + student(freedom) ** 2, 6)
-    motions = [tuple(each.motion(k) for k in range(len(releases))) for each in found]
-    rows = np.array([each.p[:6] for each in found])
-    mean = _mean(rows, share / share.sum(), covariance, limits, [each.half_cycles for each in found], motions)
-    return replace(mean, alike=unlike(releases, found))
+    limits = ends_together(fits, least + student(freedom) ** 2, 6)
+    motions = [tuple(fit.motion(k) for k in range(len(releases))) for fit in fits]
+    rows = np.array([fit.p[:6] for fit in fits])
+    mean = _mean(rows, share / share.sum(), covariance, limits, [fit.half_cycles for fit in fits], motions)
+    return replace(mean, alike=unlike(releases, fits))
 
 
 def _mean(

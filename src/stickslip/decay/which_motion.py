@@ -121,11 +121,11 @@ def choose_motion(
     ('both', True, True)
     """
     releases = find_releases(record, channel=channel)
-    found = motion_of(releases.ring_downs[0], restoring=restoring, candidates=candidates)
+    motion = motion_of(releases.ring_downs[0], restoring=restoring, candidates=candidates)
     if len(releases.ring_downs) == 1:
-        return found
+        return motion
     several = f"the first of {len(releases.ring_downs)} releases alone was read"
-    return replace(found, status=several if found.status == "ok" else f"{found.status}; {several}")
+    return replace(motion, status=several if motion.status == "ok" else f"{motion.status}; {several}")
 
 
 def named(candidates: str | tuple[str, ...] | None) -> tuple[str, ...]:
