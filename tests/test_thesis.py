@@ -15,7 +15,7 @@ import pytest
 from click.testing import CliRunner
 
 from stickslip.cli.program import main
-from stickslip_thesis import page, printed
+from stickslip_thesis import observations, page, printed
 
 CHAPTERS = pytest.mark.parametrize("chapter", page.CHAPTERS)
 MOVED = {  # a parameter, and a number that has to follow it
@@ -164,3 +164,13 @@ def test_a_chapter_that_is_not_there_is_refused() -> None:
     done = CliRunner().invoke(main, ["thesis", "9"])
     assert done.exit_code == 2
     assert "'9' is none of" in done.output
+
+
+def test_the_docs_tell_how_many_there_are() -> None:
+    chapters = [page.run_chapter(name, draw=False) for name in page.CHAPTERS]
+    counts = page.results(chapters)["verdicts"]
+    told = (Path(__file__).parent.parent / "docs" / "thesis.md").read_text("utf-8")
+    rows = dict(re.findall(r"^\| ([a-z ]+) \| .* \| (\d+) \|$", told, re.MULTILINE))
+    assert {verdict: int(count) for verdict, count in rows.items()} == {k: v for k, v in counts.items() if v}
+    seen = [one.why == "" for one in observations.observations()]
+    assert f"{sum(seen)} of {len(seen)} are seen" in " ".join(told.split())

@@ -11,7 +11,7 @@ import pytest
 import stickslip as ss
 from stickslip.decay import extremes as ex
 from stickslip.signals.derivatives import five_point_response
-from stickslip_thesis import beyond, chapter2, chapter3, chapter4, chapter6, flange, readings
+from stickslip_thesis import beyond, chapter2, chapter3, chapter4, chapter6, chapter7, flange, readings
 from stickslip_thesis.printed import given
 
 GIVEN = given()
@@ -153,6 +153,22 @@ def test_what_the_shaker_can_not_move_is_refused() -> None:
     for name, value, words in (("base", [9e-3] * 4, "stroke"), ("frequency", [0.5] * 4, "sine from 1")):
         with pytest.raises(ss.errors.ModelError, match=words):
             chapter2.rubbing({**GIVEN, "rig": {**GIVEN["rig"], name: value}}, 0)
+
+
+def test_the_shaker_can_not_overcome_the_dry_rubber() -> None:
+    bearing = GIVEN["bearing"]
+    needed = [4 * times * bearing["kinetic"] / (math.pi * bearing["stiffness"]) for times in (50, 20)]
+    assert needed == pytest.approx([11.4e-3, 4.55e-3], rel=0.01)
+    law = ss.laws.Coulomb(50 * bearing["kinetic"])
+    for frequency in (3.0, 5.0, 5.52):  # 5.52 Hz: its own
+        drive = ss.drives.HarmonicBase(ss.rig.Shaker().stroke, frequency=frequency)
+        system = ss.Oscillator(mass=bearing["mass"], stiffness=bearing["stiffness"], law=law, drive=drive)
+        assert np.ptp(ss.simulate(system, cycles=40).sample(np.linspace(38, 40, 400) / frequency, ("x",))[0]) < 1e-9
+
+
+def test_the_rig_moves_alike_in_all_conditions() -> None:
+    moved = [np.ptp(chapter7.record_of(GIVEN, *condition)["x"]) / 2 for condition in chapter7.CONDITIONS]
+    assert moved == pytest.approx([GIVEN["squeak"]["amplitude"]] * 4, rel=0.07)
 
 
 def test_both_frictions_have_one_level() -> None:

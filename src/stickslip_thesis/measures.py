@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import stickslip as ss
-from stickslip_thesis import chapter2, chapter3, chapter4, chapter5, chapter6, readings
+from stickslip_thesis import chapter2, chapter3, chapter4, chapter5, chapter6, chapter7, readings
 from stickslip_thesis.drawing import around
 from stickslip_thesis.printed import Given, Ours
 
@@ -279,10 +279,85 @@ def _off_exponential(given: Given, case: int) -> float:
     return float(np.ptp(np.diff(np.log(_peaks(given, case, "viscous")))))
 
 
+def of_chapter_7(given: Given) -> Ours:
+    """Of rubber on steel: four conditions, in the order of chapter7.CONDITIONS."""
+    records = [chapter7.record_of(given, *condition) for condition in chapter7.CONDITIONS]
+    squeal = records[1]
+    amplitudes = np.array([np.ptp(record["x"]) / 2 for record in records])
+    shaking = np.array([_while_sliding(record) for record in records])
+    levels = np.array([chapter7.level_of(record["sound"]) for record in records])
+    slopes = [ss.friction_loops(record).slope.value for record in records]
+    friction = [chapter7.slow_friction(record) for record in records]
+    bending, torsion = chapter7.merging(given)
+    return {
+        "amplitude over their mean": amplitudes / np.mean(amplitudes),
+        "share below 1 mm/s, dry and heavy": np.mean(np.abs(records[0]["v"]) < 1e-3),
+        "vibration above 100 Hz while it slides, over the others'": shaking[1] / shaking[[0, 2, 3]],
+        "wet friction over dry": [friction[1] / friction[0], friction[3] / friction[2]],
+        "slope, dry [N s/m]": [slopes[0], slopes[2]],
+        "slope, wet [N s/m]": [slopes[1], slopes[3]],
+        "bearing's friction over the contact's": [given["bearing"]["kinetic"] / level for level in friction[:2]],
+        "squeals at the light load": [
+            float(chapter7.squeaks(given, *condition)) for condition in chapter7.CONDITIONS[2:]
+        ],
+        "level over that at the light load [dB]": levels[1] - levels[2:],
+        "loudness with that of the sound, correlated": [
+            _together(squeal, name) for name in ("a", "friction", "normal_acceleration", "torsion_velocity")
+        ],
+        "line of all but the torsion [Hz]": [
+            chapter7.strongest(squeal, name) for name in ("a", "friction", "normal_acceleration", "sound")
+        ],
+        "line of the torsion [Hz]": chapter7.strongest(squeal, "torsion_velocity"),
+        "line near 500 Hz in the torsion, under its strongest [dB]": _under(squeal),
+        "power within 5 Hz of the line": _pure(squeal),
+        "torsion over bending where it begins to squeal": torsion / bending,
+    }
+
+
+def _fast(record: ss.Record, name: str) -> float:
+    return chapter2.loudness(record[name], record.fs, (100.0, 4000.0))
+
+
+def _quick(record: ss.Record, name: str) -> Array:
+    """A channel above 100 Hz."""
+    spectrum = np.fft.rfft(record[name] - np.mean(record[name]))
+    spectrum[np.fft.rfftfreq(len(record), 1 / record.fs) < 100] = 0
+    return np.asarray(np.fft.irfft(spectrum, len(record)))
+
+
+def _while_sliding(record: ss.Record) -> float:
+    """Deviation of the tangential acceleration above 100 Hz, where the mass has more than half of its largest speed."""
+    speed = np.abs(record["v"])
+    return float(np.std(_quick(record, "a")[speed > 0.5 * np.max(speed)]))
+
+
+def _together(record: ss.Record, name: str) -> float:
+    """Correlation of the levels in windows of 10 ms, above 100 Hz."""
+    rows = []
+    for channel in (name, "sound"):
+        windows = _quick(record, channel)[: len(record) // 100 * 100].reshape(-1, 100)
+        rows.append(np.sqrt(np.mean(windows**2, axis=1)))
+    return float(np.corrcoef(rows)[0, 1])
+
+
+def _under(record: ss.Record) -> float:
+    frequency, level = _spectrum(record["torsion_velocity"], record.fs)
+    audible = frequency > 100
+    return float(np.max(level[audible]) - np.max(level[(frequency > 450) & (frequency < 500)]))
+
+
+def _pure(record: ss.Record) -> float:
+    """Share of the normal acceleration's power that lies next to its strongest line."""
+    line = chapter7.strongest(record, "normal_acceleration")
+    near = chapter2.loudness(record["normal_acceleration"], record.fs, (line - 5, line + 5))
+    return (near / _fast(record, "normal_acceleration")) ** 2
+
+
 MEASURES: dict[str, Callable[[Given], Ours]] = {
     "2": of_chapter_2,
     "3": of_chapter_3,
     "4": of_chapter_4,
     "5": of_chapter_5,
     "6": of_chapter_6,
+    "7": of_chapter_7,
 }

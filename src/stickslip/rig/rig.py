@@ -331,9 +331,9 @@ def _signals(run: Trajectory) -> dict[str, _Signal]:
     moved = {"z": bool(run.table.motion.base), "force": bool(run.table.motion.force)}
     return {
         label: _Signal(_picked(run, name, j), unit)
-        for name, unit in UNITS.items()
+        for name in UNITS
         if moved.get(name, True)
-        for j, label in enumerate(run.labels(name))
+        for j, (label, unit) in enumerate(zip(run.labels(name), run.units(name), strict=True))
     }
 
 
