@@ -267,7 +267,7 @@ def weighted_mean(estimates: Sequence[Estimate], *, of: str, status: str = "ok")
 
 
 def _values(estimates: Sequence[Estimate]) -> tuple[Array, Array]:
-    values, sds = (np.array([getattr(each, key) for each in estimates]) for key in ("value", "sd"))
+    values, sds = (np.array([getattr(estimate, key) for estimate in estimates]) for key in ("value", "sd"))
     return values, np.maximum(sds, 1e-12 * max(1e-300, float(np.abs(values).max())))
 
 

@@ -19,7 +19,7 @@ from stickslip.answers.many import Kept as Kept
 from stickslip.answers.many import Row as Row
 from stickslip.answers.many import require_engine as require_engine
 from stickslip.answers.many import spread as spread
-from stickslip.answers.mending import mend as mend
+from stickslip.answers.preparation import mend as mend
 from stickslip.answers.squeaks import Condition as Condition
 from stickslip.answers.squeaks import compare_squeaks as compare_squeaks
 

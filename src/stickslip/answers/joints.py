@@ -6,9 +6,8 @@ from collections.abc import Mapping
 from functools import partial
 from typing import Any
 
-from stickslip.answers.asked import Asked
 from stickslip.answers.axes import axis_record
-from stickslip.answers.findings import Findings, flagged, record_name
+from stickslip.answers.findings import Asked, Findings, flagged, record_name
 from stickslip.cycle.joint import JointFriction, regress_joint
 from stickslip.cycle.joint_onset import joint_breakaway
 from stickslip.cycle.sticks import find_sticks

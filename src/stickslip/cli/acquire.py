@@ -1,4 +1,4 @@
-"""stickslip acquire"""
+"""stickslip acquire, and stickslip devices, which tells what can measure."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ import click
 
 import stickslip as ss
 import stickslip.bench as bench
-from stickslip.cli.interrupted import INTERRUPTED
 from stickslip.cli.options import pair
 from stickslip.cli.progress import progress
 from stickslip.cli.terminal import say, say_json, wrapped
+from stickslip.errors import INTERRUPTED
 
 TRIGGER = re.compile(r"\s*(\w+)\s*([<>])\s*(\S+)\s*")
 
@@ -138,3 +138,32 @@ def _show(done: bench.Acquired, *, as_json: bool) -> None:
         say("\n".join(wrapped(note)))
     ended = "" if done.ended == "complete" else f" ({done.ended})"
     say(f"Written: {', '.join(map(str, done.paths))}{ended}")
+
+
+@click.command()
+@click.option(
+    "--config", type=click.Path(path_type=Path), metavar="RIG.TOML", help="List the devices that it names too."
+)
+@click.option("--json", "as_json", is_flag=True, help="Print the list as JSON and nothing else.")
+def devices(config: Path | None, as_json: bool) -> None:
+    """List what can measure here: kinds of devices, what is plugged in, and which package is missing.
+
+    \b
+    stickslip devices
+    stickslip devices --config rig.toml
+    """
+    found = bench.devices()
+    named = ss.rig.read_rig(config).devices if config else {}
+    mine = {name: bench.find_device(name, named, folder=config.parent if config else None) for name in named}
+    if as_json:
+        kinds = {each.kind: {"about": each.about, "there": [*each.there], "missing": each.missing} for each in found}
+        said = {name: {"kind": one.kind, "model": one.model, "fs": one.fs} for name, one in mine.items()}
+        say_json({"kinds": kinds, "named": said})
+        return
+    for name, one in mine.items():
+        inputs = ", ".join(f"{entry.name} [{entry.unit}]" for entry in one.inputs)
+        outputs = "".join(f"; moves {output.name}" for output in one.outputs)
+        say("\n".join(wrapped(f"{one.model}, {one.fs:g} Hz: {inputs}{outputs}", f"{name:<8} ")))
+    for each in found:
+        there = f"missing: {each.missing}" if each.missing else "; ".join(each.there) or "nothing found"
+        say("\n".join([*wrapped(each.about, f"{each.kind:<8} "), *wrapped(there, 9 * " ")]))

@@ -9,11 +9,11 @@ from typing import Any
 import click
 
 import stickslip as ss
-from stickslip.cli.interrupted import INTERRUPTED
-from stickslip.cli.options import case_options, folder_name, result_options, wanted_case
+from stickslip.cli.options import case_options, folder_name, form_option, result_options, wanted_case
 from stickslip.cli.progress import progress
 from stickslip.cli.show import show
 from stickslip.cli.terminal import say, say_json, wrapped
+from stickslip.errors import INTERRUPTED
 
 LIST_WIDTH = 100
 
@@ -23,14 +23,7 @@ LIST_WIDTH = 100
 @click.option("--list", "listed", is_flag=True, help="List the scenarios, with what is known of each.")
 @case_options
 @click.option("--fs", metavar="HZ", help="Sampling rate of the record; fine enough for the motion unless given.")
-@click.option(
-    "--format",
-    "form",
-    type=click.Choice(["csv", "h5", "parquet"]),
-    default="csv",
-    show_default=True,
-    help="Format of the record.",
-)
+@form_option
 @click.option("--animate", "animation", type=click.Choice(["gif", "mp4"]), help="Add a moving picture; mp4 by ffmpeg.")
 @click.option("--sound", is_flag=True, help="Add what is heard, sound.wav; of a squeak rig its sensors' record too.")
 @result_options("NAME-stickslip")
