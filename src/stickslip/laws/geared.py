@@ -24,8 +24,8 @@ class Geared(Rigid):
 
     label = "Gear: each direction its own, and a part of the load"
     formula = (
-        "f = (c + p |n| + s |v|) sign(v) while sliding, n = load + gradient x, c = forward and s = viscous_forward where "
-        "v > 0, else back and viscous_back, p = driving where v n > 0, else driven; at rest up to c + p |n|"
+        "f = (c + p |n| + s |v|) sign(v) while sliding, n = load + gradient x, c = forward and s = viscous_forward "
+        "where v > 0, else back and viscous_back, p = driving where v n > 0, else driven; at rest up to c + p |n|"
     )
 
     forward: float = parameter("N", "Coulomb friction forward", note="without load")
