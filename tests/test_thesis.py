@@ -153,6 +153,18 @@ def test_the_results_hold_every_number(folder: Path) -> None:
     assert first["ours"] == pytest.approx(-0.86727678404443999)
 
 
+def test_chapters_in_other_processes_are_the_same(tmp_path: Path) -> None:
+    def nothing(words: str, done: float) -> None:
+        pass
+
+    apart = page.reproduce(["appendices", "7"], folder=tmp_path / "apart", tell=nothing)
+    here = page.run_chapter("appendices")
+    assert [chapter.name for chapter in apart] == ["appendices", "7"]
+    assert list(apart[0].entries()) == list(here.entries())
+    assert [plate.svg() for plate in apart[0].plates] == [plate.svg() for plate in here.plates]
+    assert len(list((tmp_path / "apart" / "figures").glob("*.png"))) == sum(len(one.plates) for one in apart)
+
+
 def test_a_verdict_that_no_longer_holds_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(page, "given", lambda: moved("decay", "damping"))
     done = CliRunner().invoke(main, ["thesis", "6", "--json"], catch_exceptions=False)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import importlib
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -14,6 +14,7 @@ from stickslip import __version__
 from stickslip.figures.plate import Plate
 from stickslip.story.folder import check_folder, results_folder, write_figures
 from stickslip.story.page import templates
+from stickslip.workers import processors, workers
 from stickslip_thesis.drawing import caption_of
 from stickslip_thesis.observations import Seen, seen
 from stickslip_thesis.printed import CHANGED as CHANGED
@@ -112,10 +113,8 @@ def reproduce(chapters: Sequence[str], *, folder: Path | None, tell: Tell) -> tu
     """Run chapters and, given a folder, write page, figures and results.json there, whole or not at all."""
     if folder is not None:
         check_folder(folder)
-    done = []
-    for place, name in enumerate(chapters):
-        tell(f"chapter {name}, numbers", place)
-        done.append(run_chapter(name, draw=folder is not None, tell=_at(tell, place)))
+    run = _run_apart if folder is not None and len(chapters) > 1 else _run_here
+    done = run(chapters, folder is not None, tell)
     if folder is not None:
         tell("writing the page", len(chapters))
         with results_folder(folder, results(done)) as draft:
@@ -126,9 +125,54 @@ def reproduce(chapters: Sequence[str], *, folder: Path | None, tell: Tell) -> tu
     return tuple(done)
 
 
-def _at(tell: Tell, place: int) -> Tell:
-    """The progress of a chapter, which counts as one."""
-    return lambda words, _: tell(words, place)
+def _run_here(chapters: Sequence[str], draw: bool, tell: Tell) -> list[Chapter]:
+    """Each in this process, its figures told one by one."""
+    start = given()
+    return [
+        run_chapter(name, start=start, draw=draw, tell=lambda words, _, place=place: tell(words, place))
+        for place, name in enumerate(chapters)
+    ]
+
+
+def _run_apart(chapters: Sequence[str], draw: bool, tell: Tell) -> list[Chapter]:
+    """Each in one of as many processes as there are processors, the longest ones, which stand last, begun first."""
+    count = min(len(chapters), processors())
+    start, done = given(), []
+    tell(f"{len(chapters)} chapters", 0)
+    with workers(count, __name__) as over:
+        jobs = [(name, start, draw) for name in reversed(chapters)]
+        for place, chapter in enumerate(over(_rendered, jobs)):
+            done.append(chapter)
+            tell(f"chapter {chapter.name}", place + 1)
+    return done[::-1]
+
+
+@dataclass(frozen=True, eq=False)
+class Rendered(Plate):
+    """A figure as its images, which pass from one process to another."""
+
+    vector: str = ""
+    image: bytes = b""
+
+    def svg(self) -> str:
+        """As it was drawn."""
+        return self.vector
+
+    def png(self) -> bytes:
+        """As it was drawn."""
+        return self.image
+
+
+def _rendered(job: tuple[str, Given, bool]) -> Chapter:
+    """A chapter, its figures drawn."""
+    name, start, draw = job
+    chapter = run_chapter(name, start=start, draw=draw)
+    plates = (Rendered(one.name, _elsewhere, one.title, one.caption, one.svg(), one.png()) for one in chapter.plates)
+    return replace(chapter, plates=tuple(plates))
+
+
+def _elsewhere() -> Any:
+    raise RuntimeError("this figure was drawn in another process, and is kept as its images")
 
 
 def results(chapters: Sequence[Chapter]) -> dict[str, Any]:

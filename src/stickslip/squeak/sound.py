@@ -82,6 +82,8 @@ def sound_pressure(
     normal : array_like or str, optional
         Of a Trajectory: the share of each degree of freedom in a_n; the second alone of a structure where left out. Of
         a Record: the channel, "normal_acceleration" or "a" where left out.
+    baffled : bool
+        Whether it is a flat disk in a wall, and not a small surface in a free field.
 
     Returns
     -------
@@ -157,7 +159,7 @@ def squeak_record(
         Signal to noise [dB]: each channel's RMS about its mean over that of its white noise; none where infinite.
     rng : int or Generator, optional
         Where the noise comes from.
-    area, distance, baffled
+    area, distance, baffled : float, bool
         As in :func:`sound_pressure`.
 
     Returns
