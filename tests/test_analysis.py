@@ -13,7 +13,7 @@ import pytest
 import stickslip as ss
 from stickslip.answers.comparison import compare
 from stickslip.answers.findings import Comparison, Findings, record_name
-from stickslip.answers.mending import mend
+from stickslip.answers.preparation import mend
 from stickslip.answers.questions import analyze
 from stickslip.errors import EstimateError, ModelError
 from stickslip.rig.settings import RigSettings

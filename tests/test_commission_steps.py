@@ -11,7 +11,7 @@ import pytest
 import stickslip as ss
 from scripts import loaded
 from stickslip import bench
-from stickslip.bench.holds import find_holds
+from stickslip.bench.calibration import find_holds
 
 NOISE = np.random.default_rng(7)
 

@@ -223,7 +223,7 @@ def test_all_that_the_program_says_goes_through_one_door() -> None:
     assert speaking == {"terminal.py", "progress.py"}
 
 
-@pytest.mark.parametrize("name", ["click", "stickslip.cli.sweep", "pandas", "pyarrow"])
+@pytest.mark.parametrize("name", ["click", "stickslip.cli.regimes", "pandas", "pyarrow"])
 def test_ctrl_c_while_something_is_imported(tmp_path: Path, name: str) -> None:
     code = (
         "import signal, sys\n"

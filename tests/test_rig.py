@@ -224,3 +224,22 @@ def test_the_friction_of_a_measured_record_is_found() -> None:
 def test_what_makes_no_sense_is_refused(wrong: object) -> None:
     with pytest.raises(ModelError):
         wrong()  # type: ignore[operator]
+
+
+def test_a_rigid_cell_feels_the_inertia_of_the_mass_that_it_names() -> None:
+    contact = ss.Contact(ss.laws.CompliantContact(1.1, stiffness=240e3), [0, 1])
+    link = 1e6 * np.array([[1.0, -1.0], [-1.0, 1.0]])
+    drive = ss.drives.HarmonicBase(1e-3, frequency=3.5)
+    two = ss.Structure(
+        np.diag([1.8, 0.6]), np.zeros((2, 2)), np.diag([2310.0, 0.0]) + link, contacts=[contact], drive=drive
+    )
+    run = ss.simulate(two, duration=1.0)
+    cell = Sensor("load", of="friction", mount=Mount(math.inf, 0.0, mass=0.6, on="a2"))
+    rig = ss.Rig((cell, Sensor("a", of="a1")))
+    record = rig.stated(rig.measure(run, fs=2000))
+    _, below, friction = run.sample(record.time, ("a", "friction"))[0]
+    assert record["load"] == pytest.approx(friction + 0.6 * below)
+    assert record.channels["load"].mount is None
+    assert record.channels["load"].inertia == 0.6
+    with pytest.raises(ModelError, match=r"moves as 'a'.*name the acceleration"):
+        ss.Rig((cell.having(on="a"), Sensor("a", of="a1"))).measure(run, fs=2000)

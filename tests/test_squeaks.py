@@ -252,6 +252,32 @@ def test_a_run_sounds_as_its_record_does() -> None:
     assert sampled[200:-200] == pytest.approx(exact[200:-200], abs=0.02 * np.max(np.abs(exact)))
 
 
+def test_a_disk_in_a_wall_is_exact_near_and_twice_the_point_far() -> None:
+    fs, frequency = 50_000.0, 500.0
+    w, c = 2 * np.pi * frequency, 343.2
+    time = np.arange(50_000) / fs
+    shaken = ss.Record.of({"a": np.sin(w * time)}, fs=fs)
+
+    def heard(area: float, distance: float, *, baffled: bool) -> float:
+        sound = ss.squeak.sound_pressure(shaken, area=area, distance=distance, baffled=baffled)["sound"]
+        return float(np.sqrt(2) * np.std(sound[10_000:40_000]))
+
+    area, near = 0.02, 0.0254  # Rayleigh's integral of a harmonic disk on its axis (Pierce, "Acoustics", 5-7)
+    edge = np.hypot(near, np.sqrt(area / np.pi))
+    assert heard(area, near, baffled=True) == pytest.approx(
+        2 * 1.204 * c / w * abs(np.sin(w / c * (edge - near) / 2)), rel=1e-3
+    )
+    assert heard(area, 5.0, baffled=True) == pytest.approx(2 * heard(area, 5.0, baffled=False), rel=5e-3)
+
+
+def test_the_disk_of_a_run_is_that_of_its_record() -> None:
+    run = ss.simulate(ss.squeak.squeak_rig("wet", 6.13), duration=0.4)
+    kept = ss.squeak.squeak_record(run, fs=50_000, baffled=True, area=0.02, distance=0.0254)
+    again = ss.squeak.sound_pressure(kept, area=0.02, distance=0.0254, baffled=True)
+    inner = slice(2000, -2000)
+    assert np.std((again["sound"] - kept["sound"])[inner]) < 0.02 * np.std(kept["sound"][inner])
+
+
 @pytest.mark.parametrize(
     ("options", "error", "words"),
     [

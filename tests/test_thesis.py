@@ -15,7 +15,7 @@ import pytest
 from click.testing import CliRunner
 
 from stickslip.cli.program import main
-from stickslip_thesis import page, printed
+from stickslip_thesis import observations, page, printed
 
 CHAPTERS = pytest.mark.parametrize("chapter", page.CHAPTERS)
 MOVED = {  # a parameter, and a number that has to follow it
@@ -153,6 +153,18 @@ def test_the_results_hold_every_number(folder: Path) -> None:
     assert first["ours"] == pytest.approx(-0.86727678404443999)
 
 
+def test_chapters_in_other_processes_are_the_same(tmp_path: Path) -> None:
+    def nothing(words: str, done: float) -> None:
+        pass
+
+    apart = page.reproduce(["appendices", "7"], folder=tmp_path / "apart", tell=nothing)
+    here = page.run_chapter("appendices")
+    assert [chapter.name for chapter in apart] == ["appendices", "7"]
+    assert list(apart[0].entries()) == list(here.entries())
+    assert [plate.svg() for plate in apart[0].plates] == [plate.svg() for plate in here.plates]
+    assert len(list((tmp_path / "apart" / "figures").glob("*.png"))) == sum(len(one.plates) for one in apart)
+
+
 def test_a_verdict_that_no_longer_holds_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(page, "given", lambda: moved("decay", "damping"))
     done = CliRunner().invoke(main, ["thesis", "6", "--json"], catch_exceptions=False)
@@ -164,3 +176,13 @@ def test_a_chapter_that_is_not_there_is_refused() -> None:
     done = CliRunner().invoke(main, ["thesis", "9"])
     assert done.exit_code == 2
     assert "'9' is none of" in done.output
+
+
+def test_the_docs_tell_how_many_there_are() -> None:
+    chapters = [page.run_chapter(name, draw=False) for name in page.CHAPTERS]
+    counts = page.results(chapters)["verdicts"]
+    told = (Path(__file__).parent.parent / "docs" / "thesis.md").read_text("utf-8")
+    rows = dict(re.findall(r"^\| ([a-z ]+) \| .* \| (\d+) \|$", told, re.MULTILINE))
+    assert {verdict: int(count) for verdict, count in rows.items()} == {k: v for k, v in counts.items() if v}
+    seen = [one.why == "" for one in observations.observations()]
+    assert f"{sum(seen)} of {len(seen)} are seen" in " ".join(told.split())

@@ -11,7 +11,7 @@ import pytest
 import stickslip as ss
 from stickslip.decay import extremes as ex
 from stickslip.signals.derivatives import five_point_response
-from stickslip_thesis import beyond, chapter2, chapter3, chapter4, chapter6, readings
+from stickslip_thesis import beyond, chapter2, chapter3, chapter4, chapter6, chapter7, flange, readings
 from stickslip_thesis.printed import given
 
 GIVEN = given()
@@ -114,6 +114,74 @@ def test_the_accelerometer_leads_so_it_is_read_late() -> None:
     record = chapter2.free_vibration(GIVEN)
     late, early = (np.std(chapter2.resultant(GIVEN, record, sign)[400:-400]) for sign in (1, -1))
     assert late < 0.15 < 0.5 < early
+
+
+def test_the_flange_explains_47_hz() -> None:
+    told = GIVEN["rig"]
+    for share in (0.15, 0.2, 0.3, 0.5):
+        slow, fast = flange.coupled({**told, "mounting_share": share})
+        assert 46.95 < slow < 47.55
+        assert fast == pytest.approx(250.0)
+    part = flange.Flange.of(told)
+    assert 1 / (1 / part.contact + 1 / part.mounting) == pytest.approx(told["stiffness"])
+    with pytest.raises(ss.errors.ModelError, match="larger share"):
+        flange.coupled({**told, "mounting_share": 0.1})
+
+
+def test_what_the_cell_passes_on_is_the_force_on_the_slider() -> None:
+    """Without faults of sensors the computed friction and the cell's less the flange's inertia are one force."""
+    told, case = {**GIVEN["rig"], "damping_ratio": 0.0}, 0
+    drive = ss.drives.HarmonicBase(told["base"][case], frequency=told["frequency"][case])
+    run = ss.simulate(flange.slider(told, drive), duration=2.0)
+    times = np.linspace(0.5, 2.0, 4001)
+    x, _, a, of_flange, friction, z = run.sample(times, ("x", "a", "friction", "z"))[0]
+    mass = flange.Flange.of(told).mass
+    computed = told["spring"] * (z - x) - told["mass"] * a
+    assert friction + mass * of_flange - mass * a == pytest.approx(computed, abs=1e-8)
+
+
+@pytest.mark.parametrize("case", range(4))
+def test_the_cell_hears_less_of_what_rings_around_100_hz_and_more_around_its_own_250_hz(case: int) -> None:
+    record = chapter2.rubbing(GIVEN, case)
+    assert chapter2.transients(GIVEN, record, chapter2.HEARD) < 0.55
+    assert chapter2.transients(GIVEN, record, (60.0, 1900.0)) < 0.65
+    around_its_own = chapter2.transients(GIVEN, record, chapter2.CELL_BAND)
+    assert around_its_own < 0.6 if case == 3 else 1.0 < around_its_own < 1.5  # case 3 sticks and slips
+
+
+def test_what_the_shaker_can_not_move_is_refused() -> None:
+    for name, value, words in (("base", [9e-3] * 4, "stroke"), ("frequency", [0.5] * 4, "sine from 1")):
+        with pytest.raises(ss.errors.ModelError, match=words):
+            chapter2.rubbing({**GIVEN, "rig": {**GIVEN["rig"], name: value}}, 0)
+
+
+def test_the_shaker_can_not_overcome_the_dry_rubber() -> None:
+    bearing = GIVEN["bearing"]
+    needed = [4 * times * bearing["kinetic"] / (math.pi * bearing["stiffness"]) for times in (50, 20)]
+    assert needed == pytest.approx([11.4e-3, 4.55e-3], rel=0.01)
+    law = ss.laws.Coulomb(50 * bearing["kinetic"])
+    for frequency in (3.0, 5.0, 5.52):  # 5.52 Hz: its own
+        drive = ss.drives.HarmonicBase(ss.rig.Shaker().stroke, frequency=frequency)
+        system = ss.Oscillator(mass=bearing["mass"], stiffness=bearing["stiffness"], law=law, drive=drive)
+        assert np.ptp(ss.simulate(system, cycles=40).sample(np.linspace(38, 40, 400) / frequency, ("x",))[0]) < 1e-9
+
+
+def test_the_rig_moves_alike_in_all_conditions() -> None:
+    moved = [np.ptp(chapter7.record_of(GIVEN, *condition)["x"]) / 2 for condition in chapter7.CONDITIONS]
+    assert moved == pytest.approx([GIVEN["squeak"]["amplitude"]] * 4, rel=0.07)
+
+
+def test_both_frictions_have_one_level() -> None:
+    for case in range(4):
+        _, computed, felt = chapter2.both(GIVEN, chapter2.rubbing(GIVEN, case))
+        levels = [np.median(np.abs(values[400:-400])) for values in (computed, felt)]
+        assert levels[1] / levels[0] == pytest.approx(1.0, abs=0.05)
+
+
+def test_the_fourth_case_sticks() -> None:
+    shares = [ss.find_sticks(chapter2.balanced(GIVEN, case)).share.value for case in range(4)]
+    assert shares[:3] == [0.0, 0.0, 0.0]
+    assert shares[3] > 0.05
 
 
 def test_the_printed_wavelet_has_its_peak_at_minus_the_centre() -> None:

@@ -3,7 +3,7 @@
 import os
 import sys
 
-from stickslip.cli.interrupted import INTERRUPTED, SENTENCE
+from stickslip.errors import INTERRUPTED, INTERRUPTION
 
 
 def main() -> None:
@@ -15,7 +15,7 @@ def main() -> None:
 
         program(prog_name="stickslip")
     except KeyboardInterrupt:
-        print(SENTENCE, file=sys.stderr)
+        print(INTERRUPTION, file=sys.stderr)
         sys.exit(INTERRUPTED)
 
 

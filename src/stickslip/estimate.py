@@ -334,9 +334,10 @@ class Result:
         """
         import pandas as pd
 
-        names = [each.name for each in self.estimates]
+        names = [estimate.name for estimate in self.estimates]
         rows = [
-            (each.value, *each.interval, each.sd, each.unit, each.method, str(each.status)) for each in self.estimates
+            (estimate.value, *estimate.interval, estimate.sd, estimate.unit, estimate.method, str(estimate.status))
+            for estimate in self.estimates
         ]
         return pd.DataFrame(rows, index=pd.Index(names, name="quantity"), columns=COLUMNS)
 
@@ -361,9 +362,9 @@ def table_of(title: str, estimates: Iterable[Estimate]) -> str:
     """Estimates as a table in HTML; what speaks against some of them stands once, below."""
     reasons: dict[str, int] = {}
     rows = []
-    for each in estimates:
-        marks = [str(reasons.setdefault(doubt.words, len(reasons) + 1)) for doubt in doubts_of(each.status)]
-        rows.append((*each.cells, " ".join(marks), each.method))
+    for estimate in estimates:
+        marks = [str(reasons.setdefault(doubt.words, len(reasons) + 1)) for doubt in doubts_of(estimate.status)]
+        rows.append((*estimate.cells, " ".join(marks), estimate.method))
     return html_table(
         title,
         ("quantity", "value", "95 % interval", "", "method"),
@@ -383,7 +384,7 @@ def plain(value: Any) -> Any:
     if hasattr(value, "to_dict"):
         return value.to_dict()
     if is_dataclass(value):
-        return {each.name: plain(getattr(value, each.name)) for each in fields(value)}
+        return {field.name: plain(getattr(value, field.name)) for field in fields(value)}
     return value
 
 

@@ -163,7 +163,7 @@ def _of_orbit(orbit: ss.solve.SteadyState) -> str:
             f"{1e3 * orbit.transition_speed:.2f} mm/s.")  # fmt: skip
 
 
-def _imposed(law: Any, memory: tuple[str, ...] = ()) -> tuple[Array, dict[str, Array]]:
+def imposed(law: Any, memory: tuple[str, ...] = ()) -> tuple[Array, dict[str, Array]]:
     """A contact under an imposed motion x = -cos t, from turn to turn: a mass that no contact can move, on a moving
     counter-face."""
     drive = ss.drives.MultiTone([(1.0, 1 / (2 * math.pi), 0.0)], on="face")
@@ -186,11 +186,11 @@ def _schematics(given: Given) -> Iterator[Plate]:
     soft = given["schematic"]
     words = (f"Computed, not sketched: the model under an imposed motion, with a contact so soft that 2f_k/K_y is "
              f"{2 / soft['stiffness']:.2g} of the amplitude. ")  # fmt: skip
-    time, motion = _imposed(ss.laws.CompliantContact(1.0, stiffness=soft["stiffness"]))
+    time, motion = imposed(ss.laws.CompliantContact(1.0, stiffness=soft["stiffness"]))
     yield figure("3.2", _hypothetical(time, motion), words.strip())
     for number, axis, label in (("3.3", "x", "x / X_m"), ("3.4", "v", "ẋ / ωX_m")):
         yield figure(number, _phases(motion, axis, label), _corners(number, soft["stiffness"], words))
-    _, over = _imposed(ss.laws.CompliantContact(1.0, stiffness=soft["stiffness"], static=soft["static"]))
+    _, over = imposed(ss.laws.CompliantContact(1.0, stiffness=soft["stiffness"], static=soft["static"]))
     for number, axis, label in (("3.5", "x", "x / X_m"), ("3.6", "v", "ẋ / ωX_m")):
         yield figure(
             number,
@@ -235,13 +235,18 @@ def _phases(motion: Mapping[str, Array], axis: str, label: str) -> Any:
     return drawn
 
 
-@styled
-def _stribeck(soft: Mapping[str, float]) -> Any:
-    """Figure 3.7: friction that falls with the sliding speed, rigid and behind a compliant contact."""
+def stribeck_behind_a_spring(soft: Mapping[str, float]) -> tuple[Array, Array, dict[str, Array]]:
+    """Speeds, friction that falls with them, and the motion of a compliant contact with it."""
     speed = np.linspace(0, 1.2, 241)
     friction = 1 + (soft["static"] - 1) * np.exp(-((speed / soft["stribeck_speed"]) ** 2))
     law = ss.laws.InSeries(ss.laws.Tabulated(speed, friction), stiffness=soft["stiffness"], damping=soft["damping"])
-    _, motion = _imposed(law)
+    return speed, friction, imposed(law)[1]
+
+
+@styled
+def _stribeck(soft: Mapping[str, float]) -> Any:
+    """Figure 3.7: friction that falls with the sliding speed, rigid and behind a compliant contact."""
+    speed, friction, motion = stribeck_behind_a_spring(soft)
     drawn, axes = panels(1, 3, height=2.6)
     axes[0].plot(np.concatenate([-speed[::-1], speed]), np.concatenate([-friction[::-1], friction]), color=ORANGE)
     axes[0].set(xlabel="v_r / ωX_m", ylabel="f / f_k")

@@ -124,9 +124,20 @@ def base_of_state_variable(given: Given, case: int) -> float | None:
 
 
 @functools.lru_cache(8)
-def _free(mass: float, spring: float, law: Any, release: float) -> ss.Record:
-    run = ss.simulate(ss.Oscillator(mass=mass, stiffness=spring, law=law), start={"x": release}, duration=1.2)
-    return ss.Rig().measure(run, fs=4000, rng=3)
+def _released(mass: float, spring: float, law: Any, release: float) -> ss.solve.Trajectory:
+    return ss.simulate(ss.Oscillator(mass=mass, stiffness=spring, law=law), start={"x": release}, duration=1.2)
+
+
+@functools.lru_cache(8)
+def _free(*released: Any) -> ss.Record:
+    return ss.Rig().measure(_released(*released), fs=4000, rng=3)
+
+
+def turns_of_release(given: Given) -> list[float]:
+    """Where [m] the released mass turns: the release, and where each microstick begins."""
+    told = given["stick_slip"]
+    run = _released(told["mass"], told["spring"], _contact(given, told["case2"]), told["release"])
+    return [told["release"], *(piece.state["x"] for piece in run.pieces if piece.mode == "microstuck")]
 
 
 def free_vibration(given: Given) -> tuple[Array, Array, Array]:

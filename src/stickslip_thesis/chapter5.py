@@ -51,11 +51,7 @@ def plates(given: Given) -> Iterator[Plate]:
         "to which equation 5.4 belongs.",
     )
     yield figure("5.2", _windows(), "Each box is as long and as wide as its window's deviations in time and frequency.")
-    time = np.arange(2048) / 1024
-    impulse = np.where(np.arange(2048) == 1024, 1.0, 0.0)
-    tone = np.sin(2 * math.pi * 12 * time) + 10 * impulse
-    for number, signal, low in (("5.3", impulse, 8.0), ("5.4", tone, 4.0)):
-        record = ss.Record.of({"a": signal}, fs=1024)
+    for number, record, low in zip(("5.3", "5.4"), signals(), (8.0, 4.0), strict=True):
         yield figure(number, _contours(given, record, (low, 256.0)), "The signal's rate and amplitude are ours.")
     words = "Contours over 80 dB, 18 of them, as in the thesis. "
     for number, kind, remark in (
@@ -75,6 +71,14 @@ def plates(given: Given) -> Iterator[Plate]:
             f"Up to 1 kHz over a span of 120 dB: in each stick {slips.per_stick.value:.0f} micro-slips show as spikes"
             f"{', where the thesis has none' if kind == 'case1' else ''}.",
         )
+
+
+def signals() -> tuple[ss.Record, ss.Record]:
+    """An impulse, and a tone of 12 Hz with one: both after one of two seconds."""
+    time = np.arange(2048) / 1024
+    impulse = np.where(np.arange(2048) == 1024, 1.0, 0.0)
+    tone = np.sin(2 * math.pi * 12 * time) + 10 * impulse
+    return ss.Record.of({"a": impulse}, fs=1024), ss.Record.of({"a": tone}, fs=1024)
 
 
 def accelerations(given: Given, kind: str) -> ss.Record:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import importlib
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -14,7 +14,9 @@ from stickslip import __version__
 from stickslip.figures.plate import Plate
 from stickslip.story.folder import check_folder, results_folder, write_figures
 from stickslip.story.page import templates
+from stickslip.workers import processors, workers
 from stickslip_thesis.drawing import caption_of
+from stickslip_thesis.observations import Seen, seen
 from stickslip_thesis.printed import CHANGED as CHANGED
 from stickslip_thesis.printed import MEANINGS, Given, Number, Ours, Table, given, judged, tables
 from stickslip_thesis.starting import starts
@@ -49,6 +51,8 @@ class Chapter:
         What it starts from: sections of given.toml.
     plates : tuple of Plate
         Its figures.
+    seen : tuple of Seen
+        What the text says that one should see in them, ticked where ours shows it.
     """
 
     name: str
@@ -56,6 +60,12 @@ class Chapter:
     start: Given
     tables: tuple[tuple[Table, list[list[tuple[float | None, str]]]], ...]
     plates: tuple[Plate, ...] = ()
+    seen: tuple[Seen, ...] = ()
+
+    def seen_in(self, plate: Plate) -> list[Seen]:
+        """The observations of a figure, told where the first of their figures stands."""
+        number = plate.title.removeprefix("Figure ")
+        return [one for one in self.seen if one.observation.figures[:1] == (number,)]
 
     @property
     def counts(self) -> Counter[str]:
@@ -90,7 +100,8 @@ def run_chapter(name: str, *, start: Given | None = None, draw: bool = True, tel
         if tell:
             tell(f"chapter {name}, {drawn.title.lower()}", len(plates))
     verdicts = tuple((table, judged(table, ours)) for table in tables() if table.chapter == name)
-    return Chapter(name, module.TITLE, {each: start[each] for each in module.STARTS_FROM}, verdicts, tuple(plates))
+    begins = {section: start[section] for section in module.STARTS_FROM}
+    return Chapter(name, module.TITLE, begins, verdicts, tuple(plates), seen(name, start) if draw else ())
 
 
 def module_of(name: str) -> ModuleType:
@@ -102,10 +113,8 @@ def reproduce(chapters: Sequence[str], *, folder: Path | None, tell: Tell) -> tu
     """Run chapters and, given a folder, write page, figures and results.json there, whole or not at all."""
     if folder is not None:
         check_folder(folder)
-    done = []
-    for place, name in enumerate(chapters):
-        tell(f"chapter {name}, numbers", place)
-        done.append(run_chapter(name, draw=folder is not None, tell=_at(tell, place)))
+    run = _run_apart if folder is not None and len(chapters) > 1 else _run_here
+    done = run(chapters, folder is not None, tell)
     if folder is not None:
         tell("writing the page", len(chapters))
         with results_folder(folder, results(done)) as draft:
@@ -116,9 +125,54 @@ def reproduce(chapters: Sequence[str], *, folder: Path | None, tell: Tell) -> tu
     return tuple(done)
 
 
-def _at(tell: Tell, place: int) -> Tell:
-    """The progress of a chapter, which counts as one."""
-    return lambda words, _: tell(words, place)
+def _run_here(chapters: Sequence[str], draw: bool, tell: Tell) -> list[Chapter]:
+    """Each in this process, its figures told one by one."""
+    start = given()
+    return [
+        run_chapter(name, start=start, draw=draw, tell=lambda words, _, place=place: tell(words, place))
+        for place, name in enumerate(chapters)
+    ]
+
+
+def _run_apart(chapters: Sequence[str], draw: bool, tell: Tell) -> list[Chapter]:
+    """Each in one of as many processes as there are processors, the longest ones, which stand last, begun first."""
+    count = min(len(chapters), processors())
+    start, done = given(), []
+    tell(f"{len(chapters)} chapters", 0)
+    with workers(count, __name__) as over:
+        jobs = [(name, start, draw) for name in reversed(chapters)]
+        for place, chapter in enumerate(over(_rendered, jobs)):
+            done.append(chapter)
+            tell(f"chapter {chapter.name}", place + 1)
+    return done[::-1]
+
+
+@dataclass(frozen=True, eq=False)
+class Rendered(Plate):
+    """A figure as its images, which pass from one process to another."""
+
+    vector: str = ""
+    image: bytes = b""
+
+    def svg(self) -> str:
+        """As it was drawn."""
+        return self.vector
+
+    def png(self) -> bytes:
+        """As it was drawn."""
+        return self.image
+
+
+def _rendered(job: tuple[str, Given, bool]) -> Chapter:
+    """A chapter, its figures drawn."""
+    name, start, draw = job
+    chapter = run_chapter(name, start=start, draw=draw)
+    plates = (Rendered(one.name, _elsewhere, one.title, one.caption, one.svg(), one.png()) for one in chapter.plates)
+    return replace(chapter, plates=tuple(plates))
+
+
+def _elsewhere() -> Any:
+    raise RuntimeError("this figure was drawn in another process, and is kept as its images")
 
 
 def results(chapters: Sequence[Chapter]) -> dict[str, Any]:
@@ -128,7 +182,21 @@ def results(chapters: Sequence[Chapter]) -> dict[str, Any]:
         "chapters": {chapter.name: chapter.title for chapter in chapters},
         "verdicts": {verdict: total[verdict] for verdict in VERDICTS},
         "numbers": [entry for chapter in chapters for entry in chapter.entries()],
+        "seen": [_plain(one) for chapter in chapters for one in chapter.seen],
     }
+
+
+def _plain(one: Seen) -> dict[str, Any]:
+    told = one.observation
+    return {
+        "section": told.section, "figures": list(told.figures), "says": told.says, "measure": told.measure,
+        "values": list(one.values), "seen": one.shown, "why": told.why,
+    }  # fmt: skip
+
+
+def holds(found: dict[str, Any]) -> bool:
+    """Whether every verdict holds, and everything is seen that should be."""
+    return not found["verdicts"][CHANGED] and all(one["seen"] == (not one["why"]) for one in found["seen"])
 
 
 def render(chapters: Sequence[Chapter]) -> str:

@@ -113,18 +113,18 @@ class Table:
 @functools.cache
 def tables() -> tuple[Table, ...]:
     """Every printed number, table by table."""
-    return tuple(_table(entry) for entry in _read("numbers.toml")["table"])
+    return tuple(_table(entry) for entry in read("numbers.toml")["table"])
 
 
 def given() -> dict[str, dict[str, Any]]:
     """What the chapters start from."""
-    return _read("given.toml")
+    return read("given.toml")
 
 
 @functools.cache
 def captions() -> Mapping[str, str]:
     """What each of the thesis's figures shows, in our words."""
-    return _read("captions.toml")
+    return read("captions.toml")
 
 
 def judged(table: Table, ours: Ours) -> list[list[tuple[float | None, str]]]:
@@ -179,5 +179,6 @@ def _number(label: str, printed: str, told: Mapping[str, Any]) -> Number:
     return Number(label, printed, told.get("verdict", SAME), told.get("instead"), tolerance, told.get("why", ""))
 
 
-def _read(name: str) -> dict[str, Any]:
+def read(name: str) -> dict[str, Any]:
+    """A data file that lies beside the chapters."""
     return tomllib.loads((HERE / name).read_text("utf-8"))

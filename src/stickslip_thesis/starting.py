@@ -18,6 +18,7 @@ UNITS = {
     "mass": "kg", "stiffness": "N/m", "spring": "N/m", "damping": "N s/m", "contact_damping": "N s/m", "kinetic": "N",
     "friction": "N", "heavy": "N", "light": "N", "load": "N", "blow": "N", "release": "m", "resolution": "m",
     "amplitude": "m", "base": "m", "forced_base": "m", "dry": "m", "estimated_dry": "m", "speed": "m/s",
+    "mounting_frequency": "Hz", "reflector": "Hz", "microphone": "m", "room": "dB", "radiator": "m^2",
     "gravity": "m/s^2", "fs": "Hz", "frequency": "Hz", "forced": "Hz", "transition": "Hz", "phase": "rad",
     "natural": "rad/s", "rate": "1/(N s)", "steepness": "s/m", "constant": "s", "hold": "s", "lag": "s",
 }  # fmt: skip
@@ -26,7 +27,9 @@ LETTERS = {
     "kinetic": "kinetic friction", "static": "static friction", "base": "amplitude of the base",
     "forced_base": "amplitude of the base, forced", "forced": "frequency, forced",
     "natural": "natural angular frequency", "steps": "steps between the extremes",
-    "heavy": "heavier load", "light": "lighter load",
+    "heavy": "heavier load", "light": "lighter load", "reflector": "bending of the reflector's beam",
+    "microphone": "distance of the microphone", "room": "level of the room", "radiator": "area of the radiator",
+    "mounting_share": "share of the mounting", "mounting_frequency": "frequency on the mounting",
 }  # fmt: skip
 
 

@@ -10,8 +10,7 @@ from typing import Any, Protocol, cast
 
 import numpy as np
 
-from stickslip.answers.asked import Asked
-from stickslip.answers.findings import BY_DECREMENTS, Comparison, Findings, record_name, require_several
+from stickslip.answers.findings import BY_DECREMENTS, Asked, Comparison, Findings, record_name, require_several
 from stickslip.answers.mistakes import mistakes_of_decay
 from stickslip.decay.answer import DecayFit, rig_units
 from stickslip.decay.decrement import Decrement, decrement
@@ -129,7 +128,11 @@ class Decay(Result):
     @property
     def viscous_residual(self) -> float | None:
         """What viscous damping alone leaves of the motion, over what it leaves together with dry friction (RMS)."""
-        fits = {} if self.motion is None else {each.name: each.fitted for each in self.motion.choice.candidates}
+        fits = (
+            {}
+            if self.motion is None
+            else {candidate.name: candidate.fitted for candidate in self.motion.choice.candidates}
+        )
         if not {"viscous", "both"} <= set(fits) or fits["both"].cost == 0:
             return None
         return math.sqrt(fits["viscous"].cost / fits["both"].cost)
@@ -158,7 +161,7 @@ class Decay(Result):
         """
         dry = self.best.dry_displacement
         fits = self.waveform.motions if self.waveform is not None and self.waveform.motions else ()
-        tried = [each.choice for each in fits or ([] if self.motion is None else [self.motion])]
+        tried = [fit.choice for fit in fits or ([] if self.motion is None else [self.motion])]
         without = [
             len(tried) * min(choice.candidate(each.name).p_value for choice in tried)
             for each in (tried[0].candidates if tried else ())
@@ -189,7 +192,7 @@ class Decay(Result):
         elif self.waveform is None:
             found += self.best.estimates
         else:
-            found += [each for each in self.waveform.estimates if each is not self.waveform.dry_force]
+            found += [estimate for estimate in self.waveform.estimates if estimate is not self.waveform.dry_force]
             found += [] if self.waveform.motions else self.whichever
         other = self._other_ratio
         return tuple(each for each in found if each is not other)
@@ -234,9 +237,9 @@ def analyze_decay(
 ) -> Findings:
     """How much viscous and how much dry friction does a free decay show, by every way of asking?
 
-    The check-up, the releases (:func:`find_releases`), the whole waveform (:func:`fit_decay`), the decrements of the
-    extremes (:func:`decrement`), which motion it was (:func:`choose_motion`) and, for comparison, what older methods
-    say. A question that can not be answered becomes a note while another can.
+    The releases (:func:`find_releases`), the whole waveform (:func:`fit_decay`), the decrements of the extremes
+    (:func:`decrement`), which motion it was (:func:`choose_motion`) and, for comparison, what older methods say. A
+    question that can not be answered becomes a note while another can.
 
     Parameters
     ----------
@@ -274,6 +277,23 @@ def analyze_decay(
     (0.032, 0.2)
     """
     require_record(record)
+    _require_method(method, restoring)
+    releases = find_releases(record, channel=channel)
+    first = releases.ring_downs[0]
+    # a hold before the release is no drift
+    faults = tuple(fault for fault in record.check() if (fault.kind, fault.channel) != ("drift", first.channel))
+    asked, constants = Asked(list(releases.notes)), _constants(first.channel, mass=mass, stiffness=stiffness)
+    way: dict[str, Any] = {"channel": first.channel, "restoring": restoring}
+    decay = _by_every_way(record, releases, asked, method, way, constants)
+    slips = mistakes_of_decay(
+        first.channel, abs(first.amplitude), decay.best.frequency.value, decay.mass, decay.stiffness
+    )
+    notes, settings = tuple(dict.fromkeys(asked.notes)), {"method": method, **way, **constants}
+    results = {"decay": decay, "slips": slips}
+    return Findings(record_name(record), record, faults, notes=notes, settings=settings, results=results)
+
+
+def _require_method(method: str, restoring: Restoring) -> None:
     if method not in METHODS:
         raise EstimateError(f"method = '{method}'", f"it is {', '.join(METHODS)}", "choose one of them")
     if restoring == "pendulum" and method == "thesis":
@@ -282,35 +302,28 @@ def analyze_decay(
             "the decrements of the extremes hold for a linear spring",
             "choose method = 'waveform', or ask extreme_decay(record)",
         )
-    releases = find_releases(record, channel=channel)
-    used, displaced = releases.ring_downs[0].channel, releases.ring_downs[0].order == 0
-    faults = tuple(each for each in record.check() if (each.kind, each.channel) != ("drift", used))  # a hold is none
-    constants = _constants(used, mass=mass, stiffness=stiffness)
-    asked = Asked(list(releases.notes))
+
+
+def _by_every_way(
+    record: Record, releases: Releases, asked: Asked, method: str, way: dict[str, Any], constants: dict[str, Any]
+) -> Decay:
+    """What the whole waveform, the decrements and the older methods say, as far as `method` asks them."""
+    linear, displaced = way["restoring"] == "linear", releases.ring_downs[0].order == 0
     waveform = thesis = motion = refusal = None
     if method != "thesis":
-        way: dict[str, Any] = {"channel": used, "restoring": restoring}
         waveform, motion, refusal = _by_waveform(record, asked, way, constants, displaced=displaced)
-    if method != "waveform" and restoring == "linear":
-        thesis = asked.ask("The decrements", partial(decrement, record, channel=used))
-    last = asked.refusals[-1:]
-    ways = {} if method != "all" or not displaced else OLDER if restoring == "linear" else FOR_PENDULUMS
-    older = {
-        name: found
-        for name, way in ways.items()
-        if (found := asked.ask(name.capitalize(), partial(way, record, channel=used))) is not None
+    if method != "waveform" and linear:
+        thesis = asked.ask("The decrements", partial(decrement, record, channel=way["channel"]))
+    refusals = asked.refusals[-1:]
+    methods = {} if method != "all" or not displaced else OLDER if linear else FOR_PENDULUMS
+    answers = {
+        name: asked.ask(name.capitalize(), partial(older, record, channel=way["channel"]))
+        for name, older in methods.items()
     }
-    if waveform is None and thesis is None and motion is None and (restoring == "linear" or not older):
-        raise last[0]
-    decay = Decay(releases, waveform, thesis, motion, older, refusal=refusal, **constants)
-    settings = {"method": method, "channel": used, "restoring": restoring, **constants}
-    notes = tuple(dict.fromkeys(asked.notes))
-    first = releases.ring_downs[0]
-    slips = mistakes_of_decay(
-        used, abs(first.amplitude), decay.best.frequency.value, constants.get("mass"), constants.get("stiffness")
-    )
-    results = {"decay": decay, "slips": slips}
-    return Findings(record_name(record), record, faults, notes=notes, settings=settings, results=results)
+    older = {name: answer for name, answer in answers.items() if answer is not None}
+    if waveform is None and thesis is None and motion is None and (linear or not older):
+        raise refusals[0]
+    return Decay(releases, waveform, thesis, motion, older, refusal=refusal, **constants)
 
 
 def _constants(channel: str, **stated: Constant | None) -> dict[str, Any]:
@@ -372,12 +385,11 @@ def compare_decays(findings: Sequence[Findings]) -> Comparison:
     Returns
     -------
     Comparison
-        Its results are ``damping_ratio``, ``dry_displacement``, ``frequency`` and ``dry_force`` of all records: of the
-        joint fit, or the means over the records with intervals that hold their scatter; ``joint``, the
-        :class:`~stickslip.decay.DecayFit` to all releases with one frequency and one friction, or None where the
-        records are not alike or can not be fitted together; what it alone gives, ``static_displacement``,
-        ``damping_ratio_any`` and ``dry_displacement_any`` (whichever motion it was); and ``apart``, by how many times
-        what their own intervals allow the records differ, of each quantity in which they are not alike.
+        Its results are ``damping_ratio``, ``dry_displacement``, ``frequency`` and ``dry_force`` of all records;
+        ``joint``, the :class:`~stickslip.decay.DecayFit` to all releases, or None; what it alone gives,
+        ``static_displacement``, ``damping_ratio_any`` and ``dry_displacement_any`` (whichever motion it was); and
+        ``apart``, of each quantity in which the records are not alike, by how many times what their own intervals
+        allow they differ.
 
     Raises
     ------
@@ -404,8 +416,8 @@ def compare_decays(findings: Sequence[Findings]) -> Comparison:
     mixed = [key for key, values in ways.items() if len(set(values)) > 1]
     joint = None
     if mixed:
-        said = "; ".join(f"{key} is {' and '.join(map(str, dict.fromkeys(ways[key])))}" for key in mixed)
-        asked.notes.append(f"The records are not fitted together: {said}.")
+        differ = "; ".join(f"{key} is {' and '.join(map(str, dict.fromkeys(ways[key])))}" for key in mixed)
+        asked.notes.append(f"The records are not fitted together: {differ}.")
     elif not apart and all(each.decay.best is each.decay.waveform for each in findings):
         way = {key: values[0] for key, values in ways.items()}
         joint = asked.ask("All records at once", lambda: _jointly(findings, way))
@@ -426,7 +438,7 @@ def _jointly(findings: Sequence[Findings], way: dict[str, Any]) -> DecayFit:
     """All releases at once, with the intervals that hold whichever motion no record speaks against."""
     joint = fit_decay([each.record for each in findings], **way)
     waveforms = [each.decay.waveform for each in findings]
-    motions = [() if each is None else each.motions for each in waveforms]
+    motions = [() if waveform is None else waveform.motions for waveform in waveforms]
     if not all(motions):
         return joint
     choices = [motion.choice for each in motions for motion in each]

@@ -185,12 +185,11 @@ def plan_experiment(
 ) -> ExperimentPlan:
     """Which sensors, and how many samples a second, are needed for which accuracy?
 
-    The rig measures the motion again and again, with noise of its own each time; every record is asked what a rig is
-    built for, with what a calibration would say of the sensors stated (:meth:`Rig.stated`), and every answer is held
-    against the truth: how late the displacement is (:func:`sensor_delay`, the mount stated), the friction at each
-    moment (:func:`friction_force`, all sensors together), its level (:func:`friction_loops`) and the contact's
-    stiffness (:func:`contact_stiffness`). All of it with each rate, with and without the accelerometer and the load
-    cell.
+    The rig measures the motion again and again, each time with noise of its own, at each rate, with and without the
+    accelerometer and the load cell. Every record is asked what a rig is built for, its sensors stated as a calibration
+    would (:meth:`Rig.stated`), and the answers are held against the truth: how late the displacement is
+    (:func:`sensor_delay`), the friction at each moment (:func:`friction_force`) and its level (:func:`friction_loops`),
+    the contact's stiffness (:func:`contact_stiffness`).
 
     Parameters
     ----------
@@ -232,16 +231,9 @@ def plan_experiment(
     ('x', 'z', 'load')
     """
     rig = rig or Rig()
-    if not isinstance(run.system, Oscillator):
-        raise ModelError("a run of several masses", "an experiment is planned for one mass", "simulate an Oscillator")
-    if "x" not in (sensor.channel for sensor in rig.sensors):
-        raise ModelError("a rig that does not sense x", "every question needs the displacement", "add a sensor for x")
-    if shaker is not None:
-        _require_reach(run.system, shaker)
-    if draws < 1 or not len(rates):
-        raise ModelError(f"{draws} draws of {len(rates)} rates", "one of each is needed at least", "give more")
-    for fs in rates:
-        finite("fs", fs, unit="Hz", positive=True)
+    _require_sensed(run, rig)
+    _require_reach(run, shaker)
+    _require_some(draws, rates)
     setups = []
     for number, fs in enumerate(sorted(rates)):
         tried: dict[tuple[str, ...], list[dict[str, _Answer]]] = {}
@@ -257,11 +249,26 @@ def plan_experiment(
     return ExperimentPlan(tuple(setups), draws, seed)
 
 
-def _require_reach(system: Oscillator, shaker: Shaker) -> None:
+def _require_sensed(run: Trajectory, rig: Rig) -> None:
+    if not isinstance(run.system, Oscillator):
+        raise ModelError("a run of several masses", "an experiment is planned for one mass", "simulate an Oscillator")
+    if "x" not in (sensor.channel for sensor in rig.sensors):
+        raise ModelError("a rig that does not sense x", "every question needs the displacement", "add a sensor for x")
+
+
+def _require_reach(run: Trajectory, shaker: Shaker | None) -> None:
     """Refuse a motion of the base that the shaker can not make, with the spring at its largest stretch."""
-    drive = system.drive
-    if isinstance(drive, HarmonicBase):  # a mass that stands still, as a stick leaves it, pulls with the amplitude
+    system, drive = run.system, run.system.drive
+    # a mass that stands still, as a stick leaves it, pulls with the amplitude
+    if shaker is not None and isinstance(system, Oscillator) and isinstance(drive, HarmonicBase):
         shaker.require(drive.frequency, drive.amplitude, pull=system.stiffness * drive.amplitude)
+
+
+def _require_some(draws: int, rates: Sequence[float]) -> None:
+    if draws < 1 or not len(rates):
+        raise ModelError(f"{draws} draws of {len(rates)} rates", "one of each is needed at least", "give more")
+    for fs in rates:
+        finite("fs", fs, unit="Hz", positive=True)
 
 
 def _choices(record: Record) -> Iterator[tuple[str, ...]]:
@@ -336,7 +343,7 @@ def _asked(truth: float, error: Callable[[], Array | float]) -> _Answer:
 
 def _accuracies(answers: Sequence[Mapping[str, _Answer]]) -> dict[str, Accuracy]:
     """All draws together, by question."""
-    return {question: _accuracy([each[question] for each in answers], UNITS[question]) for question in answers[0]}
+    return {question: _accuracy([answer[question] for answer in answers], UNITS[question]) for question in answers[0]}
 
 
 def _accuracy(answers: Sequence[_Answer], unit: str) -> Accuracy:

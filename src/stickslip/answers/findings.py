@@ -1,18 +1,20 @@
-"""What was found: of one record every answer by its name, of several what they tell together."""
+"""What was found: of one record every answer by name, and why some have none; of several what they tell together."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any, Self, TypeVar
 
-from stickslip.errors import EstimateError
+from stickslip.errors import EstimateError, ModelError, StickslipError
 from stickslip.estimate import UNTRIED, Doubt, Estimate, Result, Status, doubts_of, kinds, stands
 from stickslip.printing import html_table
 from stickslip.record.record import Record
 
 if TYPE_CHECKING:
     from stickslip.record.check import Fault
+
+Answer = TypeVar("Answer")
 
 # Answers that may be unsure as wholes, and what they are called then.
 WHOLES = {
@@ -29,6 +31,30 @@ NOT_TRIED = Doubt("not tried on twins: rigs that never stick, that slide at one 
                   "to do so as well", UNTRIED)  # fmt: skip
 ONSETS = ("sticks", "breakaway", "presliding")  # when it sticks, and what it does until it slips
 BY_DECREMENTS = ", by decrements"  # behind the name of a number that another method gave already
+
+
+@dataclass(frozen=True)
+class Asked:
+    """What came of the questions so far: notes in words, and the errors behind those that failed.
+
+    A question aside (how late a sensor is, whether two forces agree) helps the others along. Where it has no answer
+    they are asked without it, and it is no reason why a record tells nothing.
+    """
+
+    notes: list[str] = field(default_factory=list)
+    refusals: list[StickslipError] = field(default_factory=list)
+
+    def ask(self, question: str, answer: Callable[[], Answer], *, aside: bool = False) -> Answer | None:
+        """The answer; where the record can not give one, None and a note."""
+        try:
+            return answer()
+        except ModelError:
+            raise
+        except StickslipError as error:
+            self.notes.append(f"{question}: {error}")
+            if not aside:
+                self.refusals.append(error)
+            return None
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -112,10 +138,10 @@ class Findings(Answers):
         loops = self.results.get("loops")
         return loops and self._over_load(loops.slope, "s/m", "slope of the friction coefficient against speed")
 
-    def _over_load(self, found: Estimate | None, unit: str, name: str) -> Estimate | None:
-        if found is None or self.normal is None or self.level is None or self.level.unit != "N":
+    def _over_load(self, estimate: Estimate | None, unit: str, name: str) -> Estimate | None:
+        if estimate is None or self.normal is None or self.level is None or self.level.unit != "N":
             return None
-        return found.scaled(1 / self.normal, unit, name)
+        return estimate.scaled(1 / self.normal, unit, name)
 
     @property
     def estimates(self) -> tuple[Estimate, ...]:
@@ -182,7 +208,7 @@ class Comparison(Answers):
             (each.name, next(iter(each.quoted), None) if each.level is None else each.level) for each in self.findings
         ]
         rows = [(name, *(each.cells if each is not None else ("", "", ""))) for name, each in first]
-        rows += [("together", *each.cells) for each in self.estimates]
+        rows += [("together", *estimate.cells) for estimate in self.estimates]
         return html_table("Comparison", ("record", "quantity", "value", "95 % interval"), rows)
 
 
@@ -230,7 +256,7 @@ def _each(found: Any, change: Callable[[Estimate], Estimate]) -> Any:
     """An answer with each of its numbers changed, but for that of the drive."""
     if found is None:
         return None
-    numbers = {each.name: getattr(found, each.name) for each in fields(found)}
+    numbers = {field.name: getattr(found, field.name) for field in fields(found)}
     return replace(
         found,
         **{

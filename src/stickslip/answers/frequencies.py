@@ -84,7 +84,7 @@ class TimeFrequency(Result):
     def estimates(self) -> tuple[Estimate, ...]:
         """Every number found in the sticks, and after the slips begin."""
         answers = (self.transition, self.microslips, self.slip_ringing)
-        return tuple(each for answer in answers if answer is not None for each in answer.estimates)
+        return tuple(estimate for answer in answers if answer is not None for estimate in answer.estimates)
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON: the answers, not the map."""
@@ -126,9 +126,9 @@ def time_frequency(
     source : Record or iterable of Record
         At one rate; or the parts of a long one in order, as :func:`read_blocks` yields them, to be held one at a time.
     channel : str, optional
-        Which channel; the first of a, sound, force, load, friction, v, x, or any other that does not only rise or only
-        fall, as times do, when not given. The sticks are
-        asked of an acceleration, the ringing after slips begin of a measured friction beside a motion.
+        Which channel; unless given the first of a, sound, force, load, friction, v, x, or any other that does not only
+        rise or only fall, as times do. The sticks are asked of an acceleration, the ringing after slips begin of a
+        measured friction beside a motion.
     frequencies : array_like or str, optional
         As in :func:`wavelet_map`; or a range in words, "500:8000" or "0.5 kHz:8 kHz".
     wavelet_frequency : float
@@ -161,31 +161,30 @@ def time_frequency(
     ('double stick-slip', 'double stick-slip')
     """
     checked_mass(mass, stiffness)
-    if isinstance(frequencies, str):
-        frequencies = parse_range(frequencies, "Hz")
     parts = iter([source] if isinstance(source, Record) else source)
     first, second = next(parts, None), next(parts, None)
     if first is None:
         raise RecordError("no part at all", f"{QUESTION} needs one at least", "check the file")
     name = chosen_channel(first, channel)
     options: dict[str, Any] = {
-        "frequencies": frequencies, "wavelet_frequency": wavelet_frequency, "normalisation": normalisation,
+        "frequencies": parse_range(frequencies, "Hz") if isinstance(frequencies, str) else frequencies,
+        "wavelet_frequency": wavelet_frequency, "normalisation": normalisation,
     }  # fmt: skip
     if second is None and len(first) <= LONG:
+        begin, long = first, []
         wavelets = wavelet_map(first, name, **options)
-        found, notes = _spikes_and_sticks(first, name, mass, stiffness)
         ridges = tuple(find_ridges(wavelets)[:5])
-        return TimeFrequency(record_name(first), first, name, wavelets, ridges, **found, notes=tuple(notes))
-    wavelets = wavelet_overview(itertools.chain([first], () if second is None else (second,), parts), name, **options)
-    begin = first.rows(0, min(LONG, len(first)))
+    else:
+        begin = first.rows(0, min(LONG, len(first)))
+        rest = itertools.chain(() if second is None else (second,), parts)
+        wavelets, ridges = wavelet_overview(itertools.chain([first], rest), name, **options), ()
+        long = [
+            "The record is long: of the map the largest moduli of each stretch of time are kept, without ridges; "
+            f"spikes and sticks are those of its first {begin.duration:.4g} s."
+        ]
     found, notes = _spikes_and_sticks(begin, name, mass, stiffness)
-    long = (
-        "The record is long: of the map the largest moduli of each stretch of time are kept, without ridges; spikes "
-        f"and sticks are those of its first {begin.duration:.4g} s."
-    )
-    return TimeFrequency(
-        record_name(first), first if second is None else begin, name, wavelets, **found, notes=(long, *notes)
-    )
+    record = first if second is None else begin
+    return TimeFrequency(record_name(first), record, name, wavelets, ridges, **found, notes=(*long, *notes))
 
 
 def _spikes_and_sticks(
@@ -196,7 +195,7 @@ def _spikes_and_sticks(
         return {}, [f"{len(record)} samples are mapped, and too few to ask about spikes and sticks: give {LEAST}."]
     found: dict[str, Any] = {"spikes": find_spikes(record, name)}
     clocks = [each for each in record if name not in CHOSEN and _runs_on(record[each])]
-    notes = [f"Channel {each} only rises or only falls, as times do: {name} is mapped." for each in clocks[:1]]
+    notes = [f"Channel {clock} only rises or only falls, as times do: {name} is mapped." for clock in clocks[:1]]
 
     def asked(what: str, question: Callable[[], Answer]) -> Answer | None:
         try:

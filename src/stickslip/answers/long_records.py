@@ -67,36 +67,42 @@ def analyze_blocks(
     >>> round(found.level.value, 2)
     1.1
     """
-    found: list[Findings] = []
+    answered: list[Findings] = []
     refused: list[str] = []
     kept: Record | None = None
     size, number = 0, 0
     for number, block in enumerate(blocks, start=1):
+        place = f"block {number}, from {block.start:.5g} s"
         if progress is not None:
-            progress(f"block {number}, from {block.start:.5g} s")
+            progress(place)
         size += len(block)
         try:
-            each = analyze(block, rig=rig, method=method)
+            findings = analyze(block, rig=rig, method=method)
         except ModelError:
             raise
         except StickslipError as error:
-            refused.append(f"Block {number}, from {block.start:.5g} s, answers nothing: {error}")
+            refused.append(f"{place.capitalize()}, answers nothing: {error}")
             continue
         if number & (number - 1) == 0 or kept is None:  # of blocks 1, 2, 4, 8 ... the last is near the middle
-            kept, shown = each.record, f"The figures show block {number}, from {block.start:.5g} s."
-        found.append(replace(each, record=_first_row(each.record)))
+            kept, shown = findings.record, f"The figures show {place}."
+        answered.append(replace(findings, record=_first_row(findings.record)))
     if kept is None:
         raise EstimateError(
             f"none of {number} blocks answers anything" + (f"; {refused[0]}" if refused else ""),
             "a block holds some cycles of a motion, and what tells its friction",
             "see the check-up of the record",
         )
-    told = f"The record was analysed in {number} blocks, {size} samples in all; numbers are means over them. {shown}"
-    notes = [note for note, _ in Counter(note for each in found for note in each.notes).most_common()]
-    middle = found[len(found) // 2]
-    results = {name: _joined([each.results[name] for each in found], middle.results[name]) for name in middle.results}
-    faults = tuple(fault for each in found for fault in each.faults)
-    return replace(middle, record=kept, results=results, faults=faults, notes=(told, *refused, *notes))
+    blocks_told = f"The record was analysed in {number} blocks, {size} samples in all; numbers are means over them."
+    return replace(_in_one(answered, [f"{blocks_told} {shown}", *refused]), record=kept)
+
+
+def _in_one(answered: Sequence[Findings], notes: Sequence[str]) -> Findings:
+    """The findings of blocks as those of one record; notes that most blocks have come first."""
+    middle = answered[len(answered) // 2]
+    results = {key: _joined([block.results[key] for block in answered], middle.results[key]) for key in middle.results}
+    faults = tuple(fault for block in answered for fault in block.faults)
+    own = Counter(note for block in answered for note in block.notes).most_common()
+    return replace(middle, results=results, faults=faults, notes=(*notes, *(note for note, _ in own)))
 
 
 def _first_row(record: Record) -> Record:
@@ -138,15 +144,15 @@ def _mean(estimates: Sequence[Estimate]) -> Estimate:
     count = len(estimates)
     if count == 1:
         return estimates[0]
-    values = np.array([each.value for each in estimates])
-    halves = np.array([np.subtract(*each.interval[::-1]) / 2 for each in estimates])
+    values = np.array([estimate.value for estimate in estimates])
+    halves = np.array([np.subtract(*estimate.interval[::-1]) / 2 for estimate in estimates])
     mean = float(values.mean())
     own = float(np.sqrt(np.sum(halves**2))) / count
     apart = student(count - 1) * float(values.std(ddof=1)) / math.sqrt(count)
-    low, high = (float(np.mean([each.interval[end] - each.value for each in estimates])) for end in (0, 1))
+    low, high = (float(np.mean([estimate.interval[end] - estimate.value for estimate in estimates])) for end in (0, 1))
     skew = (high + low) / 2  # of an interval that is not symmetric, in which a method's own error stands
     half = max(own, apart) + abs(skew)
-    status = Counter(each.status for each in estimates).most_common(1)[0][0]
+    status = Counter(estimate.status for estimate in estimates).most_common(1)[0][0]
     checks = (f"{count} blocks, which scatter by {values.std(ddof=1):.3g}", *estimates[count // 2].checks)
     return replace(
         estimates[count // 2], value=mean, interval=(mean - half + min(skew, 0), mean + half + max(skew, 0)),

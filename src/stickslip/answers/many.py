@@ -66,7 +66,7 @@ class Row:
         """A row from plain data."""
         level = told["level"]
         return cls(**{
-            **told, "estimates": tuple(_estimate(each) for each in told["estimates"]),
+            **told, "estimates": tuple(_estimate(estimate) for estimate in told["estimates"]),
             "level": None if level is None else _estimate(level), "picture": tuple(told["picture"]),
         })  # fmt: skip
 
@@ -117,14 +117,14 @@ class Batch(Result):
         """The quantities that records answer, those of most records first."""
         often: dict[str, int] = {}
         for row in self.rows:
-            for each in row.estimates:
-                often[each.name] = often.get(each.name, 0) + (row.counts and each.known)
+            for estimate in row.estimates:
+                often[estimate.name] = often.get(estimate.name, 0) + (row.counts and estimate.known)
         return tuple(sorted(often, key=lambda name: -often[name]))
 
     def known(self, name: str) -> list[Estimate]:
         """A quantity of each record that has it, without copies of others."""
         rows = (row for row in self.rows if row.counts)
-        return [each for row in rows for each in row.estimates if each.name == name and each.known]
+        return [estimate for row in rows for estimate in row.estimates if estimate.name == name and estimate.known]
 
     def table(self) -> list[dict[str, Any]]:
         """A row a record for a spreadsheet: of each quantity the value and the ends of its 95 % interval."""
@@ -235,7 +235,7 @@ def _cells(row: Row, names: Sequence[str]) -> Iterator[tuple[str, Any]]:
         ("sha256", row.key),
     )
     yield "normal load [N]", row.normal
-    found = {each.name: each for each in row.estimates}
+    found = {estimate.name: estimate for estimate in row.estimates}
     for name in names:
         each = found.get(name)
         unit = "" if each is None or each.unit == "1" else f" [{each.unit}]"

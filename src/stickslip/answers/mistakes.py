@@ -24,20 +24,20 @@ def slipped(slips: Sequence[Slip]) -> str:
     return f"something is stated wrongly: probably {' or '.join(slip.words for slip in slips)}" if slips else ""
 
 
-def untrue(told: Consistency | None) -> str:
+def untrue(consistency: Consistency | None) -> str:
     """What of channels and constants can not all be true, in words; a clipped sensor says so itself."""
-    failed = told.failed if told is not None else ()
+    failed = consistency.failed if consistency is not None else ()
     if any("range" in check.name for check in failed):
         return ""
     apart = [check.sentence for check in failed if any(word in check.name for word in BALANCED)]
     return f"the record and the rig's constants contradict each other: {apart[0]}" if apart else ""
 
 
-def hopeless(told: Consistency | None) -> str:
+def hopeless(consistency: Consistency | None) -> str:
     """What of channels and constants can not all be true, where it is so far off that no force is worth a headline."""
-    failed = told.failed if told is not None else ()
+    failed = consistency.failed if consistency is not None else ()
     apart = [check for check in failed if any(word in check.name for word in BALANCED) and check.right]
-    return untrue(told) if any(not 1 / FAR < check.left / check.right < FAR for check in apart) else ""
+    return untrue(consistency) if any(not 1 / FAR < check.left / check.right < FAR for check in apart) else ""
 
 
 def mistakes(record: Record, rig: RigSettings, consistent: Consistency | None, loops: Loops | None) -> tuple[Slip, ...]:

@@ -83,16 +83,21 @@ def tried(
         belief = believe(findings.record, mapped=mapped)
         ask = partial(_ask, stated=belief.record.rig)
         trial = try_on_twins(belief, answers, ask, count=twins, rng=rng, progress=progress, mapped=mapped)
-    told = {
+    answered = findings.having(**_as_tried(findings, trial), trial=trial)
+    return replace(answered, notes=(*findings.notes, _note(trial)))
+
+
+def _as_tried(findings: Findings, trial: Trial) -> dict[str, Any]:
+    """The results that the trial leaves otherwise."""
+    results: dict[str, Any] = {
         "loops": _with(findings.loops, trial.estimates),
         "sticks": _with(findings.sticks, trial.estimates),
         "breakaway": _with(findings.breakaway, trial.estimates),
         "presliding": findings.presliding if findings.stiffness is not None else _yields(findings.presliding, trial),
     }
     if trial.doubt is not None:  # what was not tried rests on the same constants and channels
-        told |= {key: flagged(told.get(key, findings.results.get(key)), trial.doubt) for key in BY_FORCE}
-    answered = findings.having(**told, trial=trial)
-    return replace(answered, notes=(*findings.notes, _note(trial)))
+        results |= {key: flagged(results.get(key, findings.results.get(key)), trial.doubt) for key in BY_FORCE}
+    return results
 
 
 def _note(trial: Trial) -> str:

@@ -1,13 +1,14 @@
-"""A record made ready for the questions: sensors, delays, and its friction by the way that its channels allow."""
+"""A record made ready for the questions: repairs, sensors, delays, and friction by the way that its channels allow."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from stickslip.answers.asked import Asked
+from stickslip.answers.findings import Asked
 from stickslip.balance.felt_and_computed import ForceComparison, compare_force
 from stickslip.balance.force import friction_force
 from stickslip.balance.lag import HIDDEN, REPEATS, SensorDelay, sensor_delay
@@ -17,8 +18,16 @@ from stickslip.estimate import UNSTATED, Doubt, kinds
 from stickslip.record.channels import Channel
 from stickslip.record.flaws import constant
 from stickslip.record.record import Record, Step
-from stickslip.rig.settings import RigSettings
+from stickslip.rig.settings import RigSettings, rig_settings
 from stickslip.signals.interpolate import without_delays
+from stickslip.signals.repair import (
+    fill_gaps,
+    fill_missing,
+    remove_drift,
+    remove_spikes,
+    repair_clock,
+    restore_clipped,
+)
 
 MOTION = ("x", "v", "theta")
 USED = ("x", "z", "v", "a", "theta", "friction", "load", "force")  # channels that a question may take
@@ -28,6 +37,60 @@ STRETCH = 1 << 14  # samples from the middle in which a delay is looked for, and
 AT_ONCE = 1 << 18  # samples of which all sensors are put together unasked
 FOUND = " (found in this record)"
 SURE = 3.0  # standard deviations from which a delay is taken out
+
+
+def mend(record: Record, *, repairs: Sequence[str]) -> Record:
+    """The record after repairs, made in the order given and each logged in its history.
+
+    Parameters
+    ----------
+    record : Record
+        As read.
+    repairs : sequence of str
+        ``clock`` (:func:`repair_clock`), ``gaps`` (:func:`fill_gaps`), ``missing`` (:func:`fill_missing`), ``spikes``
+        (:func:`remove_spikes`), ``clipping`` (:func:`restore_clipped`), ``drift`` (:func:`remove_drift`). The last
+        four take a channel, as in ``drift:x``; without one they mend the channels in which the check-up finds
+        that fault.
+
+    Returns
+    -------
+    Record
+
+    Raises
+    ------
+    RecordError
+        A repair that can not be made.
+    ModelError
+        A repair that is not known.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> wave = np.sin(0.2 * np.arange(400))
+    >>> wave[100:103] = np.nan
+    >>> mended = mend(Record.of({"x": wave}, fs=100.0), repairs=["missing"])
+    >>> bool(np.isfinite(mended["x"]).all()), mended.history[-1].action
+    (True, 'fill_missing')
+    """
+    for repair in rig_settings({"repair": list(repairs)}, source="the call").repair:
+        word, _, channel = repair.partition(":")
+        if word in _WHOLE:
+            record = _WHOLE[word](record)
+            continue
+        kind, function = _PER_CHANNEL[word]
+        found = [fault.channel for fault in record.check() if fault.kind == kind and fault.channel is not None]
+        for name in [channel] if channel else dict.fromkeys(found):
+            record = function(record, name)
+    return record
+
+
+_WHOLE: dict[str, Callable[[Record], Record]] = {"clock": repair_clock, "gaps": fill_gaps}
+_PER_CHANNEL: dict[str, tuple[str, Callable[[Record, str], Record]]] = {
+    "missing": ("missing", fill_missing),
+    "spikes": ("spike", remove_spikes),
+    "clipping": ("clipped", restore_clipped),
+    "drift": ("drift", remove_drift),
+}
 
 
 @dataclass(frozen=True)
@@ -163,9 +226,7 @@ def _base_moves(record: Record, comparison: ForceComparison | None, asked: Asked
 
 
 def _constants(rig: RigSettings) -> dict[str, Any]:
-    return {
-        "mass": rig.mass, "stiffness": rig.stiffness, "damping": rig.damping or 0.0, "damper": rig.damper
-    }  # fmt: skip
+    return {"mass": rig.mass, "stiffness": rig.stiffness, "damping": rig.damping or 0.0, "damper": rig.damper}
 
 
 def _aligned(record: Record, asked: Asked) -> tuple[Record, SensorDelay | None]:

@@ -9,8 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.answers.asked import Asked
-from stickslip.answers.findings import BY_FORCE, NOT_TRIED, ONSETS, Findings, flagged, record_name, with_doubt
+from stickslip.answers.findings import BY_FORCE, NOT_TRIED, ONSETS, Asked, Findings, flagged, record_name, with_doubt
 from stickslip.answers.mistakes import missing, mistakes, slipped, untrue
 from stickslip.answers.preparation import (
     AT_ONCE,
@@ -40,7 +39,7 @@ from stickslip.errors import TOO_SHORT, EstimateError, StickslipError
 from stickslip.estimate import Constant, Doubt
 from stickslip.record.flaws import constant
 from stickslip.record.record import RIG_UNITS, Record, require_record
-from stickslip.rig.settings import RigSettings
+from stickslip.rig.settings import RigSettings, rig_settings
 from stickslip.twin.search import lacking
 
 STRETCH = 1 << 14  # samples in which the contact is fitted
@@ -228,8 +227,6 @@ QUESTIONS = (
 
 
 def _settings(rig: RigSettings | None, given: Mapping[str, Any]) -> RigSettings:
-    from stickslip.rig.settings import rig_settings
-
     return rig_settings({**(rig.model_dump(exclude_unset=True) if rig is not None else {}), **given}, source="the call")
 
 
@@ -269,7 +266,7 @@ def _stated(rig: RigSettings, *, all_of_it: bool) -> dict[str, Any]:
 
 def _nothing(name: str, record: Record, refusals: list[StickslipError]) -> EstimateError:
     value = f"{name} answers no question about friction"
-    still = [each for each in MOTION if each in record and constant(record[each])]
+    still = [channel for channel in MOTION if channel in record and constant(record[channel])]
     if still:
         return EstimateError(
             f"{value}: {unmoved(record, still[0])}",
@@ -319,7 +316,9 @@ def _reasons(
         yield NO_BASE, (*BY_FORCE, "sticks")
     if unknown:
         yield unknown, BY_FORCE
-    if unstated := [f"{name} is read as {each.unit}" for name, each in record.channels.items() if each.assumed]:
+    if unstated := [
+        f"{name} is read as {channel.unit}" for name, channel in record.channels.items() if channel.assumed
+    ]:
         yield f"nobody stated a unit: {' and '.join(unstated)}", (*BY_FORCE, "regression", "asymmetric", "pull")
     if strays := [error.value for error in refusals if error.kind == STRAYING]:
         yield f"{strays[0]}: a mass, a spring or a sensor is not as stated, or the contact no spring", ONSETS

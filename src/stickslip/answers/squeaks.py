@@ -9,20 +9,19 @@ from functools import partial
 
 import numpy as np
 
-from stickslip.answers.asked import Asked
-from stickslip.answers.findings import Comparison, Findings, record_name, require_several
+from stickslip.answers.findings import Asked, Comparison, Findings, record_name, require_several
 from stickslip.cycle.loops import NO_SLOPE, friction_loops
 from stickslip.errors import EstimateError
 from stickslip.estimate import Estimate, kinds
 from stickslip.record.record import Record, require_record
-from stickslip.squeak.bursts import HEARD, Squeaks, find_squeaks
+from stickslip.squeak.bursts import HEARD, find_squeaks
 from stickslip.squeak.couplings import coupling
 from stickslip.squeak.quality import SoundQuality, impulsiveness, sound_quality
 from stickslip.squeak.spectra import burst_spectra
+from stickslip.squeak.squeaks import Squeaks
 from stickslip.units import parse_constant, parse_range, parse_value
 
 HEARD_AT_ONCE = 5.0  # s
-OF_MEDIAN = math.sqrt(math.pi / 2)  # its standard deviation over that of the mean
 VIBRATING = (*HEARD, "torsion_velocity", "load")
 
 
@@ -83,7 +82,7 @@ def analyze_squeaks(
     asked = Asked(list(squeaks.notes))
     others = [each for each in VIBRATING if each in record and each != squeaks.channel]
     listen = partial(find_squeaks, record, frequencies=band)
-    beside = [asked.ask(f"Bursts in {each}", partial(listen, channel=each)) for each in others]
+    beside = [asked.ask(f"Bursts in {other}", partial(listen, channel=other)) for other in others]
     loops = None
     if "friction" in record and any(each in record for each in ("x", "v", "theta")):
         loops = asked.ask("Friction over the cycle", partial(friction_loops, record, contact=contact))
@@ -118,7 +117,7 @@ def _quality(record: Record, squeaks: Squeaks, asked: Asked) -> SoundQuality | N
     if record.channels[squeaks.channel].unit != "Pa" or not squeaks.bursts:
         return None
     if record.duration > HEARD_AT_ONCE:
-        loudest = max(squeaks.bursts, key=lambda each: np.nan_to_num(each.level, nan=-math.inf))
+        loudest = max(squeaks.bursts, key=lambda burst: np.nan_to_num(burst.level, nan=-math.inf))
         end = record.start + record.duration
         begin = min(max(record.start, loudest.start - HEARD_AT_ONCE / 2), end - HEARD_AT_ONCE)
         record = record.between(begin, begin + HEARD_AT_ONCE)
@@ -255,21 +254,21 @@ def compare_squeaks(findings: Sequence[Findings]) -> Comparison:
     """
     require_several(findings)
     conditions = tuple(_condition(each) for each in findings)
-    squeaking = tuple(each.name for each in conditions if each.squeaks)
+    squeaking = tuple(condition.name for condition in conditions if condition.squeaks)
     results = {"conditions": conditions, "verdicts": tuple(_verdicts(conditions)), "squeaking": squeaking}
     return Comparison(tuple(findings), results=results)
 
 
-def _condition(found: Findings) -> Condition:
-    squeaks, loops, record = found.squeaks, found.loops, found.record
+def _condition(findings: Findings) -> Condition:
+    squeaks, loops, record = findings.squeaks, findings.loops, findings.record
     heard = squeaks.of("squeak", "squeal")
     levels = [burst.level for burst in heard if np.isfinite(burst.level)]
     path = next((each for each in ("x", "theta") if each in record), None)
     return Condition(
-        name=found.name, normal=found.normal, forcing=squeaks.forcing,
+        name=findings.name, normal=findings.normal, forcing=squeaks.forcing,
         stroke=float(np.nanmax(record[path]) - np.nanmin(record[path])) / 2 if path else float("nan"),
         level=None if loops is None else loops.level, slope=None if loops is None else loops.slope,
-        coefficient=found.coefficient, slope_of_coefficient=found.slope_of_coefficient,
+        coefficient=findings.coefficient, slope_of_coefficient=findings.slope_of_coefficient,
         answer=squeaks.answer, kind=squeaks.kind, count=len(heard), rate=len(heard) / record.duration,
         pulses=max(squeaks.of("creak"), key=lambda burst: burst.duration).rate if squeaks.of("creak") else float("nan"),
         frequency=squeaks.frequency, sound=max(levels, default=float("nan")), reference=squeaks.reference,
@@ -278,7 +277,7 @@ def _condition(found: Findings) -> Condition:
 
 def _verdicts(conditions: Sequence[Condition]) -> list[str]:
     """Which squeak, and what their slopes say of that."""
-    loud = [each for each in conditions if each.squeaks]
+    loud = [condition for condition in conditions if condition.squeaks]
     quiet, untold = _answering(conditions, "does not squeak"), _answering(conditions, "can not be told")
     creaking = _answering(conditions, "creaks")
     if not loud and not untold:
@@ -303,7 +302,7 @@ def _verdicts(conditions: Sequence[Condition]) -> list[str]:
 
 
 def _answering(conditions: Sequence[Condition], answer: str) -> list[Condition]:
-    return [each for each in conditions if each.answer == answer]
+    return [condition for condition in conditions if condition.answer == answer]
 
 
 def _say(conditions: Sequence[Condition], one: str, several: str) -> list[str]:
@@ -312,5 +311,5 @@ def _say(conditions: Sequence[Condition], one: str, several: str) -> list[str]:
 
 
 def _names(conditions: Sequence[Condition]) -> str:
-    names = [each.name for each in conditions]
+    names = [condition.name for condition in conditions]
     return " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)

@@ -52,10 +52,10 @@ from stickslip.bench.simulated import SimulatedBench as SimulatedBench
 from stickslip.bench.simulated import sweep_of as sweep_of
 from stickslip.bench.steps import STEPS as STEPS
 from stickslip.bench.steps import BenchStep as BenchStep
+from stickslip.bench.steps import Commissioned as Commissioned
+from stickslip.bench.steps import commission as commission
 from stickslip.bench.steps import step_named as step_named
 from stickslip.bench.through import Tour as Tour
 from stickslip.bench.through import tour as tour
-from stickslip.bench.walk import Commissioned as Commissioned
-from stickslip.bench.walk import commission as commission
 
 __all__: list[str]

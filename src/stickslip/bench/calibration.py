@@ -10,16 +10,18 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from stickslip.bench.holds import find_holds, jumps
 from stickslip.errors import EstimateError, ModelError
 from stickslip.estimate import Doubt, Estimate, Result, Status
 from stickslip.record.record import Record
-from stickslip.statistics import student
+from stickslip.statistics import mean_uncertainty, student
 
 Array = NDArray[np.float64]
 
-QUESTION, BY_WEIGHTS = "the sensitivity of a sensor", "a spring by weights"
+QUESTION = "the sensitivity of a sensor"
 LEAST = 3  # levels
+BLOCKS = 400  # into which a record is reduced before its levels are looked for
+SHORTEST = 4  # blocks of a level
+MARGIN = 0.2  # of a level, at each of its ends, in which the hand still works
 BENT = 0.01  # of the range, from which a sensor is not called straight
 
 
@@ -63,8 +65,8 @@ def calibrate(
     """By which factor, and from which zero, does a sensor read what is put on it?
 
     The record stands on one level after another: weights on a load cell, gauge blocks before a displacement sensor, an
-    accelerometer turned over in gravity. The levels are found in it (:func:`~stickslip.bench.holds.find_holds`); a
-    straight line through them against the known values gives gain and zero, its scatter how sure they are, with
+    accelerometer turned over in gravity. The levels are found in it (:func:`find_holds`); a straight
+    line through them against the known values gives gain and zero, its scatter how sure they are, with
     Student's quantile for few levels. Of a sensor that leaks, the steps are read instead, each side drawn on to the
     instant between, so that what leaks away while a level is held does not count.
 
@@ -213,8 +215,8 @@ def spring_by_weights(
     >>> spring_by_weights(Record.of({"x": x}, fs=1000), weights=weights).stiffness.includes(2310)
     True
     """
-    found = calibrate(record, channel=channel, reference=weights, reference_sd=weights_sd)
-    compliance, gain_sd = found.gain, record.channels[channel].gain_sd
+    calibration = calibrate(record, channel=channel, reference=weights, reference_sd=weights_sd)
+    compliance, gain_sd = calibration.gain, record.channels[channel].gain_sd
     if compliance.value <= 0:
         raise EstimateError(
             "a spring that gives against the weight", "displacement and weight have one sign", "turn one of them round"
@@ -224,7 +226,150 @@ def spring_by_weights(
     stiffness = Estimate(
         "spring stiffness", 1 / compliance.value,
         (math.exp(-1.96 * part) / compliance.value, math.exp(1.96 * part) / compliance.value),
-        part / compliance.value, "N/m", f"displacement under {len(found.levels)} weights",
-        checks=(f"off a straight line by {100 * found.linearity.value:.2g} %",),
+        part / compliance.value, "N/m", f"displacement under {len(calibration.levels)} weights",
+        checks=(f"off a straight line by {100 * calibration.linearity.value:.2g} %",),
     )  # fmt: skip
-    return SpringByWeights(replace(stiffness, status=found.status), found.reference, found.levels, found.status)
+    return SpringByWeights(
+        replace(stiffness, status=calibration.status), calibration.reference, calibration.levels, calibration.status
+    )
+
+
+@dataclass(frozen=True)
+class Hold:
+    """A level that was held.
+
+    Attributes
+    ----------
+    first, last : float
+        Instants [s] between which it is read, the margins left out.
+    level : float
+        Its mean [unit of the channel].
+    slope : float
+        How fast it changes [unit / s].
+    sd : float
+        Standard deviation of the mean.
+    middle : float
+        Instant [s] at which a straight line through it has its mean.
+    """
+
+    first: float
+    last: float
+    level: float
+    slope: float
+    sd: float
+
+    @property
+    def middle(self) -> float:
+        """Instant [s] at which a straight line through it has its mean."""
+        return (self.first + self.last) / 2
+
+    def at(self, time: float) -> float:
+        """The straight line through it, at another instant [s]."""
+        return self.level + self.slope * (time - self.middle)
+
+
+def find_holds(record: Record, channel: str, count: int, *, question: str) -> tuple[Hold, ...]:
+    """The `count` levels on which a channel stands one after another.
+
+    The record is reduced to the medians of 400 blocks and cut where straight lines through the parts leave least, by
+    dynamic programming; a fifth of each part at either end is left to the hand that changes the level.
+
+    Parameters
+    ----------
+    record : Record
+    channel : str
+    count : int
+        How many levels there are.
+    question : str
+        For the message.
+
+    Returns
+    -------
+    tuple of Hold
+
+    Raises
+    ------
+    RecordError
+        The channel is missing or not finite.
+    EstimateError
+        The record is too short for that many levels.
+
+    Examples
+    --------
+    >>> levels = np.repeat([0.0, 2.0, 5.0], 400) + 0.01 * np.random.default_rng(1).standard_normal(1200)
+    >>> [round(hold.level, 1) for hold in find_holds(Record.of({"x": levels}, fs=100), "x", 3, question="an example")]
+    [-0.0, 2.0, 5.0]
+    """
+    record.require_clean(channel, question=question, samples=2 * SHORTEST * count)
+    values = record[channel]
+    size = max(1, len(values) // BLOCKS)
+    blocks = np.median(values[: len(values) // size * size].reshape(-1, size), axis=1)
+    if len(blocks) < SHORTEST * count:
+        raise EstimateError(
+            f"{len(values)} samples for {count} levels", f"{question} needs a second or more at each", "hold longer"
+        )
+    edges = [edge * size for edge in _cuts(blocks, count)]
+    edges[-1] = len(values)
+    return tuple(_hold(record, values, first, last) for first, last in itertools.pairwise(edges))
+
+
+def _cuts(blocks: Array, count: int) -> list[int]:
+    """Where `count` straight lines part, the ends included: least squares by dynamic programming."""
+    cost = _line_costs(blocks)
+    size = len(blocks)
+    best = np.full((count + 1, size + 1), math.inf)
+    back = np.zeros((count + 1, size + 1), dtype=int)
+    best[0, 0] = 0.0
+    for part in range(1, count + 1):
+        total = best[part - 1][:, None] + cost  # [from, to]
+        back[part] = total.argmin(axis=0)
+        best[part] = total.min(axis=0)
+    edges = [size]
+    for part in range(count, 0, -1):
+        edges.append(int(back[part, edges[-1]]))
+    return edges[::-1]
+
+
+def _line_costs(values: Array) -> Array:
+    """What a straight line leaves of each stretch, [from, to]; infinite where it is too short."""
+    size = len(values)
+    time = np.arange(size, dtype=float)
+
+    def sums(row: Array) -> Array:
+        return np.concatenate([[0.0], np.cumsum(row)])
+
+    values = values - values.mean()
+    n, t, y = (sums(row) for row in (np.ones(size), time, values))
+    tt, ty, yy = (sums(row) for row in (time * time, time * values, values * values))
+
+    def over(total: Array) -> Array:
+        return total[None, :] - total[:, None]
+
+    with np.errstate(divide="ignore", invalid="ignore"):
+        count = over(n)
+        stt, sty = over(tt) - over(t) ** 2 / count, over(ty) - over(t) * over(y) / count
+        left = over(yy) - over(y) ** 2 / count - sty**2 / stt
+    left[over(n) < SHORTEST] = math.inf
+    return np.where(np.isfinite(left), np.maximum(left, 0.0), math.inf)
+
+
+def _hold(record: Record, values: Array, first: int, last: int) -> Hold:
+    margin = round(MARGIN * (last - first))
+    part = values[first + margin : last - margin]
+    time = (np.arange(len(part)) - (len(part) - 1) / 2) / record.fs
+    slope = float(time @ part / (time @ time))
+    sd = mean_uncertainty(part - part.mean() - slope * time)[0]
+    start = record.start + (first + margin) / record.fs
+    return Hold(start, start + (len(part) - 1) / record.fs, float(part.mean()), slope, sd)
+
+
+def jumps(holds: Sequence[Hold]) -> Array:
+    """How far each level lies above the one before, both drawn on to the instant between them."""
+    pairs = itertools.pairwise(holds)
+    return np.array(
+        [
+            after.at(middle) - before.at(middle)
+            for before, after in pairs
+            for middle in [(before.last + after.first) / 2]
+        ]
+    )

@@ -224,6 +224,22 @@ class Stream(Protocol):
         """Move an output from now on: by a tone, by samples at the device's rate, or not at all."""
 
 
+class Listening:
+    """An open device that is read and moves nothing, as most are; what derives from it reads, and may hold a port."""
+
+    device: Any  # the one that is open
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *raised: object) -> None:
+        """Nothing is held."""
+
+    def drive(self, output: str, signal: Signal) -> None:
+        """It moves nothing: refuses every output."""
+        output_of(self.device, output)
+
+
 class Device(Protocol):
     """Something that measures.
 

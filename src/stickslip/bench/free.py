@@ -119,11 +119,11 @@ def free_vibration(
     doubts: list[Doubt | str] = [decay.status]
     for name in (name for name in FOLLOWED if name in record):
         try:
-            found = sensor_delay(record, channels=("x", name))
+            delay = sensor_delay(record, channels=("x", name))
         except StickslipError as error:
             doubts.append(Doubt(f"the phase of {name} is not told: {error}", lesser=True))
             continue
-        delays[name], phases[name] = _lead(found, name, decay.frequency, unsure.get(name, 0.0))
+        delays[name], phases[name] = _lead(delay, name, decay.frequency, unsure.get(name, 0.0))
     ratio = replace(old.damping_ratio, name="damping ratio by decrement") if old else decay.damping_ratio.unknown(
         "the decrement method is refused"
     )  # fmt: skip
@@ -183,9 +183,9 @@ def _mount(mount: Resonance | tuple[float, float]) -> tuple[tuple[float, float],
     return (frequency.value, damping.value), delay * math.hypot(*parts)
 
 
-def _lead(found: SensorDelay, name: str, frequency: Estimate, unsure: float) -> tuple[Estimate, Estimate]:
+def _lead(delay: SensorDelay, name: str, frequency: Estimate, unsure: float) -> tuple[Estimate, Estimate]:
     """By which time, and which angle, a sensor leads; its mount is not known better than `unsure` [s]."""
-    late = found.delay
+    late = delay.delay
     lead = Estimate.normal(
         f"lead of {name} over x", -late.value, sd=math.hypot(late.spread, unsure), unit="s", method=late.method,
         status=late.status, checks=late.checks,
@@ -298,7 +298,7 @@ def best_constants(
     """
     if not masses and not springs:
         raise EstimateError("neither a mass nor a spring", "a frequency tells their ratio alone", "weigh one of them")
-    rows = [([1.0, 0.0], each) for each in masses] + [([0.0, 1.0], each) for each in springs]
+    rows = [([1.0, 0.0], mass) for mass in masses] + [([0.0, 1.0], spring) for spring in springs]
     design = np.array([row for row, _ in rows] + [[-1.0, 1.0]])
     read = np.array([math.log(each.value) for _, each in rows] + [2 * math.log(2 * math.pi * frequency.value)])
     sd = np.array([each.spread / each.value for _, each in rows] + [2 * frequency.spread / frequency.value])
@@ -381,7 +381,7 @@ def onto_stick(record: Record, *, mass: Constant, stiffness: Constant) -> OntoSt
     weight, spring = Estimate.stated("mass", mass, "kg"), Estimate.stated("stiffness", stiffness, "N/m")
     record.require_clean("x", "a", question=STICKS, samples=100)
     found, begin = _rung(record, weight, _stop(record))
-    coupled = min(found.resonances, key=lambda each: (COUPLED not in each.name, each.frequency.spread))
+    coupled = min(found.resonances, key=lambda resonance: (COUPLED not in resonance.name, resonance.frequency.spread))
     turn, of_mass = (2 * math.pi * coupled.frequency.value) ** 2, weight.value
     value = of_mass * turn - spring.value
     sd = math.hypot(
@@ -415,11 +415,11 @@ def _rung(record: Record, mass: Estimate, stop: int) -> tuple[ImpactTest, float]
     step = max(1, round(LATER * record.fs / 45.0))  # the thesis's contact rings at 45 Hz
     for _ in range(TRIES):
         try:
-            found = impact_test(record.rows(begin), mass=mass)
-            step = max(1, round(LATER * record.fs / found.resonances[0].frequency.value))
-            if best is None or _disorder(found) < _disorder(best):
-                best = found
-            if found.residual < CLEAN and len(found.resonances) <= MOST_MODES:
+            test = impact_test(record.rows(begin), mass=mass)
+            step = max(1, round(LATER * record.fs / test.resonances[0].frequency.value))
+            if best is None or _disorder(test) < _disorder(best):
+                best = test
+            if test.residual < CLEAN and len(test.resonances) <= MOST_MODES:
                 break
         except EstimateError as error:
             last = error
@@ -431,6 +431,6 @@ def _rung(record: Record, mass: Estimate, stop: int) -> tuple[ImpactTest, float]
     return best, best.time
 
 
-def _disorder(found: ImpactTest) -> float:
+def _disorder(test: ImpactTest) -> float:
     """How far the ringing is from that of one contact and two mounts: slips look like many short modes."""
-    return found.residual * max(1.0, len(found.resonances) / MOST_MODES)
+    return test.residual * max(1.0, len(test.resonances) / MOST_MODES)

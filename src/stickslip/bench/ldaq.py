@@ -9,12 +9,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
 from pydantic import BaseModel, Field
 
-from stickslip.bench.device import Block, Input, Output, Signal, output_of, vendors
+from stickslip.bench.device import Block, Input, Listening, Output, vendors
 from stickslip.bench.wiring import Wires, inputs
 from stickslip.errors import ModelError
 from stickslip.settings import STRICT, checked
@@ -55,16 +55,11 @@ class Source:
         return f"{type(self.acquisition).__name__} of LDAQ"
 
     def open(self) -> Reading:
-        """Begin to read.
-
-        Returns
-        -------
-        Reading
-        """
+        """Begin to read."""
         return Reading(self)
 
 
-class Reading:
+class Reading(Listening):
     """A source that is read."""
 
     def __init__(self, device: Source) -> None:
@@ -76,9 +71,6 @@ class Reading:
             device.acquisition.terminate_data_source()
             raise ModelError(f"a channel '{missing[0]}'", f"the source has {', '.join(there)}", "name one of them")
         self.columns = [there.index(one.terminal) for one in device.inputs]
-
-    def __enter__(self) -> Self:
-        return self
 
     def __exit__(self, *raised: object) -> None:
         """Let go of the source."""
@@ -95,10 +87,6 @@ class Reading:
         rows = data.reshape(-1, data.shape[-1])[:, self.columns].T if data.size else np.empty((len(self.columns), 0))
         first, self.sent = self.sent, self.sent + rows.shape[1]
         return Block(first, time.monotonic(), rows)
-
-    def drive(self, output: str, signal: Signal) -> None:
-        """It moves nothing."""
-        output_of(self.device, output)
 
 
 class _Settings(BaseModel):
@@ -119,16 +107,6 @@ def listed() -> Sequence[str]:
 
 def build(name: str, settings: Mapping[str, Any], folder: Path) -> Source:
     """A source from a table: acquisition (``"dewesoft.DewesoftAcquisition"``), its arguments, channels.
-
-    Parameters
-    ----------
-    name : str
-    settings : mapping
-    folder : Path
-
-    Returns
-    -------
-    Source
 
     Raises
     ------

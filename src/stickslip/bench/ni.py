@@ -70,10 +70,6 @@ class Unit:
     def open(self) -> Task:
         """Begin to measure.
 
-        Returns
-        -------
-        Task
-
         Raises
         ------
         ModelError
@@ -187,16 +183,6 @@ def listed() -> Sequence[str]:
 
 def build(name: str, settings: Mapping[str, Any], folder: Path) -> Unit:
     """A unit from a table: device, fs, channels (``load = "ai0 [V] @ 500 mV/lbf"``), outputs.
-
-    Parameters
-    ----------
-    name : str
-    settings : mapping
-    folder : Path
-
-    Returns
-    -------
-    Unit
 
     Raises
     ------

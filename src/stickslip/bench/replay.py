@@ -7,12 +7,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Annotated, Any, Self
+from typing import Annotated, Any
 
 import numpy as np
 from pydantic import BaseModel, Field
 
-from stickslip.bench.device import Block, Input, Output, Signal, output_of
+from stickslip.bench.device import Block, Input, Listening, Output
 from stickslip.errors import ModelError
 from stickslip.files.read import read_record
 from stickslip.record.record import DETAILS, Record
@@ -81,27 +81,16 @@ class Replay:
         return tuple(found)
 
     def open(self) -> Playing:
-        """Begin to play.
-
-        Returns
-        -------
-        Playing
-        """
+        """Begin to play."""
         return Playing(self)
 
 
-class Playing:
+class Playing(Listening):
     """A record, being played."""
 
     def __init__(self, device: Replay) -> None:
         self.device, self.sent, self.began = device, 0, time.monotonic()
         self.samples = np.array([device.record[one.name] for one in device.inputs])
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *raised: object) -> None:
-        """Nothing is held."""
 
     def read(self, timeout: float = 1.0) -> Block | None:
         """The next samples; see :class:`Stream`."""
@@ -117,10 +106,6 @@ class Playing:
         self.sent = after
         clock = self.began + after / fs if device.fast else time.monotonic()
         return Block(first, clock, self.samples[:, first:after])
-
-    def drive(self, output: str, signal: Signal) -> None:
-        """It moves nothing."""
-        output_of(self.device, output)
 
 
 class _Settings(BaseModel):
@@ -141,16 +126,6 @@ def listed() -> Sequence[str]:
 
 def build(name: str, settings: Mapping[str, Any], folder: Path) -> Replay:
     """A player of the record that a table names: path, channels, fs, fast.
-
-    Parameters
-    ----------
-    name : str
-    settings : mapping
-    folder : Path
-
-    Returns
-    -------
-    Replay
 
     Raises
     ------

@@ -132,6 +132,12 @@ class Proposal:
     bound: str
     pair: tuple[str, str]
 
+    @property
+    def why(self) -> str:
+        """What it would tell, in words."""
+        one, other = self.pair
+        return f"tells {one} from {other} by {self.separation:.3g} standard deviations a sample"
+
 
 def next_runs(
     laws: Mapping[str, Oscillator],
@@ -217,19 +223,21 @@ def run_list(proposals: Sequence[Proposal], *, seconds: float = 20.0) -> RunList
     >>> run_list([Proposal(4.2, 0.5e-3, 12.0, "", ("rigid", "compliant"))]).run[0].name
     'next-1'
     """
+    if not 0 < seconds < math.inf:
+        raise ModelError(f"seconds = {seconds}", "a recording lasts some time", "give a length in s")
     return RunList(
         run=tuple(
             Run(
-                name=f"next-{number}", frequency=each.frequency, amplitude=each.amplitude, seconds=seconds,
-                why=f"tells {each.pair[0]} from {each.pair[1]} by {each.separation:.3g} standard deviations a sample",
+                name=f"next-{number}", frequency=proposal.frequency, amplitude=proposal.amplitude, seconds=seconds,
+                why=proposal.why,
             )
-            for number, each in enumerate(proposals, start=1)
+            for number, proposal in enumerate(proposals, start=1)
         )
     )  # fmt: skip
 
 
 def _frequencies(laws: Mapping[str, Oscillator], shaker: Shaker) -> list[float]:
-    natural = max(math.sqrt(each.stiffness / each.mass) / math.tau for each in laws.values())
+    natural = max(math.sqrt(system.stiffness / system.mass) / math.tau for system in laws.values())
     low = max(shaker.lowest, 0.2 * natural)
     high = min(shaker.highest, HIGHEST * natural)
     if not low < high:
@@ -243,8 +251,8 @@ def _frequencies(laws: Mapping[str, Oscillator], shaker: Shaker) -> list[float]:
 
 def _amplitude(laws: Mapping[str, Oscillator], shaker: Shaker, frequency: float) -> float:
     """The largest amplitude that is tried: what the shaker can, up to four times what friction holds."""
-    stiffness = min(each.stiffness for each in laws.values())
-    friction = max(float(getattr(each.law, "kinetic", 1.0)) for each in laws.values())
+    stiffness = min(system.stiffness for system in laws.values())
+    friction = max(float(getattr(system.law, "kinetic", 1.0)) for system in laws.values())
     wanted = 4 * friction / stiffness
     top = shaker.largest(frequency)
     return min(top, max(wanted, 0.5e-3))
@@ -272,10 +280,10 @@ def _told(
 ) -> list[Proposal]:
     """What a motion tells; nothing where a law can not be simulated or the mass leaves the sensor's range."""
     try:
-        answers = {name: _steady(each, motion) for name, each in laws.items()}
-        if any(np.abs(each).max() > largest for each in answers.values()):
+        answers = {name: _steady(system, motion) for name, system in laws.items()}
+        if any(np.abs(answer).max() > largest for answer in answers.values()):
             return []
-        effects = {name: _effects(each, motion, answers[name]) for name, each in laws.items()}
+        effects = {name: _effects(system, motion, answers[name]) for name, system in laws.items()}
     except StickslipError:
         return []
     names = list(laws)
@@ -299,7 +307,7 @@ def _effects(system: Oscillator, motion: tuple[float, float], answer: Array) -> 
     """What each parameter of the law, its damper and the sensor's gain change, a column each."""
     columns = [answer * GAIN_SD]
     law: Any = system.law
-    for name in (each.name for each in fields(law)):
+    for name in (field.name for field in fields(law)):
         value = getattr(law, name)
         if isinstance(value, (int, float)) and not isinstance(value, bool) and value > 0:
             changed = replace(system, law=replace(law, **{name: value * (1 + NUDGE)}))

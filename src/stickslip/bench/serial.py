@@ -7,12 +7,12 @@ import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Self
+from typing import Annotated, Any
 
 import numpy as np
 from pydantic import BaseModel, Field
 
-from stickslip.bench.device import Block, Input, Output, Signal, output_of, vendors
+from stickslip.bench.device import Block, Input, Listening, Output, vendors
 from stickslip.bench.wiring import Wires, columns, inputs
 from stickslip.errors import ModelError
 from stickslip.settings import STRICT, checked, quantity
@@ -61,22 +61,18 @@ class Lines:
         """Where it is."""
         return f"lines at {self.port}, {self.baud} baud"
 
-    def open(self) -> Listening:
+    def open(self) -> OpenPort:
         """Open the port.
-
-        Returns
-        -------
-        Listening
 
         Raises
         ------
         ModelError
             It is not there, or another program has it.
         """
-        return Listening(self)
+        return OpenPort(self)
 
 
-class Listening:
+class OpenPort(Listening):
     """An open port."""
 
     def __init__(self, device: Lines) -> None:
@@ -94,9 +90,6 @@ class Listening:
         self.next = 0  # counter of the line that should come
         self.origin: int | None = None  # of the device's own counter
         self.waiting: list[tuple[int, list[float]]] = []  # lines with their counters, not yet handed on
-
-    def __enter__(self) -> Self:
-        return self
 
     def __exit__(self, *raised: object) -> None:
         """Close the port."""
@@ -120,10 +113,6 @@ class Listening:
         count = next((j for j, (at, _) in enumerate(self.waiting) if at != first + j), len(self.waiting))
         taken, self.waiting = self.waiting[:count], self.waiting[count:]
         return Block(first, clock, np.array([values for _, values in taken]).T)
-
-    def drive(self, output: str, signal: Signal) -> None:
-        """It moves nothing."""
-        output_of(self.device, output)
 
     def _take(self, line: bytes) -> None:
         """One line: its numbers with its counter; a damaged one is a sample that was lost."""
@@ -166,16 +155,6 @@ def listed() -> Sequence[str]:
 
 def build(name: str, settings: Mapping[str, Any], folder: Path) -> Lines:
     """A port from a table: port, fs, channels (``x = "#2 [mm]"``), baud, counter, wrap.
-
-    Parameters
-    ----------
-    name : str
-    settings : mapping
-    folder : Path
-
-    Returns
-    -------
-    Lines
 
     Raises
     ------

@@ -8,12 +8,12 @@ import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Self
+from typing import Annotated, Any
 
 import numpy as np
 from pydantic import BaseModel, Field
 
-from stickslip.bench.device import Block, Input, Output, Signal, output_of, vendors
+from stickslip.bench.device import Block, Input, Listening, Output, vendors
 from stickslip.bench.wiring import Wire, Wires, columns, inputs
 from stickslip.errors import ModelError
 from stickslip.settings import STRICT, checked, quantity
@@ -54,10 +54,6 @@ class Card:
     def open(self) -> Hearing:
         """Begin to listen.
 
-        Returns
-        -------
-        Hearing
-
         Raises
         ------
         ModelError
@@ -66,7 +62,7 @@ class Card:
         return Hearing(self)
 
 
-class Hearing:
+class Hearing(Listening):
     """An open card. Its driver calls from a thread of its own, and what it brings waits in a line."""
 
     def __init__(self, device: Card) -> None:
@@ -90,9 +86,6 @@ class Hearing:
                 "see stickslip devices",
             ) from error
 
-    def __enter__(self) -> Self:
-        return self
-
     def __exit__(self, *raised: object) -> None:
         """Close the card."""
         self.stream.close()
@@ -104,10 +97,6 @@ class Hearing:
         except queue.Empty:
             return Block(self.next, time.monotonic(), np.empty((len(self.columns), 0), dtype=np.int16))
         return Block(first, clock, samples)
-
-    def drive(self, output: str, signal: Signal) -> None:
-        """It moves nothing."""
-        output_of(self.device, output)
 
     def _called(self, data: Any, frames: int, times: Any, status: Any) -> None:
         """The driver's call: samples, and whether some before them were lost; how many the card's clock tells."""
@@ -139,16 +128,6 @@ def listed() -> Sequence[str]:
 
 def build(name: str, settings: Mapping[str, Any], folder: Path) -> Card:
     """A card from a table: device, fs, channels (``sound = "#1 [1]"``, full scale being 1).
-
-    Parameters
-    ----------
-    name : str
-    settings : mapping
-    folder : Path
-
-    Returns
-    -------
-    Card
 
     Raises
     ------

@@ -18,8 +18,7 @@ from stickslip.bench.recording import Wanted, acquire
 from stickslip.bench.runs import Proposal, Run, next_runs, run_list
 from stickslip.bench.sim import Sim
 from stickslip.bench.simulated import SimulatedBench, thesis_oscillator
-from stickslip.bench.steps import STEPS
-from stickslip.bench.walk import Commissioned, commission
+from stickslip.bench.steps import STEPS, Commissioned, commission
 from stickslip.drives.kinds import HarmonicBase, Release
 from stickslip.estimate import Estimate, Result
 from stickslip.files.read import read_record
@@ -203,10 +202,10 @@ def _laws(driven: Sequence[Record], rig: RigSettings) -> LawComparison:
 def _next(laws: LawComparison, rig: RigSettings) -> tuple[Proposal, ...]:
     """What would tell the two best laws apart that differ in family."""
     best = laws.candidates[0]
-    other = next((each for each in laws.candidates[1:] if each.name != best.name), None)
+    other = next((candidate for candidate in laws.candidates[1:] if candidate.name != best.name), None)
     if other is None:
         return ()
-    left = {each.name: replace(each.oscillator, drive=Release()) for each in (best, other)}
+    left = {candidate.name: replace(candidate.oscillator, drive=Release()) for candidate in (best, other)}
     known = [(run.frequency, run.amplitude) for run in RUNS]
     return next_runs(left, shaker=Shaker.of(rig.shaker), done=known)
 

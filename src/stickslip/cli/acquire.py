@@ -1,4 +1,4 @@
-"""stickslip acquire"""
+"""stickslip acquire, and stickslip devices, which tells what can measure."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ import click
 
 import stickslip as ss
 import stickslip.bench as bench
-from stickslip.cli.interrupted import INTERRUPTED
 from stickslip.cli.options import pair
 from stickslip.cli.progress import progress
 from stickslip.cli.terminal import say, say_json, wrapped
+from stickslip.errors import INTERRUPTED
 
 TRIGGER = re.compile(r"\s*(\w+)\s*([<>])\s*(\S+)\s*")
 
@@ -66,7 +66,7 @@ def acquire(names: tuple[str, ...], config: Path | None, output: Path, as_json: 
     if options["runs"]:
         _run_all(chosen, bench.read_runs(options["runs"]), output, log, as_json=as_json)
         return
-    drive = dict(_driven(each) for each in options["drives"])
+    drive = dict(_driven(text) for text in options["drives"])
     wanted = bench.Wanted(options["seconds"], _trigger(options["trigger"], options["before"]), drive, log)
     with progress(100) as tell:
         done = bench.acquire(chosen, output=output, wanted=wanted, watch=_watch(tell, options["seconds"]))
@@ -138,3 +138,32 @@ def _show(done: bench.Acquired, *, as_json: bool) -> None:
         say("\n".join(wrapped(note)))
     ended = "" if done.ended == "complete" else f" ({done.ended})"
     say(f"Written: {', '.join(map(str, done.paths))}{ended}")
+
+
+@click.command()
+@click.option(
+    "--config", type=click.Path(path_type=Path), metavar="RIG.TOML", help="List the devices that it names too."
+)
+@click.option("--json", "as_json", is_flag=True, help="Print the list as JSON and nothing else.")
+def devices(config: Path | None, as_json: bool) -> None:
+    """List what can measure here: kinds of devices, what is plugged in, and which package is missing.
+
+    \b
+    stickslip devices
+    stickslip devices --config rig.toml
+    """
+    kinds = bench.devices()
+    named = ss.rig.read_rig(config).devices if config else {}
+    mine = {name: bench.find_device(name, named, folder=config.parent if config else None) for name in named}
+    if as_json:
+        told = {kind.kind: {"about": kind.about, "there": [*kind.there], "missing": kind.missing} for kind in kinds}
+        named_so = {name: {"kind": one.kind, "model": one.model, "fs": one.fs} for name, one in mine.items()}
+        say_json({"kinds": told, "named": named_so})
+        return
+    for name, one in mine.items():
+        inputs = ", ".join(f"{entry.name} [{entry.unit}]" for entry in one.inputs)
+        outputs = "".join(f"; moves {output.name}" for output in one.outputs)
+        say("\n".join(wrapped(f"{one.model}, {one.fs:g} Hz: {inputs}{outputs}", f"{name:<8} ")))
+    for kind in kinds:
+        there = f"missing: {kind.missing}" if kind.missing else "; ".join(kind.there) or "nothing found"
+        say("\n".join([*wrapped(kind.about, f"{kind.kind:<8} "), *wrapped(there, 9 * " ")]))

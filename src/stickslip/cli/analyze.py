@@ -11,9 +11,8 @@ from typing import TYPE_CHECKING, Any
 import click
 
 import stickslip as ss
-from stickslip.cli.interrupted import INTERRUPTED
-from stickslip.cli.many import Places, ask_many, finish, many_options
-from stickslip.cli.options import all_option, reading_options, result_options, usable
+from stickslip.cli.many import Places, answer_many, many_options
+from stickslip.cli.options import all_option, constants_options, normal_option, reading_options, result_options, usable
 from stickslip.cli.progress import progress
 from stickslip.cli.records import (
     answers,
@@ -26,6 +25,7 @@ from stickslip.cli.records import (
 )
 from stickslip.cli.show import show
 from stickslip.cli.terminal import complain
+from stickslip.errors import INTERRUPTED
 from stickslip.workers import processors
 
 if TYPE_CHECKING:
@@ -47,17 +47,8 @@ twins_option = click.option(
 
 @click.command()
 @click.argument("files", nargs=-1, required=True, metavar="FILES...")
-@click.option("--mass", metavar="VALUE", help='Oscillating mass in kg, or with its unit ("250 g", "2.42 ± 0.02 kg").')
-@click.option("--stiffness", metavar="VALUE", help="Spring in N/m, or with its unit.")
-@click.option("--damping", metavar="VALUE", help="Viscous damping of the suspension in N s/m.")
-@click.option("--damper", type=click.Choice(["ground", "base"]), help="What the damper ends on.")
-@click.option("--contact", type=click.Choice(["ground", "base"]), help="What the mass slides on.")
-@click.option(
-    "--normal",
-    multiple=True,
-    metavar='LOAD or "PATTERN=LOAD"',
-    help="Normal load in N, for all files or for those whose name fits. Repeatable.",
-)
+@constants_options()
+@normal_option
 @click.option(
     "--method",
     type=click.Choice(["auto", "fusion", "motion", "load", "smoother", "five-point", "F", "F1", "F2"]),
@@ -92,7 +83,7 @@ def analyze(
     stickslip analyze run.csv --channels "x=disp [mm]" --mass 3.08 --stiffness "1.19 N/mm"
     stickslip analyze "run_*.csv" --config rig.toml --normal "*250g*=2.45" --normal "*450g*=4.41"
     """
-    places = Places.of(options)
+    places, shown = Places.of(options), {"as_json": as_json, "everything": everything}
     rig = rig_of(**options)
     groups = [group for argument in files for group in groups_of(argument)]
     require_fits(options["normal"], groups)
@@ -100,9 +91,7 @@ def analyze(
     if places.wanted(groups):
         chosen = click.get_current_context().get_parameter_source("twins") is not click.core.ParameterSource.DEFAULT
         asked = {"method": method, "twins": twins if chosen else 0}
-        with progress(len(groups)) as tell:
-            batch = ask_many("analyze", groups, rig, asked, places, folder=folder, tell=tell)
-        finish(batch, places, folder if output or not as_json else None, folder, as_json=as_json, everything=everything)
+        answer_many("analyze", groups, rig, asked, places, folder=folder, output=output, **shown)
         return
     with progress(2 * len(groups) + 1) as tell:
         found, refused = answers(
@@ -119,7 +108,7 @@ def analyze(
         tell("drawing and writing", 2 * len(groups))
         results, written = _sure(found, twins, told, folder if output or not as_json else None, tell)
     name_left_out(refused)
-    show(results, written, as_json=as_json, everything=everything)
+    show(results, written, **shown)
 
 
 def _sure(

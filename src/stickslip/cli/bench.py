@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 
 import stickslip as ss
+import stickslip.bench as room
 from stickslip.cli.options import all_option, usable
 from stickslip.cli.progress import progress
 from stickslip.cli.show import print_json, show
@@ -34,8 +35,6 @@ def tour(fast: bool, seed: int, output: Path, as_json: bool, everything: bool) -
     and wet; all is recorded, analysed, laws are compared, and DIR/report/report.html is what a lab would hand in, with
     the true values beside.
     """
-    import stickslip.bench as room
-
     report = output / "report"
     usable(click.get_current_context(), None, report)  # type: ignore[arg-type]
     with progress(100) as tell:
@@ -67,8 +66,7 @@ def following(
     stickslip bench next rigid-fit compliant-fit --config rig.toml --output next.toml
     stickslip acquire --device daq --config rig.toml --runs next.toml --output records
     """
-    import stickslip.bench as room
-
+    motions = [_motion(motion) for motion in done]
     rig = ss.rig.read_rig(config) if config else None
     left = {Path(law).stem or law: ss.answers.read_fitted(law, rig=rig) for law in laws}
     sensor = rig.sensors.get("x") if rig else None
@@ -76,8 +74,8 @@ def following(
     shaker = ss.rig.Shaker.of(rig.shaker if rig else None)
     with progress(1) as tell:
         tell("simulating what the shaker can do", 0)
-        found = room.next_runs(left, shaker=shaker, noise=noise, count=count, done=[_motion(each) for each in done])
-    runs = room.run_list(found, seconds=seconds)
+        proposals = room.next_runs(left, shaker=shaker, noise=noise, count=count, done=motions)
+    runs = room.run_list(proposals, seconds=seconds)
     if output:
         output.write_text(runs.toml(), encoding="utf-8")
     if as_json:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 import stickslip as ss
+import stickslip.bench as bench
 from stickslip.cli.options import all_option, pair
 from stickslip.cli.progress import progress
 from stickslip.cli.records import groups_of, read
@@ -57,22 +58,21 @@ def commission(
     stickslip commission --device daq --config rig.toml --step rest --step tap
     stickslip commission tap=hammer.csv --config rig.toml
     """
-    import stickslip.bench as bench
-
     chosen = [bench.step_named(name) for name in options["steps"]] or list(bench.STEPS)
+    anew = {bench.step_named(name).name for name in options["again"]}
     if listed:
         say("\n".join(aligned(("step", "question", "at the rig"), [[s.name, s.title, s.todo] for s in chosen])))
         return
     config: Path | None = options["config"]
     rig = ss.rig.read_rig(config) if config else ss.rig.rig_settings({})
-    given = dict(_given(each) for each in files)
+    given = dict(_given(file) for file in files)
     if given and not options["steps"]:
         chosen = [step for step in bench.STEPS if step.name in given]
     folder = output or (None if given or as_json else Path("commission"))
     device = _device(options["name"], rig, config) if options["name"] else None
     if device is None and not given and not (folder and (folder / "records").is_dir()):
         raise click.UsageError("nothing measures; name a --device (sim needs no hardware), or STEP=FILE")
-    source, truth = _source(given, device, rig, folder, options)
+    source, truth = _source(given, device, rig, folder, seed=options["seed"], anew=anew)
     with progress(len(chosen) + 1) as tell:
         done = bench.commission(source, rig=rig, steps=chosen, truth=truth, progress=tell)
         tell("drawing and writing", len(chosen))
@@ -84,24 +84,19 @@ def commission(
 
 def _given(text: str) -> tuple[str, Path]:
     """A step and the file that answers it."""
-    import stickslip.bench as bench
-
     name, file = pair(text, "STEP=FILE")
     return bench.step_named(name).name, groups_of(file)[0][0]
 
 
 def _device(name: str, rig: RigSettings, config: Path | None) -> Device:
-    import stickslip.bench as bench
-
     return bench.find_device(name, rig.devices, folder=config.parent if config else None)
 
 
 def _source(
-    given: dict[str, Path], device: Device | None, rig: RigSettings, folder: Path | None, options: dict[str, Any]
+    given: dict[str, Path], device: Device | None, rig: RigSettings, folder: Path | None, *, seed: int, anew: set[str]
 ) -> tuple[Source, dict[str, float]]:
     """What gives the record of a step, and the truth where the rig is simulated."""
-    bench_of = _simulated(device, rig, options["seed"])
-    anew = set(options["again"])
+    bench_of = _simulated(device, rig, seed)
 
     def source(step: BenchStep) -> Record | None:
         if step.name in given:
@@ -130,8 +125,6 @@ def _kept(folder: Path, name: str) -> Path:
 
 def _simulated(device: Device | None, rig: RigSettings, seed: int) -> SimulatedBench | None:
     """The bench that stands behind a simulated device: it can be weighed, tapped and loaded too."""
-    import stickslip.bench as bench
-
     if not isinstance(device, bench.Sim):
         return None
     system: Any = device.system
@@ -141,8 +134,6 @@ def _simulated(device: Device | None, rig: RigSettings, seed: int) -> SimulatedB
 
 def _asked(device: Device, step: BenchStep, kept: Path | None, rig: RigSettings) -> Record | None:
     """The record of a step at a real rig, once its hands are ready."""
-    import stickslip.bench as bench
-
     if any(name not in [one.name for one in device.inputs] for name in step.needs):
         return None
     say(f"{step.title}\n  {step.todo}")

@@ -8,7 +8,7 @@ from typing import Any
 import click
 
 import stickslip as ss
-from stickslip.cli.many import Places, ask_many, finish, many_options
+from stickslip.cli.many import Places, answer_many, many_options
 from stickslip.cli.options import reading_options, result_options
 from stickslip.cli.progress import progress
 from stickslip.cli.records import (
@@ -65,7 +65,7 @@ def decay(files: tuple[str, ...], output: Path | None, as_json: bool, everything
     stickslip decay release.csv --channels "x=disp [mm]" --stiffness "2.31 N/mm"
     stickslip decay "release_*.csv" --method thesis --json
     """
-    places = Places.of(options)
+    places, shown = Places.of(options), {"as_json": as_json, "everything": everything}
     asked = {key: options.pop(key) for key in ("method", "channel", "restoring", "mass", "stiffness")}
     rig = rig_of(**options)
     if any(each.partition(":")[0] == "drift" for each in rig.repair):
@@ -78,9 +78,7 @@ def decay(files: tuple[str, ...], output: Path | None, as_json: bool, everything
     folder = output or (default_folder(groups) if len(groups) == 1 else Path("decays-stickslip"))
     asked |= {key: getattr(rig, key) for key in ("mass", "stiffness") if asked[key] is None}
     if places.wanted(groups):
-        with progress(len(groups)) as tell:
-            batch = ask_many("decay", groups, rig, asked, places, folder=folder, tell=tell)
-        finish(batch, places, folder if output or not as_json else None, folder, as_json=as_json, everything=everything)
+        answer_many("decay", groups, rig, asked, places, folder=folder, output=output, **shown)
         return
     with progress(2 * len(groups) + 1) as tell:
         found, refused = answers(groups, rig, lambda record: ss.analyze_decay(record, **asked), tell)
@@ -88,4 +86,4 @@ def decay(files: tuple[str, ...], output: Path | None, as_json: bool, everything
         results = with_left_out(ss.answers.compare_decays(found) if len(found) > 1 else found[0], refused)
         written = ss.publish(results, folder=folder) if output or not as_json else None
     name_left_out(refused)
-    show(results, written, as_json=as_json, everything=everything)
+    show(results, written, **shown)

@@ -36,6 +36,6 @@ def impact(file: str, output: Path | None, as_json: bool, everything: bool, **op
     with progress(1) as tell:
         tell(f"reading {file}", 0)
         record = read(groups[0], rig)
-        found = ss.balance.impact_test(record, mass=rig.mass)
-        written = ss.publish(found, folder=folder, record=record) if folder else None
-    show(found, written, as_json=as_json, everything=everything, record=record)
+        test = ss.balance.impact_test(record, mass=rig.mass)
+        written = ss.publish(test, folder=folder, record=record) if folder else None
+    show(test, written, as_json=as_json, everything=everything, record=record)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 import stickslip as ss
-from stickslip.cli.options import reading_options
+from stickslip.cli.options import constants_options, reading_options
 from stickslip.cli.records import RIG_FILE, groups_of, read, rig_of
 from stickslip.cli.terminal import aligned, complain, say, wrapped
 from stickslip.cli.words import spoken
@@ -36,11 +36,7 @@ CONSTANTS = {
 
 @click.command()
 @click.argument("files", nargs=-1, required=True, metavar="FILES...")
-@click.option("--mass", metavar="VALUE", help='Oscillating mass in kg, or with its unit ("2.42 ± 0.02 kg").')
-@click.option("--stiffness", metavar="VALUE", help="Spring in N/m, or with its unit.")
-@click.option("--damping", metavar="VALUE", help="Viscous damping of the suspension in N s/m.")
-@click.option("--damper", type=click.Choice(["ground", "base"]), help="What the damper ends on.")
-@click.option("--contact", type=click.Choice(["ground", "base"]), help="What the mass slides on.")
+@constants_options()
 @click.option("--yes", is_flag=True, help="Ask nothing: take what was recognised and what the options say.")
 @click.option("--output", type=click.Path(path_type=Path), default=Path(RIG_FILE), show_default=True, metavar="FILE",
               help="The file to write.")  # fmt: skip
@@ -65,7 +61,7 @@ def init(files: tuple[str, ...], yes: bool, output: Path, force: bool, **options
     guesses = [] if stated.channels else ss.rig.guess_columns(record)
     _show(groups[0], record, guesses)
     if not yes:
-        guesses = [_asked(each) for each in guesses]
+        guesses = [_asked(guess) for guess in guesses]
     told = _settings(options, stated, guesses, {} if yes else _constants(options, record, guesses))
     rig = ss.rig.rig_settings(told, source="the answers")
     try:
@@ -82,14 +78,16 @@ def init(files: tuple[str, ...], yes: bool, output: Path, force: bool, **options
 def _show(files: Sequence[Path], record: Record, guesses: Sequence[Guess]) -> None:
     say(" + ".join(map(str, files)))
     say(f"{len(record)} samples at {record.fs:.6g} Hz, {record.duration:.4g} s.")
-    rows = [(each.column, each.unit + ("" if each.stated else " ?"), each.spanned, _words(each)) for each in guesses]
+    rows = [
+        (guess.column, guess.unit + ("" if guess.stated else " ?"), guess.spanned, _words(guess)) for guess in guesses
+    ]
     for line in aligned(("column", "unit", "span", "taken for"), rows) if rows else ():
         say(line)
     suspicious = [
-        f"{each.column}: the file states no unit; {each.unit} is a guess." for each in guesses if _unsure(each)
+        f"{guess.column}: the file states no unit; {guess.unit} is a guess." for guess in guesses if _unsure(guess)
     ]
     suspicious += [
-        f"{each.column}: taken for {each.channel} by its unit alone." for each in guesses if "alone" in each.why
+        f"{guess.column}: taken for {guess.channel} by its unit alone." for guess in guesses if "alone" in guess.why
     ]
     faults = [spoken(fault) for fault in record.check() if fault.kind != "unit"]
     for words in (*suspicious, *faults):
@@ -135,7 +133,7 @@ def _constants(options: Mapping[str, Any], record: Record, guesses: Sequence[Gue
         if options[name] is None:
             answer = click.prompt(f"{words}; Enter if not known", default="", show_default=False, value_proc=_a(name))
             told |= {name: answer} if answer else {}
-    if any(each.channel == "z" for each in guesses):
+    if any(guess.channel == "z" for guess in guesses):
         for name, words in (("contact", "What does the mass slide on"), ("damper", "What does the damper end on")):
             if options[name] is None:
                 told[name] = click.prompt(words, type=click.Choice(["ground", "base"]), default="ground")
@@ -163,7 +161,7 @@ def _settings(
 ) -> dict[str, Any]:
     given = {name: options[name] for name in (*CONSTANTS, "damper", "contact") if options[name] is not None}
     known = {key: value for key, value in stated.model_dump(exclude_unset=True).items() if key not in given}
-    channels = {each.channel: each.text for each in guesses if each.channel}
+    channels = {guess.channel: guess.text for guess in guesses if guess.channel}
     return {**known, **given, **answers, **({"channels": channels} if channels else {})}
 
 

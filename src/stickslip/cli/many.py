@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Any
 import click
 
 import stickslip as ss
+from stickslip.cli.options import together
+from stickslip.cli.progress import progress
 from stickslip.cli.records import checksum, names_of, read
 from stickslip.cli.show import show
 
@@ -23,20 +25,16 @@ POINTS = 120  # of a small picture
 SHOWN = 3.0  # cycles in it, where there are cycles
 
 
-def many_options(command: Callable[..., None]) -> Callable[..., None]:
-    """The options of hundreds of records."""
-    options = [
-        click.option("--workers", type=click.IntRange(min=1), metavar="N",
-                     help=f"Processes for more than {MANY} records, all processors unless given."),
-        click.option("--engine", metavar="NAME", default="processes", show_default=True,
-                     help="Where many records are worked on: processes, cluster (Dask, on this machine) or "
-                     "cluster://HOST:PORT."),
-        click.option("--table", type=click.Path(path_type=Path), metavar="FILE",
-                     help="Write one row a record into FILE.csv, FILE.parquet or FILE.xlsx."),
-    ]  # fmt: skip
-    for option in reversed(options):
-        command = option(command)
-    return command
+# Of hundreds of records.
+many_options = together(
+    click.option("--workers", type=click.IntRange(min=1), metavar="N",
+                 help=f"Processes for more than {MANY} records, all processors unless given."),
+    click.option("--engine", metavar="NAME", default="processes", show_default=True,
+                 help="Where many records are worked on: processes, cluster (Dask, on this machine) or "
+                 "cluster://HOST:PORT."),
+    click.option("--table", type=click.Path(path_type=Path), metavar="FILE",
+                 help="Write one row a record into FILE.csv, FILE.parquet or FILE.xlsx."),
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -103,13 +101,25 @@ def _kept(folder: Path) -> Path:
     return folder.with_name(f"{folder.name}.rows")
 
 
-def finish(batch: Batch, places: Places, folder: Path | None, kept: Path, *, as_json: bool, everything: bool) -> None:
-    """Write what was found, show it, and forget what was kept for another run."""
-    written = ss.publish(batch, folder=folder) if folder is not None else None
+def answer_many(
+    question: str,
+    groups: Sequence[Sequence[Path]],
+    rig: RigSettings,
+    asked: Mapping[str, Any],
+    places: Places,
+    *,
+    folder: Path,
+    output: Path | None,
+    **shown: bool,
+) -> None:
+    """Ask all records, write what was found into `folder` (not of JSON alone), show it, forget what was kept of it."""
+    with progress(len(groups)) as tell:
+        batch = ask_many(question, groups, rig, asked, places, folder=folder, tell=tell)
+    written = ss.publish(batch, folder=folder) if output or not shown["as_json"] else None
     if places.table is not None:
         ss.story.write_table(batch, places.table)
-    _kept(kept).unlink(missing_ok=True)
-    show(batch, written, as_json=as_json, everything=everything)
+    _kept(folder).unlink(missing_ok=True)
+    show(batch, written, **shown)
 
 
 def _rows(tasks: Sequence[Task], kept: Mapping[str, Row]) -> Iterator[Row]:
@@ -161,8 +171,8 @@ def _decayed(record: Record, rig: RigSettings, **asked: Any) -> Any:
 
 
 def _squeaked(record: Record, rig: RigSettings, **asked: Any) -> Any:
-    found = ss.analyze_squeaks(record, contact=rig.contact, **asked)
-    return replace(found, normal=rig.normal_load(found.name) or found.normal)
+    findings = ss.analyze_squeaks(record, contact=rig.contact, **asked)
+    return replace(findings, normal=rig.normal_load(findings.name) or findings.normal)
 
 
 ASK: dict[str, Callable[..., Any]] = {"analyze": _analyzed, "decay": _decayed, "squeak": _squeaked}

@@ -21,49 +21,87 @@ def pair(text: str, option: str) -> tuple[str, str]:
     return name.strip(), value.strip()
 
 
-def reading_options(command: Callable[..., None]) -> Callable[..., None]:
-    """The options that say how a file is read."""
-    options = [
-        click.option(
-            "--channels",
-            multiple=True,
-            metavar='"NAME=COLUMN [UNIT]"',
-            help='What a column is: "x=qm [m]", "force=vir * 35.15 [N]", "a=acc [g] ± 1 %". Repeatable.',
-        ),
-        click.option(
-            "--units",
-            multiple=True,
-            metavar='"COLUMN=UNIT"',
-            help='Unit of a column whose header states none: "x=mm", "#1=ms". Repeatable.',
-        ),
-        click.option(
-            "--sensor",
-            "sensors",
-            multiple=True,
-            metavar='"CHANNEL.NAME=VALUE"',
-            help='What is known of a sensor: "a.delay=3 ms", "a.mount=125 Hz, 0.1", "load.inertia=20 g". Repeatable.',
-        ),
-        click.option("--fs", metavar="HZ", help="Sampling rate, for a file that states none."),
-        click.option("--time", metavar="COLUMN", help="Column that holds the time, where its header does not say."),
-        click.option("--delimiter", metavar="SIGN", help="Delimiter of a text file, where it can not be told."),
-        click.option("--decimal", type=click.Choice([".", ","]), help="Decimal sign of a text file."),
-        click.option("--rows", metavar="FIRST:LAST", help="Rows to keep of each file."),
-        click.option(
-            "--repair",
-            metavar="LIST",
-            help="Repairs after reading, in this order, with commas: clock, gaps, missing, spikes, clipping, drift; "
-            "for one channel alone as in drift:x.",
-        ),
-        click.option(
-            "--config",
-            type=click.Path(path_type=Path),
-            metavar="RIG.TOML",
-            help="The rig's constants and channel map; unless given rig.toml of this folder. Options go before it.",
-        ),
-    ]
-    for option in reversed(options):
-        command = option(command)
-    return command
+Decorator = Callable[[Callable[..., None]], Callable[..., None]]
+
+
+def together(*options: Decorator) -> Decorator:
+    """Several options as one decorator, in the order in which the help lists them."""
+
+    def decorate(command: Callable[..., None]) -> Callable[..., None]:
+        for option in reversed(options):
+            command = option(command)
+        return command
+
+    return decorate
+
+
+# How a file is read.
+reading_options = together(
+    click.option(
+        "--channels",
+        multiple=True,
+        metavar='"NAME=COLUMN [UNIT]"',
+        help='What a column is: "x=qm [m]", "force=vir * 35.15 [N]", "a=acc [g] ± 1 %". Repeatable.',
+    ),
+    click.option(
+        "--units",
+        multiple=True,
+        metavar='"COLUMN=UNIT"',
+        help='Unit of a column whose header states none: "x=mm", "#1=ms". Repeatable.',
+    ),
+    click.option(
+        "--sensor",
+        "sensors",
+        multiple=True,
+        metavar='"CHANNEL.NAME=VALUE"',
+        help='What is known of a sensor: "a.delay=3 ms", "a.mount=125 Hz, 0.1", "load.inertia=20 g". Repeatable.',
+    ),
+    click.option("--fs", metavar="HZ", help="Sampling rate, for a file that states none."),
+    click.option("--time", metavar="COLUMN", help="Column that holds the time, where its header does not say."),
+    click.option("--delimiter", metavar="SIGN", help="Delimiter of a text file, where it can not be told."),
+    click.option("--decimal", type=click.Choice([".", ","]), help="Decimal sign of a text file."),
+    click.option("--rows", metavar="FIRST:LAST", help="Rows to keep of each file."),
+    click.option(
+        "--repair",
+        metavar="LIST",
+        help="Repairs after reading, in this order, with commas: clock, gaps, missing, spikes, clipping, drift; "
+        "for one channel alone as in drift:x.",
+    ),
+    click.option(
+        "--config",
+        type=click.Path(path_type=Path),
+        metavar="RIG.TOML",
+        help="The rig's constants and channel map; unless given rig.toml of this folder. Options go before it.",
+    ),
+)
+
+
+def constants_options(mass: str = 'Oscillating mass in kg, or with its unit ("250 g", "2.42 ± 0.02 kg").') -> Decorator:
+    """The options that state the oscillator; `mass` is the help of the first."""
+    return together(
+        click.option("--mass", metavar="VALUE", help=mass),
+        click.option("--stiffness", metavar="VALUE", help="Spring in N/m, or with its unit."),
+        click.option("--damping", metavar="VALUE", help="Viscous damping of the suspension in N s/m."),
+        click.option("--damper", type=click.Choice(["ground", "base"]), help="What the damper ends on."),
+        contact_option,
+    )
+
+
+contact_option = click.option("--contact", type=click.Choice(["ground", "base"]), help="What the mass slides on.")
+normal_option = click.option(
+    "--normal",
+    multiple=True,
+    metavar='LOAD or "PATTERN=LOAD"',
+    help="Normal load in N, for all files or for those whose name fits. Repeatable.",
+)
+form_option = click.option(
+    "--format",
+    "form",
+    type=click.Choice(["csv", "h5", "parquet"]),
+    default="csv",
+    show_default=True,
+    help="Format of the record.",
+)
 
 
 def usable(context: click.Context, option: click.Parameter, folder: Path | None) -> Path | None:
@@ -78,7 +116,7 @@ all_option = click.option(
 )
 
 
-def result_options(folder: str, *, short: bool = True) -> Callable[[Callable[..., None]], Callable[..., None]]:
+def result_options(folder: str, *, short: bool = True) -> Decorator:
     """The options that say where the results go; `folder` is where they go unless it is said.
 
     With `short` the terminal has the answer, and all of it is an option.
@@ -96,7 +134,7 @@ def result_options(folder: str, *, short: bool = True) -> Callable[[Callable[...
         is_flag=True,
         help="Print the results as JSON and nothing else; a folder is written only with --output.",
     )
-    return lambda command: output(as_json(all_option(command) if short else command))
+    return together(output, as_json, *([all_option] if short else []))
 
 
 changes_option = click.option(
@@ -108,16 +146,12 @@ changes_option = click.option(
 )
 
 
-def case_options(command: Callable[..., None]) -> Callable[..., None]:
-    """The options that say how long it runs and what is changed of it."""
-    options = [
-        click.option("--duration", metavar="TIME", help="Time to simulate in s, or with its unit."),
-        click.option("--cycles", type=click.FloatRange(min=0, min_open=True), help="The same in periods of the drive."),
-        changes_option,
-    ]
-    for option in reversed(options):
-        command = option(command)
-    return command
+# How long it runs, and what is changed of it.
+case_options = together(
+    click.option("--duration", metavar="TIME", help="Time to simulate in s, or with its unit."),
+    click.option("--cycles", type=click.FloatRange(min=0, min_open=True), help="The same in periods of the drive."),
+    changes_option,
+)
 
 
 def wanted_case(

@@ -7,30 +7,27 @@ from typing import Any
 import click
 
 import stickslip as ss
-from stickslip.cli.acquire import acquire
+from stickslip.cli.acquire import acquire, devices
 from stickslip.cli.analyze import analyze, demo
 from stickslip.cli.bench import bench
 from stickslip.cli.commission import commission
 from stickslip.cli.decay import decay
-from stickslip.cli.devices import devices
 from stickslip.cli.exchange import check, convert, datasets
-from stickslip.cli.fit import fit
+from stickslip.cli.fit import fit, predict
 from stickslip.cli.impact import impact
 from stickslip.cli.init import init
-from stickslip.cli.interrupted import INTERRUPTED, SENTENCE
+from stickslip.cli.joint import joint
 from stickslip.cli.lab import lab
-from stickslip.cli.mended import mended
-from stickslip.cli.predict import predict
 from stickslip.cli.progress import compiling
-from stickslip.cli.regimes import bifurcation, dither, stability
+from stickslip.cli.regimes import bifurcation, dither, stability, sweep
 from stickslip.cli.rig import rig
 from stickslip.cli.simulate import simulate
 from stickslip.cli.squeak import squeak
-from stickslip.cli.sweep import sweep
 from stickslip.cli.terminal import complain, say
 from stickslip.cli.thesis import thesis
 from stickslip.cli.wavelet import wavelet
-from stickslip.cli.words import spoken
+from stickslip.cli.words import mended, spoken
+from stickslip.errors import INTERRUPTED, INTERRUPTION
 
 ARGUMENTS = "stickslip.arguments"  # the key under which the context keeps what was typed
 
@@ -53,10 +50,11 @@ class _Commands(click.Group):
             with compiling():
                 return super().invoke(ctx)
         except KeyboardInterrupt:
-            say(SENTENCE, err=True)
+            say(INTERRUPTION, err=True)
             ctx.exit(INTERRUPTED)
         except click.UsageError as error:
-            ctx.exit(_misused(error, " ".join(filter(None, (ctx.command_path, ctx.invoked_subcommand)))))
+            within = " ".join(filter(None, (ctx.command_path, ctx.invoked_subcommand)))
+            ctx.exit(_misused(error, error.ctx.command_path if error.ctx else within))
         except ss.StickslipError as error:
             complain(spoken(error))
             for line in mended(ctx.meta.get(ARGUMENTS, ()), error):
@@ -100,6 +98,7 @@ for _command in (
     fit,
     impact,
     init,
+    joint,
     lab,
     predict,
     rig,

@@ -1,4 +1,4 @@
-"""stickslip stability, bifurcation, dither: what a system does, asked of its equations."""
+"""stickslip sweep, stability, bifurcation, dither: what a system does, asked of its equations."""
 
 from __future__ import annotations
 
@@ -9,12 +9,58 @@ from typing import TYPE_CHECKING, Any
 import click
 
 import stickslip as ss
-from stickslip.cli.options import changes_option, folder_name, result_options, wanted_case
+from stickslip.cli.options import all_option, changes_option, folder_name, result_options, usable, wanted_case
 from stickslip.cli.progress import progress
-from stickslip.cli.show import show
+from stickslip.cli.show import print_json, show
+from stickslip.cli.terminal import say
+from stickslip.errors import INTERRUPTED
 
 if TYPE_CHECKING:
     from stickslip.systems import Case
+
+
+@click.command()
+@click.argument("file", type=click.Path(path_type=Path))
+@click.option("--engine", default="threads", show_default=True, metavar="NAME",
+              help="Where it runs: serial, threads, dask, dask://HOST:PORT or cuda.")  # fmt: skip
+@click.option("--store", type=click.Path(path_type=Path), metavar="MAP.ZARR",
+              help="Where what is done is kept, and goes on after an end; FILE.zarr unless given.")  # fmt: skip
+@click.option("--output", type=click.Path(path_type=Path), callback=usable, metavar="DIR",
+              help="Folder for the report and its figures; none unless given.")  # fmt: skip
+@click.option("--json", "as_json", is_flag=True, help="Print the results as JSON and nothing else.")
+@all_option
+def sweep(file: Path, engine: str, store: Path | None, output: Path | None, as_json: bool, everything: bool) -> None:
+    """Map what a system does over a grid of its parameters.
+
+    FILE names the system, the grid and what is asked of each motion; every finished block is kept in the store, and a
+    sweep that was ended goes on there when it is called again.
+
+    \b
+    stickslip sweep grid.toml --engine threads --store map.zarr --output maps
+    """
+    asked = ss.maps.read_sweep(file)
+    place = store if store is not None else file.with_suffix(".zarr")
+    found = ss.sweep(
+        asked.case.system,
+        asked.grid,
+        measures=asked.measures,
+        cycles=asked.cycles,
+        settle=asked.settle,
+        start=asked.case.start,
+        engine=engine,
+        store=place,
+    )
+    story, whole = ss.summary(found), found.attrs["status"] == "complete"
+    written = ss.publish(found, folder=output, system=asked.case.system) if output is not None else None
+    if as_json:
+        print_json({**story.data(), "store": str(place)})
+        raise SystemExit(0 if whole else INTERRUPTED)
+    show(found, written, as_json=False, everything=everything)
+    say(f"Map: {place}")
+    if not whole:
+        say("Call again to go on.")
+        raise SystemExit(INTERRUPTED)
+
 
 CASE = click.argument("case", metavar="SCENARIO|FILE.toml")
 
@@ -118,7 +164,7 @@ def dither(case: str, output: Path | None, as_json: bool, everything: bool, **op
     system = wanted.system
     if not isinstance(system, ss.Oscillator):
         raise click.BadParameter("dither is found for a single mass; give an oscillator", param_hint="CASE")
-    tones = [_number(each, "Hz", "--frequency") for each in options["frequencies"]] or None
+    tones = [_number(frequency, "Hz", "--frequency") for frequency in options["frequencies"]] or None
     chosen = {key: options[key] for key in ("on", "cycles", "precision")}
     _answer(
         wanted, "dither", lambda: ss.dither(system, frequency=tones, start=wanted.start or None, **chosen),

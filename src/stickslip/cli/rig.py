@@ -9,7 +9,15 @@ from typing import TYPE_CHECKING, Any
 import click
 
 import stickslip as ss
-from stickslip.cli.options import case_options, folder_name, pair, reading_options, result_options, wanted_case
+from stickslip.cli.options import (
+    case_options,
+    folder_name,
+    form_option,
+    pair,
+    reading_options,
+    result_options,
+    wanted_case,
+)
 from stickslip.cli.progress import progress
 from stickslip.cli.records import folder_after, groups_of, read, rig_of
 from stickslip.cli.show import show
@@ -81,14 +89,7 @@ def rig() -> None:
     metavar="RIG.TOML",
     help="Of a plan: its [shaker] has to be able to move the base so.",
 )
-@click.option(
-    "--format",
-    "form",
-    type=click.Choice(["csv", "h5", "parquet"]),
-    default="csv",
-    show_default=True,
-    help="Format of the record.",
-)
+@form_option
 @case_options
 @result_options("NAME-rig, or NAME-plan,")
 def measure(case: str, output: Path | None, as_json: bool, everything: bool, plan: bool, **options: Any) -> None:

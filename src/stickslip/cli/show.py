@@ -80,7 +80,7 @@ def _print_all(story: Story) -> None:
     """Everything that the page tells in words, each sentence once."""
     lines = [line for text in story.headline for line in _lines(text)]
     lines += [*_remedy(story), *_numbers(story, story.lines), ""]
-    said = {str(each) for each in (*story.headline, *story.notices)} | {each.reason for each in story.notices}
+    said = {str(each) for each in (*story.headline, *story.notices)} | {notice.reason for notice in story.notices}
     lines += [line for caution in story.notices for line in _caution(story, caution)]
     lines += [line for fault in story.faults or () if fault not in said for line in _lines(fault, "- ")]
     for table in story.tables:

@@ -9,11 +9,11 @@ from typing import Any
 import click
 
 import stickslip as ss
-from stickslip.cli.interrupted import INTERRUPTED
-from stickslip.cli.options import case_options, folder_name, result_options, wanted_case
+from stickslip.cli.options import case_options, folder_name, form_option, result_options, wanted_case
 from stickslip.cli.progress import progress
 from stickslip.cli.show import show
 from stickslip.cli.terminal import say, say_json, wrapped
+from stickslip.errors import INTERRUPTED
 
 LIST_WIDTH = 100
 
@@ -23,14 +23,7 @@ LIST_WIDTH = 100
 @click.option("--list", "listed", is_flag=True, help="List the scenarios, with what is known of each.")
 @case_options
 @click.option("--fs", metavar="HZ", help="Sampling rate of the record; fine enough for the motion unless given.")
-@click.option(
-    "--format",
-    "form",
-    type=click.Choice(["csv", "h5", "parquet"]),
-    default="csv",
-    show_default=True,
-    help="Format of the record.",
-)
+@form_option
 @click.option("--animate", "animation", type=click.Choice(["gif", "mp4"]), help="Add a moving picture; mp4 by ffmpeg.")
 @click.option("--sound", is_flag=True, help="Add what is heard, sound.wav; of a squeak rig its sensors' record too.")
 @result_options("NAME-stickslip")
@@ -68,20 +61,23 @@ def simulate(
 
 
 def _list_scenarios(*, as_json: bool, everything: bool) -> None:
-    found = {name: ss.scenarios.get(name) for name in ss.scenarios.names()}
+    scenarios = {name: ss.scenarios.get(name) for name in ss.scenarios.names()}
     if as_json:
-        say_json({name: each.about for name, each in found.items()})
+        say_json({name: scenario.about for name, scenario in scenarios.items()})
         return
     if not everything:
-        families = [list(group) for _, group in itertools.groupby(found, key=lambda name: name.partition(" ")[0])]
+        families = [list(group) for _, group in itertools.groupby(scenarios, key=lambda name: name.partition(" ")[0])]
         shown = [f'"{names[0]}"' + f" and {len(names) - 1} more" * (len(names) > 1) for names in families]
-        more = f'{len(found)} scenarios; --all has each with what is known of it; run one: stickslip simulate "NAME"'
+        more = (
+            f'{len(scenarios)} scenarios; --all has each with what is known of it; run one: stickslip simulate "NAME"'
+        )
         say("\n".join([*wrapped(", ".join(shown)), "", *wrapped(more)]))
         return
-    cases = [(ss.systems.scenario_case(name), ", ".join(each.known).replace("_", " ")) for name, each in found.items()]
-    for (about, parts, known), group in itertools.groupby(
-        cases, key=lambda each: (each[0].about, each[0].parts, each[1])
-    ):
+    cases = [
+        (ss.systems.scenario_case(name), ", ".join(scenario.known).replace("_", " "))
+        for name, scenario in scenarios.items()
+    ]
+    for (about, parts, known), group in itertools.groupby(cases, key=lambda of: (of[0].about, of[0].parts, of[1])):
         say(f"\n{about}\n  {parts}; known: {known}")
         line = ""
         for case, _ in group:
@@ -91,4 +87,4 @@ def _list_scenarios(*, as_json: bool, everything: bool) -> None:
                 line = ""
             line += name
         say(line)
-    say(f'\n{len(found)} scenarios; run one with: stickslip simulate "NAME"')
+    say(f'\n{len(scenarios)} scenarios; run one with: stickslip simulate "NAME"')

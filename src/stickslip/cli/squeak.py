@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 import click
 
 import stickslip as ss
-from stickslip.cli.many import Places, ask_many, finish, many_options
-from stickslip.cli.options import reading_options, result_options
+from stickslip.cli.many import Places, answer_many, many_options
+from stickslip.cli.options import contact_option, normal_option, reading_options, result_options
 from stickslip.cli.progress import progress
 from stickslip.cli.records import (
     answers,
@@ -33,13 +33,8 @@ if TYPE_CHECKING:
     "--channel", metavar="NAME", help="Where to listen; sound, normal_acceleration, a, friction unless given."
 )
 @click.option("--frequencies", metavar="LOW:HIGH", help="What is listened to in Hz; from 50 Hz up unless given.")
-@click.option("--contact", type=click.Choice(["ground", "base"]), help="What the mass slides on.")
-@click.option(
-    "--normal",
-    multiple=True,
-    metavar='LOAD or "PATTERN=LOAD"',
-    help="Normal load in N, for all files or for those whose name fits. Repeatable.",
-)
+@contact_option
+@normal_option
 @click.option(
     "--lever",
     metavar="VALUE",
@@ -70,7 +65,7 @@ def squeak(
     stickslip squeak squeal.wav --channels "sound=sound * 2.5 [Pa]"
     stickslip squeak wet_6N.csv wet_1N.csv --normal "*6N*=6.13" --normal "*1N*=1.23"
     """
-    places = Places.of(options)
+    places, shown = Places.of(options), {"as_json": as_json, "everything": everything}
     rig = rig_of(**options)
     groups = [group for argument in files for group in groups_of(argument)]
     require_fits(options["normal"], groups)
@@ -78,15 +73,15 @@ def squeak(
 
     if places.wanted(groups):
         asked = {"channel": channel, "frequencies": frequencies, "lever": lever}
-        with progress(len(groups)) as tell:
-            batch = ask_many("squeak", groups, rig, asked, places, folder=folder, tell=tell)
-        finish(batch, places, folder if output or not as_json else None, folder, as_json=as_json, everything=everything)
+        answer_many("squeak", groups, rig, asked, places, folder=folder, output=output, **shown)
         return
 
     def ask(record: Record) -> Findings:
-        found = ss.analyze_squeaks(record, channel=channel, frequencies=frequencies, contact=rig.contact, lever=lever)
-        loads = (rig.normal_load(part) for part in (*found.name.split(" + "), found.name))
-        return replace(found, normal=next((load for load in loads if load is not None), found.normal))
+        findings = ss.analyze_squeaks(
+            record, channel=channel, frequencies=frequencies, contact=rig.contact, lever=lever
+        )
+        loads = (rig.normal_load(part) for part in (*findings.name.split(" + "), findings.name))
+        return replace(findings, normal=next((load for load in loads if load is not None), findings.normal))
 
     with progress(2 * len(groups) + 1) as tell:
         found, refused = answers(groups, rig, ask, tell)
@@ -94,4 +89,4 @@ def squeak(
         tell("drawing and writing", 2 * len(groups))
         written = ss.publish(results, folder=folder) if output or not as_json else None
     name_left_out(refused)
-    show(results, written, as_json=as_json, everything=everything)
+    show(results, written, **shown)

@@ -29,7 +29,8 @@ def thesis(chapters: tuple[str, ...], output: Path | None, as_json: bool) -> Non
     stickslip thesis
     stickslip thesis 6 --output chapter6
 
-    The exit code is 1 where a verdict no longer holds.
+    Beside each figure stands what the text says that one should see, ticked where a number of ours shows it. The exit
+    code is 1 where a verdict no longer holds, or something is no longer seen.
     """
     import stickslip_thesis.page as pages  # the chapters compute and draw: they take a second to load
 
@@ -44,7 +45,7 @@ def thesis(chapters: tuple[str, ...], output: Path | None, as_json: bool) -> Non
         say_json(found)
     else:
         _show(found, done, folder)
-    if found["verdicts"][pages.CHANGED]:
+    if not pages.holds(found):
         raise SystemExit(1)
 
 
@@ -66,5 +67,12 @@ def _show(found: dict[str, Any], done: tuple[Any, ...], folder: Path | None) -> 
     say("\n".join(aligned(("chapter", *found["verdicts"]), counts)))
     total = ", ".join(f"{count} {verdict}" for verdict, count in found["verdicts"].items() if count)
     say("\n".join(wrapped(f"{sum(found['verdicts'].values())} printed numbers: {total}.")))
+    if found["seen"]:
+        ticked = sum(one["seen"] for one in found["seen"])
+        say(f"Of {len(found['seen'])} things that the text says one should see, {ticked} are seen.")
+        unseen = [
+            f"not seen: {one['says']} ({one['section']}): {one['why']}" for one in found["seen"] if not one["seen"]
+        ]
+        say("\n".join(line for text in unseen for line in wrapped(text)))
     if folder is not None:
         say(f"Report: {folder / 'thesis.html'}")

@@ -54,10 +54,10 @@ def wavelet(
         tell(f"reading {name_of(groups[0])}", 0)
         parts = _told_of(read_parts(groups[0], rig), tell)
         asked |= {"mass": rig.mass, "stiffness": rig.stiffness}
-        found = ss.answers.time_frequency(parts, frequencies=frequencies, **asked)
+        findings = ss.answers.time_frequency(parts, frequencies=frequencies, **asked)
         tell("drawing and writing", 2)
-        written = ss.publish(found, folder=folder) if folder else None
-    show(found, written, as_json=as_json, everything=everything)
+        written = ss.publish(findings, folder=folder) if folder else None
+    show(findings, written, as_json=as_json, everything=everything)
 
 
 def _told_of(parts: Iterator[Record], tell: Callable[[str, float], None]) -> Iterator[Record]:

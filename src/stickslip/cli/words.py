@@ -1,8 +1,12 @@
-"""What a sentence says to a Python user, and how the command line says it."""
+"""How the command line says what a sentence says to a Python user; and the command as it was typed, mended."""
 
 from __future__ import annotations
 
 import re
+import shlex
+from collections.abc import Iterator, Sequence
+
+from stickslip.errors import MISSTATED, TOO_SHORT, StickslipError
 
 REPAIRS = {
     "repair_clock": "clock",
@@ -48,3 +52,25 @@ def spoken(words: object) -> str:
     for said, option in _SPOKEN:
         text = re.sub(said, option, text)
     return text
+
+
+# Of each kind of error the options without which the command may succeed.
+CAUSES = {MISSTATED: ("--delimiter", "--decimal"), TOO_SHORT: ("--rows",)}
+
+
+def mended(arguments: Sequence[str], error: StickslipError) -> Iterator[str]:
+    """Two lines with the command that mends an error, where leaving an option out may do it."""
+    kept = list(_without(arguments, CAUSES.get(error.kind, ())))
+    if len(kept) < len(arguments):
+        yield "To mend it:"
+        yield shlex.join(["stickslip", *kept])
+
+
+def _without(arguments: Sequence[str], options: Sequence[str]) -> Iterator[str]:
+    """The words but these options and their values."""
+    words = iter(arguments)
+    for word in words:
+        if word in options:
+            next(words, None)
+        elif word.partition("=")[0] not in options:
+            yield word

@@ -59,6 +59,11 @@ class Slip:
     delays: Mapping[str, float] = field(default_factory=dict)
     zeros: Mapping[str, float] = field(default_factory=dict)
 
+    @property
+    def of_one_unit(self) -> bool:
+        """Whether one wrong unit is meant of several channels; cables that are exchanged leave the units alone."""
+        return len(self.cure) > 1 and all(name == read for name, (read, _) in self.cure.items())
+
 
 @dataclass(frozen=True)
 class Amplitudes:
@@ -147,11 +152,11 @@ def _explaining(balance: Amplitudes) -> tuple[Slip, ...]:
         return ()
     # two that fit as well are ranked by how well the friction opposes the motion then, joint units before single ones
     tried = [(balance.cured(slip), slip) for slip in _slips(balance)]
-    ranked = sorted(tried, key=lambda each: each[0].misfit + (each[0].lag / 90 if each[0].knows else 0.0))
+    ranked = sorted(tried, key=lambda pair: pair[0].misfit + (pair[0].lag / 90 if pair[0].knows else 0.0))
     near = max(most, 1.2 * ranked[0][0].misfit)
-    found = [slip for cured, slip in ranked if cured.misfit < near and cured.misfit * BETTER < before]
-    joint = [slip for slip in found if len(slip.cure) > 1 and slip.words.startswith("x and z are in")]
-    return tuple(joint[:1]) if joint and balance.of_one_size else tuple(s for s in found if s not in joint)
+    likely = [slip for cured, slip in ranked if cured.misfit < near and cured.misfit * BETTER < before]
+    joint = [slip for slip in likely if slip.of_one_unit]
+    return tuple(joint[:1]) if joint and balance.of_one_size else tuple(s for s in likely if not s.of_one_unit)
 
 
 def _of_the_balance(balance: Amplitudes) -> Iterator[Slip]:

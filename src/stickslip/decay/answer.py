@@ -192,7 +192,7 @@ def fit_pendulum(
     fitted = chosen.fitted
     blocks, model = fitted.blocks, f"{fitted.motion.words}, spring sin x"
     kind = "white" if chosen.noise.whiteness >= COLOURED else "correlated"
-    choices = [each.choice for each in motions]
+    choices = [motion.choice for motion in motions]
     estimate = _estimator(chosen, status, kind)
     begins, far = beginning(ring_down.held and not later)
     damping = estimate("damping_ratio", "damping ratio", "1")
@@ -372,25 +372,25 @@ def _fitted(releases: list[Release], half_cycles: tuple[int, ...], start: Array 
     return Together(half_cycles, p, value, curvature, objective, tuple(places))
 
 
-def unlike(releases: list[Release], found: list[Together]) -> float:
+def unlike(releases: list[Release], fits: list[Together]) -> float:
     """p-value of the releases sharing frequency, damping ratio and dry friction: what sharing costs is chi-square."""
     from scipy.special import chdtrc
 
     if len(releases) == 1:
         return 1.0
     alone = sum(min(each.value for each in fit_together([release])) for release in releases)
-    cost = min(each.value for each in found) - alone
+    cost = min(each.value for each in fits) - alone
     return float(chdtrc(SHARED * (len(releases) - 1), max(cost, 0.0)))
 
 
-def ends_together(found: list[Together], level: float, count: int) -> Array:
+def ends_together(fits: list[Together], level: float, count: int) -> Array:
     """Ends (count, 2) of the profile likelihood of the first parameters, by the best candidate at each end."""
     answer = np.empty((count, 2))
     for which in range(count):
         for column, side in enumerate((-1, 1)):
             reached: list[float] = []
             beyond: list[float] = []
-            for each in found:
+            for each in fits:
                 if each.value >= level:
                     continue
                 p = extreme(each.objective, each.p, each.value, which, side, level)

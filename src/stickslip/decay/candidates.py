@@ -226,9 +226,9 @@ def fit_motion(
             return tried[best]
         allowed = blocks.motion(tried[best].parameters)[2]
         new = [
-            each
-            for each in dict.fromkeys((allowed, best - 1, best + 1, best - 2, best + 2))
-            if each > 0 and each not in tried
+            count
+            for count in dict.fromkeys((allowed, best - 1, best + 1, best - 2, best + 2))
+            if count > 0 and count not in tried
         ]
         if not new:
             break
@@ -269,7 +269,7 @@ def _search(motion: Motion, blocks: BlockMeans, start: Array, half_cycles: int |
     def slope_at(free: Array) -> Array:
         return -at(free)[1]
 
-    found = least_squares(
+    solved = least_squares(
         residual_at,
         np.clip(parameters[columns] / units, low, high),
         jac=slope_at,
@@ -280,8 +280,8 @@ def _search(motion: Motion, blocks: BlockMeans, start: Array, half_cycles: int |
         gtol=None,
         max_nfev=EVALUATIONS,
     )
-    parameters[columns] = units * found.x
-    residual, jacobian, begun = at(found.x)
+    parameters[columns] = units * solved.x
+    residual, jacobian, begun = at(solved.x)
     return Fitted(motion, parameters, begun, half_cycles is not None, residual, jacobian / units, blocks)
 
 

@@ -228,7 +228,7 @@ class Choice:
 
     def seen_beside(self, *names: str) -> str:
         """What is seen beside the motions of these names, in words; empty where one of them is not rejected."""
-        tried = [each for each in self.candidates if each.name in names]
+        tried = [candidate for candidate in self.candidates if candidate.name in names]
         if not tried or any(each.kept for each in tried):
             return ""
         best = min(tried, key=lambda each: each.fitted.motion.size)
@@ -236,7 +236,7 @@ class Choice:
 
     def candidate(self, name: str) -> Candidate:
         """The candidate of a name in ``MOTIONS``."""
-        return next(each for each in self.candidates if each.name == name)
+        return next(candidate for candidate in self.candidates if candidate.name == name)
 
 
 def choose(
@@ -321,7 +321,9 @@ def kept_by_all(choices: Sequence[Choice]) -> tuple[str, ...]:
     A true candidate is rejected once in twenty, however many releases look for it (Bonferroni). Least is up to twice
     the best residual of all releases together.
     """
-    tried = {each.name: [choice.candidate(each.name) for choice in choices] for each in choices[0].candidates}
+    tried = {
+        candidate.name: [choice.candidate(candidate.name) for choice in choices] for candidate in choices[0].candidates
+    }
     kept = tuple(name for name, each in tried.items() if len(choices) * min(one.p_value for one in each) >= SIZE)
     costs = {name: sum(one.fitted.cost for one in each) for name, each in tried.items()}
     return kept or tuple(name for name, cost in costs.items() if cost <= NEAR**2 * min(costs.values()))
@@ -329,17 +331,19 @@ def kept_by_all(choices: Sequence[Choice]) -> tuple[str, ...]:
 
 def interval_of(choices: Sequence[Choice], parameter: str) -> tuple[float, float]:
     """95 % interval of what several releases share, whichever of the candidates not rejected is the motion."""
-    ends = [_pooled([each.candidate(name).estimate(parameter) for each in choices]) for name in kept_by_all(choices)]
+    ends = [
+        _pooled([choice.candidate(name).estimate(parameter) for choice in choices]) for name in kept_by_all(choices)
+    ]
     return min(low for low, _ in ends), max(high for _, high in ends)
 
 
 def _pooled(estimates: Sequence[Estimate]) -> tuple[float, float]:
     """Interval of the mean of estimates, each as heavy as it is sure."""
-    sd = np.array([each.sd for each in estimates])
+    sd = np.array([estimate.sd for estimate in estimates])
     share = 1.0 * (sd == 0) if (sd == 0).any() else sd.min() ** 2 / sd**2
     share /= share.sum()
-    value = share @ [each.value for each in estimates]
-    low, high = (np.array([each.interval[side] - each.value for each in estimates]) for side in (0, 1))
+    value = share @ [estimate.value for estimate in estimates]
+    low, high = (np.array([estimate.interval[side] - estimate.value for estimate in estimates]) for side in (0, 1))
     return float(value - np.linalg.norm(share * low)), float(value + np.linalg.norm(share * high))
 
 

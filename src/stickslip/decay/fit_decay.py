@@ -138,7 +138,7 @@ def fit_decay(
             ring_downs, restoring=restoring, noise=noise, motions=motions, known=known, notes=notes, history=history
         )
     sources = [each for each, those in zip(records, found, strict=True) for _ in those.ring_downs]
-    ring_downs = [_described(ring_down, each) for ring_down, each in zip(ring_downs, sources, strict=True)]
+    ring_downs = [_described(ring_down, source) for ring_down, source in zip(ring_downs, sources, strict=True)]
     releases = [_release(each, noise) for each in ring_downs]
     motion = _alone(releases[0]) if len(releases) == 1 and releases[0].noise.kind == "white" else _together(releases)
     return _answer(ring_downs, releases, motion, motions, known, notes, history)
@@ -148,7 +148,7 @@ def _releases_of(records: list[Record], channel: str | None) -> list[Releases]:
     """The releases of each record, all of one channel."""
     if not records:
         raise EstimateError("no record", "a decay is fitted to one record at least", "pass a record, or several")
-    found = [find_releases(each, channel=channel) for each in records]
+    found = [find_releases(record, channel=channel) for record in records]
     names = {ring_down.channel for each in found for ring_down in each.ring_downs}
     if len(names) > 1:
         raise EstimateError(
@@ -230,17 +230,17 @@ def _alone(release: Release) -> _Motion:
 
 
 def _together(releases: list[Release]) -> _Motion:
-    found = fit_together(releases)
-    least = min(each.value for each in found)
-    freedom = sum(each.blocks.freedom for each in releases)
-    share = np.exp(-0.5 * np.array([each.value - least for each in found]))
-    best = found[int(np.argmax(share))]
+    fits = fit_together(releases)
+    least = min(fit.value for fit in fits)
+    freedom = sum(release.blocks.freedom for release in releases)
+    share = np.exp(-0.5 * np.array([fit.value - least for fit in fits]))
+    best = fits[int(np.argmax(share))]
     covariance = np.asarray(np.linalg.pinv(best.curvature)[:6, :6], dtype=np.float64)
-    limits = ends_together(found, least + student(freedom) ** 2, 6)
-    motions = [tuple(each.motion(k) for k in range(len(releases))) for each in found]
-    rows = np.array([each.p[:6] for each in found])
-    mean = _mean(rows, share / share.sum(), covariance, limits, [each.half_cycles for each in found], motions)
-    return replace(mean, alike=unlike(releases, found))
+    limits = ends_together(fits, least + student(freedom) ** 2, 6)
+    motions = [tuple(fit.motion(k) for k in range(len(releases))) for fit in fits]
+    rows = np.array([fit.p[:6] for fit in fits])
+    mean = _mean(rows, share / share.sum(), covariance, limits, [fit.half_cycles for fit in fits], motions)
+    return replace(mean, alike=unlike(releases, fits))
 
 
 def _mean(
@@ -284,7 +284,7 @@ def _answer(
     checks = (f"{many} half cycles" + ("" if likelihood > 0.995 else f" (likelihood {likelihood:.2f})"),)
     noise = "; ".join(dict.fromkeys(each.noise.words for each in releases))
     method = f"whole waveform, noise {noise}, profile likelihood"
-    starts, first = [each.first for each in ring_downs], ring_downs[0]
+    starts, first = [ring_down.first for ring_down in ring_downs], ring_downs[0]
     begins, far = beginning(first.held if first.order == 0 else float(motion.values[5]) > -1 / first.fs)
 
     def estimate(index: int, words: str, unit: str, factor: float = 1.0, offset: float = 0.0) -> Estimate:
@@ -326,14 +326,14 @@ def _answer(
 
 def _left_out(ring_downs: list[RingDown]) -> list[str]:
     """What of the releases is not fitted, in words."""
-    cut = any(CLIPPED in each.marks or not each.sound.all() for each in ring_downs)
-    lost = any(LOST in each.marks for each in ring_downs)
+    cut = any(CLIPPED in ring_down.marks or not ring_down.sound.all() for ring_down in ring_downs)
+    lost = any(LOST in ring_down.marks for ring_down in ring_downs)
     return [words for words, told in ((CLIPPED, cut), (LOST, lost)) if told]
 
 
 def _seen_beside(choices: list[Choice]) -> list[str]:
     """Of the first release that shows another motion than viscous and dry friction, which one, in words."""
-    return [words for each in choices if (words := each.seen_beside("both", "static"))][:1]
+    return [words for choice in choices if (words := choice.seen_beside("both", "static"))][:1]
 
 
 def _misfit(releases: list[Release], fitted: list[Array]) -> tuple[Doubt, ...]:

@@ -174,9 +174,10 @@ class Releases:
 
     def __repr__(self) -> str:
         told = [
-            f"{each.release:.4g} to {each.stop:.4g} s: {len(each.turns)} extremes at {each.frequency:.4g} Hz"
-            f" from {each.amplitude:.3g} {each.unit}" + ("" if each.stopped else ", still moving at the end")
-            for each in self.ring_downs
+            f"{ring_down.release:.4g} to {ring_down.stop:.4g} s: {len(ring_down.turns)} extremes"
+            f" at {ring_down.frequency:.4g} Hz from {ring_down.amplitude:.3g} {ring_down.unit}"
+            + ("" if ring_down.stopped else ", still moving at the end")
+            for ring_down in self.ring_downs
         ]
         return "\n  ".join([f"{len(told)} release{'s' * (len(told) > 1)}:", *told])
 
@@ -239,14 +240,14 @@ def find_releases(record: Record, *, channel: str | None = None) -> Releases:
     return Releases(kept, (*many, *lost, *dict.fromkeys(note for each in kept for note in each.notes)))
 
 
-def _as_let_go(found: tuple[RingDown, ...]) -> tuple[RingDown, ...]:
+def _as_let_go(ring_downs: tuple[RingDown, ...]) -> tuple[RingDown, ...]:
     """The releases, each up to where something caught it: friction holds no mass where another release went on."""
-    longest = max(found, key=lambda each: len(each.turns))
+    longest = max(ring_downs, key=lambda each: len(each.turns))
     if longest.order > 0 or not longest.stopped:
-        return found
+        return ring_downs
     turned = abs(float(longest.samples[longest.turns[-2]]) - longest.rest)
     kept = []
-    for each in found:
+    for each in ring_downs:
         stayed = abs(float(each.samples[each.turns[-1]]) - longest.rest)
         if each.stopped and stayed > HELD * turned + SEEN * each.noise:
             last = int(each.turns[-2])

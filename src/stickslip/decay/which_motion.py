@@ -121,11 +121,11 @@ def choose_motion(
     ('both', True, True)
     """
     releases = find_releases(record, channel=channel)
-    found = motion_of(releases.ring_downs[0], restoring=restoring, candidates=candidates)
+    motion = motion_of(releases.ring_downs[0], restoring=restoring, candidates=candidates)
     if len(releases.ring_downs) == 1:
-        return found
+        return motion
     several = f"the first of {len(releases.ring_downs)} releases alone was read"
-    return replace(found, status=several if found.status == "ok" else f"{found.status}; {several}")
+    return replace(motion, status=several if motion.status == "ok" else f"{motion.status}; {several}")
 
 
 def named(candidates: str | tuple[str, ...] | None) -> tuple[str, ...]:
@@ -278,7 +278,7 @@ def _answer(choice: Choice, ring_down: RingDown) -> DecayMotion:
         whichever((choice,), damping, "damping_ratio"),
         whichever((choice,), dry, "dry_displacement"),
         choice.model,
-        tuple((each.name, each.fitted.motion.words, each.verdict) for each in choice.candidates),
+        tuple((candidate.name, candidate.fitted.motion.words, candidate.verdict) for candidate in choice.candidates),
         choice,
         told(ring_down, "" if choice.status == "ok" else choice.status),
         _terms(chosen, unit),

@@ -1,10 +1,10 @@
 from stickslip.figures.animation import animate as animate
+from stickslip.figures.bench import plot_plan as plot_plan
 from stickslip.figures.bifurcation import plot_basins as plot_basins
 from stickslip.figures.bifurcation import plot_bifurcation as plot_bifurcation
 from stickslip.figures.bifurcation import plot_boundary as plot_boundary
 from stickslip.figures.bifurcation import plot_dither as plot_dither
 from stickslip.figures.contact import plot_transition_speed as plot_transition_speed
-from stickslip.figures.experiment import plot_plan as plot_plan
 from stickslip.figures.friction import plot_consistency as plot_consistency
 from stickslip.figures.limit_cycle import plot_limit_cycles as plot_limit_cycles
 from stickslip.figures.limit_cycle import plot_stability as plot_stability

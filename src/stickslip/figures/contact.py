@@ -38,37 +38,13 @@ POINTS_A_CYCLE = 300
 
 @styled
 def plot_displacement_loop(findings: Findings, *, ax: Axes | None = None) -> Axes:
-    """Friction against displacement: the cycles thin, their mean with a band of one standard deviation.
-
-    Parameters
-    ----------
-    findings : Findings
-        With loops.
-    ax : Axes, optional
-        Where to draw.
-
-    Returns
-    -------
-    Axes
-    """
+    """Friction against displacement: the cycles thin, their mean with a band of one standard deviation."""
     return _loop(findings, "displacement", axes_of(ax))
 
 
 @styled
 def plot_velocity_loop(findings: Findings, *, ax: Axes | None = None) -> Axes:
-    """Friction against velocity: the cycles thin, their mean, and the binned curve with 95 % intervals.
-
-    Parameters
-    ----------
-    findings : Findings
-        With loops.
-    ax : Axes, optional
-        Where to draw.
-
-    Returns
-    -------
-    Axes
-    """
+    """Friction against velocity: the cycles thin, their mean, and the binned curve with 95 % intervals."""
     ax = _loop(findings, "velocity", axes_of(ax, height=4.2))
     loops = findings.loops
     assert loops is not None
@@ -90,15 +66,6 @@ def plot_sticks(findings: Findings) -> Figure:
     """How long the contact stuck and slipped, over the record's time, and how often each duration occurred.
 
     A stick or slip that the record's begin or end cuts lasted longer than is known, and is not shown.
-
-    Parameters
-    ----------
-    findings : Findings
-        With sticks or slips that lie within the record as wholes.
-
-    Returns
-    -------
-    Figure
     """
     assert findings.sticks is not None
     events = [event for event in findings.sticks.events if event.whole]
@@ -220,17 +187,7 @@ def across(findings: Findings, abscissa: str) -> Array:
 
 @styled
 def plot_micro_slips(findings: Findings) -> Figure:
-    """Does the contact hold all the time that it sticks? One stick, with the micro-slips in it shaded.
-
-    Parameters
-    ----------
-    findings : Findings
-        With sticks that have micro-slips in them.
-
-    Returns
-    -------
-    Figure
-    """
+    """Does the contact hold all the time that it sticks? One stick, with the micro-slips in it shaded."""
     assert findings.sticks is not None
     events, record = findings.sticks.events, findings.record
     held = record.time[0], record.time[-1]
@@ -260,19 +217,7 @@ def plot_micro_slips(findings: Findings) -> Figure:
 
 @styled
 def plot_breakaway(findings: Findings, *, ax: Axes | None = None) -> Axes:
-    """What the contact bears just before it slips against what it bears while it slides, in each direction.
-
-    Parameters
-    ----------
-    findings : Findings
-        With loops and breakaway.
-    ax : Axes, optional
-        Where to draw.
-
-    Returns
-    -------
-    Axes
-    """
+    """What the contact bears just before it slips against what it bears while it slides, in each direction."""
     loops, breakaway = findings.loops, findings.breakaway
     assert loops is not None
     assert breakaway is not None

@@ -47,21 +47,7 @@ POINTS = 600  # of a smooth curve
 
 @styled
 def plot_decay(decay: Decay, *, release: int = 0, ax: Axes | None = None) -> Axes:
-    """The response within the envelopes that either friction alone would give (thesis, Figure 6.1).
-
-    Parameters
-    ----------
-    decay : Decay
-        ``decay`` of what :func:`~stickslip.analyze_decay` returned.
-    release : int
-        Which of several releases, from 0.
-    ax : Axes, optional
-        Where to draw.
-
-    Returns
-    -------
-    Axes
-    """
+    """The response within the envelopes that either friction alone would give (thesis, Figure 6.1)."""
     ax, ring = axes_of(ax), decay.releases.ring_downs[release]
     factor, unit = prefixed(ring.samples - ring.rest, ring.unit)
     rows = _shown(ring)
@@ -84,16 +70,7 @@ def plot_decay(decay: Decay, *, release: int = 0, ax: Axes | None = None) -> Axe
 def plot_identified(decay: Decay, *, release: int = 0) -> Figure:
     """Recorded and identified response over each other, and what is left between them (thesis, Figure 6.10).
 
-    Parameters
-    ----------
-    decay : Decay
-        ``decay`` of what :func:`~stickslip.analyze_decay` returned.
-    release : int
-        Which of several releases, from 0; beyond the first by the whole waveform alone.
-
-    Returns
-    -------
-    Figure
+    Of a release beyond the first, by the whole waveform alone.
     """
     time, measured, fitted, label = _identified(decay, release)
     ring = decay.releases.ring_downs[release]
@@ -114,19 +91,7 @@ def plot_identified(decay: Decay, *, release: int = 0) -> Figure:
 
 @styled
 def plot_differences(decrement: Decrement, *, ax: Axes | None = None) -> Axes:
-    """The amplitude differences on the exponential that viscous friction alone makes of them (thesis, Figure 6.2).
-
-    Parameters
-    ----------
-    decrement : Decrement
-        What :func:`~stickslip.decrement` returned.
-    ax : Axes, optional
-        Where to draw.
-
-    Returns
-    -------
-    Axes
-    """
+    """The amplitude differences on the exponential that viscous friction alone makes of them (thesis, Figure 6.2)."""
     ax = axes_of(ax)
     factor, unit = prefixed(decrement.differences, decrement.ring_down.unit)
     apart = len(decrement.sd) - len(
@@ -155,17 +120,7 @@ def plot_differences(decrement: Decrement, *, ax: Axes | None = None) -> Axes:
 
 @styled
 def plot_bounds(decrement: Decrement) -> Figure:
-    """The viscous rate and the dry friction against the number m of half cycles, each with its worst case.
-
-    Parameters
-    ----------
-    decrement : Decrement
-        What :func:`~stickslip.decrement` returned.
-
-    Returns
-    -------
-    Figure
-    """
+    """The viscous rate and the dry friction against the number m of half cycles, each with its worst case."""
     bounds = decrement.bounds
     factor, unit = prefixed(bounds.dry, decrement.dry_displacement.unit)
     figure, axes = new_figure(2, height=4.6)
@@ -200,21 +155,7 @@ def _within_reach(ax: Axes, value: Array, *errors: Array) -> None:
 
 @styled
 def plot_records(comparison: Comparison, *, quantity: str = "damping_ratio", ax: Axes | None = None) -> Axes:
-    """A quantity of each record with its 95 % interval, and the band that holds for all.
-
-    Parameters
-    ----------
-    comparison : Comparison
-        What :func:`~stickslip.answers.compare_decays` returned.
-    quantity : {"damping_ratio", "dry_displacement", "frequency"}
-        Which.
-    ax : Axes, optional
-        Where to draw.
-
-    Returns
-    -------
-    Axes
-    """
+    """A quantity of each record with its 95 % interval, and the band that holds for all."""
     estimates = [getattr(findings.decay.best, quantity) for findings in comparison.findings]
     names, label = [findings.name for findings in comparison.findings], "each record, 95 %"
     ax, factor, unit = named_intervals(names, estimates, ax=ax, label=label)

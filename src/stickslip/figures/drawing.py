@@ -39,7 +39,8 @@ if TYPE_CHECKING:
 # What draws each kind of result, the file of this room and the function. One that takes no `ax` fills a whole figure.
 DRAWN = {
     "Record": "drawing.of_record", "Findings": "drawing.of_findings", "Comparison": "drawing.of_comparison",
-    "Loops": "drawing.of_loops", "DecayFit": "drawing.of_decay", "Decrement": "decay.plot_differences",
+    "Loops": "drawing.of_loops", "JointFriction": "joint.plot_joint",
+    "DecayFit": "drawing.of_decay", "Decrement": "decay.plot_differences",
     "ForceComparison": "traces.plot_force_comparison", "Consistency": "friction.plot_consistency",
     "TransitionSpeed": "contact.plot_transition_speed", "Trial": "traces.plot_twin", "Squeaks": "squeak.plot_squeaks",
     "TimeFrequency": "drawing.of_frequencies", "DataArray": "wavelet.plot_wavelet",
@@ -47,7 +48,7 @@ DRAWN = {
     "Trajectory": "trajectory.plot_motion", "CycleBranches": "limit_cycle.plot_limit_cycles",
     "Bifurcation": "bifurcation.plot_bifurcation", "Basins": "bifurcation.plot_basins",
     "Boundary": "bifurcation.plot_boundary", "Dither": "bifurcation.plot_dither", "Dataset": "drawing.of_dataset",
-    "ExperimentPlan": "experiment.plot_plan", "Estimate": "drawing.of_estimates", "list": "drawing.of_estimates",
+    "ExperimentPlan": "bench.plot_plan", "Estimate": "drawing.of_estimates", "list": "drawing.of_estimates",
     "tuple": "drawing.of_estimates", "Result": "drawing.of_result",
 }  # fmt: skip
 
@@ -106,6 +107,11 @@ def _drawer(thing: Any) -> Callable[..., Figure | Axes]:
             f"what can be drawn is one of {', '.join(DRAWN)}",
             "give what a question or a simulation returned",
         )
+    return _named(place)
+
+
+def _named(place: str) -> Callable[..., Figure | Axes]:
+    """A function of this room by its file and its name; a file is loaded when it first draws, as each loads much."""
     file, name = place.split(".")
     draw: Callable[..., Figure | Axes] = getattr(importlib.import_module(f"stickslip.figures.{file}"), name)
     return draw
@@ -134,31 +140,25 @@ def of_record(record: Record, *, ax: Axes | None = None, channels: Sequence[str]
 
 
 def of_findings(findings: Findings, *, ax: Axes | None = None) -> Figure | Axes:
-    """The friction loop, the decay, the squeaks, or else the record."""
-    from stickslip.figures.contact import plot_displacement_loop
-    from stickslip.figures.decay import plot_decay
-    from stickslip.figures.squeak import plot_squeaks
-
+    """The friction loop, the decay, the joint, the squeaks, or else the record."""
     results = findings.results
     if results.get("loops") is not None:
-        return plot_displacement_loop(findings, ax=ax)
+        return _named("contact.plot_displacement_loop")(findings, ax=ax)
     if results.get("decay") is not None:
-        return plot_decay(findings.decay, ax=ax)
+        return _named("decay.plot_decay")(findings.decay, ax=ax)
+    if results.get("joint") is not None:
+        return _named("joint.plot_joint")(findings.joint, ax=ax)
     if results.get("squeaks") is not None and ax is None:
-        return plot_squeaks(findings.squeaks)
+        return _named("squeak.plot_squeaks")(findings.squeaks)
     return of_record(findings.record, ax=ax)
 
 
 def of_comparison(comparison: Comparison, *, ax: Axes | None = None) -> Figure | Axes:
     """Friction of each record; of decays their damping ratio, of squeaks their conditions."""
-    from stickslip.figures.decay import plot_records
-    from stickslip.figures.friction import plot_levels
-    from stickslip.figures.squeak import plot_conditions
-
     kinds = set(comparison.findings[0].results)
-    if "decay" in kinds:
-        return plot_records(comparison, ax=ax)
-    return plot_conditions(comparison) if "squeaks" in kinds and ax is None else plot_levels(comparison, ax=ax)
+    if "squeaks" in kinds and ax is None:
+        return _named("squeak.plot_conditions")(comparison)
+    return _named("decay.plot_records" if "decay" in kinds else "friction.plot_levels")(comparison, ax=ax)
 
 
 @styled
@@ -176,11 +176,9 @@ def of_loops(loops: Loops, *, ax: Axes | None = None, against: str = "displaceme
     return ax
 
 
-def of_frequencies(found: TimeFrequency) -> Figure:
+def of_frequencies(findings: TimeFrequency) -> Figure | Axes:
     """The map of a channel, with the signal above it."""
-    from stickslip.figures.wavelet import plot_wavelet
-
-    return plot_wavelet(found.wavelets, record=found.record)
+    return _named("wavelet.plot_wavelet")(findings.wavelets, record=findings.record)
 
 
 def of_decay(fit: DecayFit, *, ax: Axes | None = None) -> Axes:
@@ -196,10 +194,9 @@ def of_decay(fit: DecayFit, *, ax: Axes | None = None) -> Axes:
 
 def of_dataset(data: Any, *, ax: Axes | None = None, **options: Any) -> Figure | Axes:
     """A map of a sweep; where steady sliding lasts."""
-    from stickslip.figures.limit_cycle import plot_stability
-    from stickslip.figures.maps import plot_map
-
-    return plot_stability(data, **options) if "growth" in data else plot_map(data, ax=ax, **options)
+    if "growth" in data:
+        return _named("limit_cycle.plot_stability")(data, **options)
+    return _named("maps.plot_map")(data, ax=ax, **options)
 
 
 @styled

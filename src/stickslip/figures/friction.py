@@ -141,17 +141,7 @@ def plates_together(comparison: Comparison) -> list[Plate]:
 
 @styled
 def plot_regression(findings: Findings) -> Figure:
-    """The measured force, the force that the regression explains, and the rest, over time.
-
-    Parameters
-    ----------
-    findings : Findings
-        With a regression.
-
-    Returns
-    -------
-    Figure
-    """
+    """The measured force, the force that the regression explains, and the rest, over time."""
     regression = findings.regression
     assert regression is not None
     factor, unit = prefixed(regression.measured, regression.coulomb.unit)
@@ -216,19 +206,7 @@ def plot_consistency(consistency: Consistency, *, ax: Axes | None = None) -> Axe
 
 @styled
 def plot_levels(comparison: Comparison, *, ax: Axes | None = None) -> Axes:
-    """The friction level of each record with its 95 % interval.
-
-    Parameters
-    ----------
-    comparison : Comparison
-        What to draw.
-    ax : Axes, optional
-        Where to draw.
-
-    Returns
-    -------
-    Axes
-    """
+    """The friction level of each record with its 95 % interval."""
     levels = {findings.name: findings.level for findings in comparison.findings if findings.level is not None}
     ax, _, unit = named_intervals(list(levels), list(levels.values()), ax=ax)
     ax.set(xlabel=axis_label("sliding friction, 95 %", unit))
@@ -238,19 +216,7 @@ def plot_levels(comparison: Comparison, *, ax: Axes | None = None) -> Axes:
 
 @styled
 def plot_load_dependence(comparison: Comparison, *, ax: Axes | None = None) -> Axes:
-    """Friction against normal load, with the line through the origin and its 95 % band.
-
-    Parameters
-    ----------
-    comparison : Comparison
-        With a fitted coefficient.
-    ax : Axes, optional
-        Where to draw.
-
-    Returns
-    -------
-    Axes
-    """
+    """Friction against normal load, with the line through the origin and its 95 % band."""
     ax = axes_of(ax)
     known = [(f.normal, f.level) for f in comparison.findings if f.normal is not None and f.level is not None]
     loads = np.array([load for load, _ in known])

@@ -43,19 +43,7 @@ SHOWN = 0.4  # s of a record that are drawn: more can not be told apart on a pag
 
 @styled
 def plot_laws(comparison: LawComparison, *, ax: Axes | None = None) -> Axes:
-    """The misfit of each law over the least that any law leaves, and which laws are rejected.
-
-    Parameters
-    ----------
-    comparison : LawComparison
-        What :func:`~stickslip.compare_laws` returned.
-    ax : Axes, optional
-        Where to draw.
-
-    Returns
-    -------
-    Axes
-    """
+    """The misfit of each law over the least that any law leaves, and which laws are rejected."""
     from matplotlib.ticker import NullFormatter
 
     standings = [candidate.standing for candidate in comparison.candidates]
@@ -76,19 +64,7 @@ def plot_laws(comparison: LawComparison, *, ax: Axes | None = None) -> Axes:
 
 @styled
 def plot_fit(result: LawComparison | LawFit, *, record: int = 0) -> Figure:
-    """What was measured, what the fitted or best law predicts, and what is left, over the first part of a record.
-
-    Parameters
-    ----------
-    result : LawComparison or LawFit
-        What :func:`~stickslip.compare_laws` or :func:`~stickslip.fit_law` returned.
-    record : int
-        Which of several records, from 0.
-
-    Returns
-    -------
-    Figure
-    """
+    """What was measured, what the fitted or best law predicts, and what is left, over the first part of a record."""
     fit = result.fit if isinstance(result, LawComparison) else result
     name_of_law = result.best.name if isinstance(result, LawComparison) else type(fit.law).__name__
     traces = fit.traces[record]
@@ -116,19 +92,7 @@ def plot_fit(result: LawComparison | LawFit, *, record: int = 0) -> Figure:
 
 @styled
 def plot_curve(fit: CurveFit, *, ax: Axes | None = None) -> Axes:
-    """A measured friction and the fitted curve.
-
-    Parameters
-    ----------
-    fit : CurveFit
-        What :func:`~stickslip.fit_curve` returned.
-    ax : Axes, optional
-        Where to draw.
-
-    Returns
-    -------
-    Axes
-    """
+    """A measured friction and the fitted curve."""
     ax = axes_of(ax)
     label, unit = ALONG[fit.along]
     factor, unit = prefixed(fit.at, unit)

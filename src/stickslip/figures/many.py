@@ -38,18 +38,18 @@ def _over_records(batch: Batch, name: str) -> Plate:
 
 
 @styled
-def plot_over_records(found: Sequence[Estimate], *, ax: Axes | None = None) -> Axes:
+def plot_over_records(estimates: Sequence[Estimate], *, ax: Axes | None = None) -> Axes:
     """A quantity of each record with its interval."""
     ax = axes_of(ax)
-    values = np.array([each.value for each in found])
-    factor, unit = prefixed(values, found[0].unit)
-    ends = np.array([each.interval for each in found])
+    values = np.array([each.value for each in estimates])
+    factor, unit = prefixed(values, estimates[0].unit)
+    ends = np.array([each.interval for each in estimates])
     lengths = np.where(np.isfinite(ends), np.abs(ends - values[:, None]), 0.0).T
     ax.errorbar(
-        np.arange(1, len(found) + 1), factor * values, factor * lengths, fmt="o", color=BLUE, ms=2, elinewidth=0.6
+        np.arange(1, len(estimates) + 1), factor * values, factor * lengths, fmt="o", color=BLUE, ms=2, elinewidth=0.6
     )
     ax.set_xlabel("record")
-    ax.set_ylabel(axis_label(found[0].name, unit))
+    ax.set_ylabel(axis_label(estimates[0].name, unit))
     return ax
 
 

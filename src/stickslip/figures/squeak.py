@@ -42,8 +42,8 @@ if TYPE_CHECKING:
 
     from stickslip.answers.findings import Comparison, Findings
     from stickslip.record.record import Record
-    from stickslip.squeak.bursts import Squeak, Squeaks
     from stickslip.squeak.spectra import BurstSpectra
+    from stickslip.squeak.squeaks import Squeak, Squeaks
 
 MARKS = {
     "squeaks": (ORANGE, "D"), "squeals": (ORANGE, "D"), "creaks": (PURPLE, "^"), "does not squeak": (BLUE, "o"),
@@ -70,15 +70,6 @@ MOST_ROWS = 6
 @styled
 def plot_squeaks(squeaks: Squeaks) -> Figure:
     """The sound over time with its bursts shaded, and its spectrogram with their dominant frequencies.
-
-    Parameters
-    ----------
-    squeaks : Squeaks
-        What :func:`~stickslip.find_squeaks` returned.
-
-    Returns
-    -------
-    Figure
 
     Examples
     --------
@@ -117,21 +108,7 @@ def plot_squeaks(squeaks: Squeaks) -> Figure:
 
 @styled
 def plot_burst_spectra(spectra: BurstSpectra, *, channel: str, record: Record) -> Figure:
-    """Power spectra of each channel, in the bursts and outside of them.
-
-    Parameters
-    ----------
-    spectra : BurstSpectra
-        What :func:`~stickslip.squeak.burst_spectra` returned.
-    channel : str
-        Where the bursts were heard.
-    record : Record
-        Where they were found, for the units.
-
-    Returns
-    -------
-    Figure
-    """
+    """Power spectra of each channel, in the bursts and outside of them."""
     from matplotlib.ticker import LogLocator, NullLocator
 
     names = list(spectra.inside)
@@ -156,21 +133,7 @@ def plot_burst_spectra(spectra: BurstSpectra, *, channel: str, record: Record) -
 
 @styled
 def plot_coherence(spectra: BurstSpectra, *, channel: str, record: Record) -> Figure:
-    """Coherence of every channel with the one in which the bursts were heard, in the bursts and outside of them.
-
-    Parameters
-    ----------
-    spectra : BurstSpectra
-        Of two channels at least.
-    channel : str
-        Where the bursts were heard.
-    record : Record
-        Where they were found.
-
-    Returns
-    -------
-    Figure
-    """
+    """Coherence of every channel with the one in which the bursts were heard, in the bursts and outside of them."""
     pairs = [pair for pair in spectra.coherence if channel in pair] or list(spectra.coherence)
     figure, axes = _panels(len(pairs))
     last = _highest(spectra.frequency, spectra.inside, channel)
@@ -192,17 +155,7 @@ def plot_coherence(spectra: BurstSpectra, *, channel: str, record: Record) -> Fi
 
 @styled
 def plot_forcing_cycle(squeaks: Squeaks) -> Figure:
-    """Where in the forcing cycle, and at which sliding velocity, the bursts come.
-
-    Parameters
-    ----------
-    squeaks : Squeaks
-        Of a record with the forced motion.
-
-    Returns
-    -------
-    Figure
-    """
+    """Where in the forcing cycle, and at which sliding velocity, the bursts come."""
     record, motion = squeaks.record, ForcedMotion.of(squeaks.record)
     assert motion.velocity is not None
     assert motion.phase is not None
@@ -236,19 +189,7 @@ def plot_forcing_cycle(squeaks: Squeaks) -> Figure:
 
 @styled
 def plot_burst(findings: Findings, *, burst: Squeak) -> Figure:
-    """Every channel about one burst.
-
-    Parameters
-    ----------
-    findings : Findings
-        What :func:`~stickslip.analyze_squeaks` returned.
-    burst : Squeak
-        Which one.
-
-    Returns
-    -------
-    Figure
-    """
+    """Every channel about one burst."""
     around = min(0.5 * burst.duration, 0.1)
     part = findings.record.between(burst.start - around, burst.end + around)
     names = [name for name in TRACED if name in part] or [findings.squeaks.channel]
@@ -266,15 +207,6 @@ def plot_conditions(comparison: Comparison) -> Figure:
     """Friction and its slope against speed in each condition, with their 95 % intervals; where it squeaks is orange.
 
     Grey where that can not be told. Both over the load, where it is known in every condition.
-
-    Parameters
-    ----------
-    comparison : Comparison
-        What :func:`~stickslip.answers.compare_squeaks` returned, friction in one condition at least.
-
-    Returns
-    -------
-    Figure
     """
 
     conditions = [condition for condition in comparison.conditions if condition.level is not None]
@@ -305,17 +237,7 @@ def plot_conditions(comparison: Comparison) -> Figure:
 
 @styled
 def plot_condition_loops(comparison: Comparison) -> Figure:
-    """Friction against displacement and velocity, a row for each condition, as the thesis's figures 7.3 and 7.6.
-
-    Parameters
-    ----------
-    comparison : Comparison
-        With friction loops in one condition at least; the first six are drawn.
-
-    Returns
-    -------
-    Figure
-    """
+    """Friction against displacement and velocity, a row for each condition, as the thesis's figures 7.3 and 7.6."""
 
     rows = [findings for findings in comparison.findings if findings.loops is not None][:MOST_ROWS]
     figure = empty_figure(0.4 + 2.1 * len(rows))

@@ -57,18 +57,7 @@ _CYCLES = 3.0  # of the lowest line that are drawn
 def plot_traces(findings: Findings, *, record: Record | None = None, most: int = 5) -> Figure:
     """The channels over time, one under the other, with the times of sticking shaded.
 
-    Parameters
-    ----------
-    findings : Findings
-        What to draw.
-    record : Record, optional
-        A stretch of its record, to look closer.
-    most : int
-        Panels at most; the first ones of x and z, theta, v, a, force, load, friction, normal, y, sound that exist.
-
-    Returns
-    -------
-    Figure
+    A stretch of the record may be given to look closer; `most` panels are drawn, in the order of `PANELS`.
     """
     record = findings.record if record is None else record
     panels = [names for names in PANELS if any(name in record for name in names)]
@@ -141,21 +130,7 @@ def force_balance(record: Record) -> dict[str, Array] | None:
 
 @styled
 def plot_force_balance(findings: Findings, *, record: Record | None = None, ax: Axes | None = None) -> Axes:
-    """The terms of the force balance: spring, inertia, damper, applied force, and the friction that they leave.
-
-    Parameters
-    ----------
-    findings : Findings
-        Of a record whose friction came from ``friction_force``.
-    record : Record, optional
-        The stretch to draw; all of it unless given.
-    ax : Axes, optional
-        Where to draw.
-
-    Returns
-    -------
-    Axes
-    """
+    """The terms of the force balance: spring, inertia, damper, applied force, and the friction that they leave."""
     ax = axes_of(ax)
     whole = findings.record
     record = whole if record is None else record
@@ -285,17 +260,6 @@ def plot_twin(trial: Trial, *, record: Record | None = None) -> Figure:
 
     Above the measured displacement and the quiet twin's; below what is left, with the share of the motion that the twin
     follows: ``100 (1 - |x - y| / |x - mean x|)``, as a comparison of models is commonly rated.
-
-    Parameters
-    ----------
-    trial : Trial
-        From :func:`~stickslip.tried`: ``findings.trial``.
-    record : Record, optional
-        The stretch to draw; all of it unless given.
-
-    Returns
-    -------
-    Figure
     """
     whole = trial.belief.record
     moved = trial.belief.moved

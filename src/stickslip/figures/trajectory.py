@@ -156,17 +156,6 @@ def plot_motion(run: Trajectory, *, first: float = 0.0, last: float | None = Non
 
     Of a structure every mass is drawn, and each contact's friction has a panel of its own, shaded by what that contact
     does; a load that follows the motion is drawn too.
-
-    Parameters
-    ----------
-    run : Trajectory
-        What to draw.
-    first, last : float
-        Time shown [s]; to the end where `last` is left out.
-
-    Returns
-    -------
-    Figure
     """
     last = run.duration if last is None else last
     panels = _panels(run)
@@ -246,44 +235,14 @@ def _shades_alone(run: Trajectory, handle: Any) -> bool:
 
 @styled
 def plot_loop(run: Trajectory, *, against: str = "x", contact: int = 0, ax: Axes | None = None) -> Axes:
-    """Friction against displacement, velocity or load: the last cycle, over those before it.
-
-    Parameters
-    ----------
-    run : Trajectory
-        What to draw.
-    against : {"x", "slip", "load"}
-        Displacement along the contact (of one mass: its own), velocity on the counter-face, or normal load.
-    contact : int
-        Which contact of a structure, from 0.
-    ax : Axes, optional
-        Where to draw.
-
-    Returns
-    -------
-    Axes
-    """
+    """Friction against displacement, velocity or load: the last cycle, over those before it."""
     across = "way" if against == "x" and isinstance(run.system, Structure) else against
     return _portrait(run, (across, contact), ("friction", contact), axes_of(ax), contact)
 
 
 @styled
 def plot_phase(run: Trajectory, *, mass: int = 0, ax: Axes | None = None) -> Axes:
-    """Velocity against displacement: the last cycle, over those before it, with sticks of a single contact marked.
-
-    Parameters
-    ----------
-    run : Trajectory
-        What to draw.
-    mass : int
-        Which degree of freedom of a structure, from 0.
-    ax : Axes, optional
-        Where to draw.
-
-    Returns
-    -------
-    Axes
-    """
+    """Velocity against displacement: the last cycle, over those before it, with sticks of a single contact marked."""
     marked = 0 if contacts_of(run) == 1 else None
     return _portrait(run, ("x", mass), ("v", mass), axes_of(ax, height=4.2), marked)
 

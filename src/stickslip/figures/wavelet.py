@@ -122,17 +122,7 @@ def plot_wavelet(
 
 @styled
 def plot_stick(findings: TimeFrequency) -> Figure:
-    """One stick from the middle of the record: its acceleration in pieces, and the map up to high frequencies.
-
-    Parameters
-    ----------
-    findings : TimeFrequency
-        With ringing.
-
-    Returns
-    -------
-    Figure
-    """
+    """One stick from the middle of the record: its acceleration in pieces, and the map up to high frequencies."""
     ringing = findings.ringing
     assert ringing is not None
     record, window = ringing.record, ringing.windows[len(ringing.windows) // 2]

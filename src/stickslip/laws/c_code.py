@@ -154,7 +154,7 @@ def _rates(modes: Modes, memory: list[str], names: Mapping[str, str]) -> str:
         mode.name: " ".join(f"rate[{memory.index(name)}] = {_text(form, named)};" for name, form in mode.rates.items())
         for mode in modes
     }
-    cases = [f"    case {_token(name)}: {each} break;" for name, each in moves.items() if each]
+    cases = [f"    case {_token(name)}: {move} break;" for name, move in moves.items() if move]
     return "\n".join([
         "void friction_rates(const friction_state *s, const friction_motion *in, double *rate)", "{",
         "    int i;", "    (void)in;", "    for (i = 0; i < FRICTION_MEMORY; i++) rate[i] = 0.0;",

@@ -157,7 +157,9 @@ def required(law: type[Any]) -> int:
 
 def hypotheses() -> dict[str, Hypothesis]:
     """What records are asked to choose from, by name: rigid contacts, then others, the simplest of both first."""
-    known = [each for law in registered().values() if hasattr(law, "hypotheses") for each in law.hypotheses()]
+    known = [
+        hypothesis for law in registered().values() if hasattr(law, "hypotheses") for hypothesis in law.hypotheses()
+    ]
     return {each.name: each for each in sorted(known, key=lambda each: each.family is not RIGID)}
 
 

@@ -73,7 +73,7 @@ class Log:
     photo: str = ""
 
     def __post_init__(self) -> None:
-        for name in (each.name for each in fields(self)):
+        for name in (field.name for field in fields(self)):
             value = getattr(self, name)
             if name in NUMBERS:
                 object.__setattr__(self, name, None if value is None else _number(name, value))
@@ -89,7 +89,7 @@ class Log:
         RecordError
             An entry that a log does not have, or a value without meaning.
         """
-        known = [each.name for each in fields(cls)]
+        known = [field.name for field in fields(cls)]
         if strange := [str(name) for name in entries if name not in known]:
             raise RecordError(f"'{strange[0][:40]}' in the log", f"a log has {', '.join(known)}", "choose one of them")
         return cls(**entries)
@@ -97,7 +97,7 @@ class Log:
     def entries(self) -> dict[str, Any]:
         """What was written down, by name."""
         empty = Log()
-        named = {each.name: getattr(self, each.name) for each in fields(self)} if self != empty else {}
+        named = {field.name: getattr(self, field.name) for field in fields(self)} if self != empty else {}
         return {name: value for name, value in named.items() if value not in ("", None)}
 
     def rows(self) -> list[tuple[str, str]]:

@@ -300,6 +300,12 @@ class Rig:
             own = np.random.default_rng(chance.integers(2**63))  # a sensor's noise does not hang on the others
             if sensor.source not in signals:
                 continue
+            if sensor.mount and sensor.mount.mass and sensor.mount.on not in signals:
+                raise ModelError(
+                    f"the mount of {sensor.channel} moves as '{sensor.mount.on}'",
+                    f"the run has {', '.join(signals)}",
+                    "name the acceleration of its mass: Mount(..., on=...)",
+                )
             samples[sensor.channel] = _read(sensor, signals, breaks, times, own)
             unit = signals[sensor.source].unit
             label = described(sensor.channel, unit)
@@ -325,9 +331,9 @@ def _signals(run: Trajectory) -> dict[str, _Signal]:
     moved = {"z": bool(run.table.motion.base), "force": bool(run.table.motion.force)}
     return {
         label: _Signal(_picked(run, name, j), unit)
-        for name, unit in UNITS.items()
+        for name in UNITS
         if moved.get(name, True)
-        for j, label in enumerate(run.labels(name))
+        for j, (label, unit) in enumerate(zip(run.labels(name), run.units(name), strict=True))
     }
 
 
@@ -343,8 +349,9 @@ def _read(
 
     def sensed(at: Array) -> Array:
         values = signals[sensor.source].values(at)
-        mass = sensor.mount.mass if sensor.mount else 0.0
-        return values + mass * signals["a"].values(at) if mass else values
+        if not (sensor.mount and sensor.mount.mass):
+            return values
+        return values + sensor.mount.mass * signals[sensor.mount.on].values(at)
 
     ideal = respond(sensed, breaks=breaks, times=times - sensor.lag, response=sensor.response)
     noisy = sensor.gain * ideal + sensor.noise.samples(len(times), fs=fs, rng=rng)

@@ -25,11 +25,13 @@ class Mount:
     Attributes
     ----------
     frequency : float
-        Resonance w / 2 pi [Hz].
+        Resonance w / 2 pi [Hz]; infinite where it is rigid, or where the system that moves has this motion itself.
     damping : float
         Damping ratio zeta.
     mass : float
         Of a load cell's mount: mass [kg] between contact and cell, whose inertia the cell feels too: f + mass a.
+    on : str
+        The acceleration of this mass among the run's: "a", or of a structure "a2" ...
 
     Raises
     ------
@@ -39,15 +41,17 @@ class Mount:
     Examples
     --------
     >>> Mount(frequency=125, damping=0.1)
-    Mount(frequency=125, damping=0.1, mass=0.0)
+    Mount(frequency=125, damping=0.1, mass=0.0, on='a')
     """
 
     frequency: float
     damping: float
     mass: float = 0.0
+    on: str = "a"
 
     def __post_init__(self) -> None:
-        finite("frequency", self.frequency, unit="Hz", positive=True)
+        if self.frequency != math.inf:
+            finite("frequency", self.frequency, unit="Hz", positive=True)
         finite("damping", self.damping, unit="(ratio)")
         finite("mass", self.mass, unit="kg", signed=True)
 
@@ -257,7 +261,9 @@ class Sensor:
     @property
     def response(self) -> Response:
         """Its mount and its discharge as one filter."""
-        mount = resonance(self.mount.frequency, self.mount.damping) if self.mount else Response()
+        mount = Response()
+        if self.mount and math.isfinite(self.mount.frequency):
+            mount = resonance(self.mount.frequency, self.mount.damping)
         return mount.then(leak(self.discharge)) if math.isfinite(self.discharge) else mount
 
     @property
@@ -266,7 +272,9 @@ class Sensor:
         noise = math.hypot(self.noise.white, self.noise.band, self.digitiser.step / math.sqrt(12))
         details: dict[str, Any] = {"delay": self.lag, "noise": noise or None}
         if self.mount:
-            details |= {"mount": (self.mount.frequency, self.mount.damping), "inertia": self.mount.mass}
+            swings = math.isfinite(self.mount.frequency)
+            details |= {"mount": (self.mount.frequency, self.mount.damping)} if swings else {}
+            details["inertia"] = self.mount.mass
         return details | ({"discharge": self.discharge} if math.isfinite(self.discharge) else {})
 
     def having(self, **changes: Any) -> Sensor:

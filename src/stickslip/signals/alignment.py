@@ -364,7 +364,7 @@ def _terms(mount: tuple[float, float] | None) -> tuple[float, float]:
 
 def told(parts: Iterable[Lines]) -> Lines:
     """The clear lines of all stretches that tell something of a delay or a mount, of what their own stretch tells."""
-    clear = [each.chosen(each.clear).telling for each in parts]
+    clear = [part.chosen(part.clear).telling for part in parts]
     lines = Lines(*(np.concatenate([getattr(each, field.name) for each in clear], axis=-1) for field in fields(Lines)))
     if len(lines.turn) < 2:
         raise EstimateError(

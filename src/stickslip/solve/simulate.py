@@ -230,57 +230,78 @@ def run(
     a greater question, which then ends as well.
     """
     laps, offset = span
-    size = len(table.names)
     period = table.motion.period
-    model, past, work = Model(table.linear, fast_tables(table), period), blank_past(), kernel.scratch(size)
-    clock, state = Clock(0.0, 0.0, 0.0), state.copy()
     total = offset + (laps * period if math.isfinite(period) else 0.0)
     scale = period if math.isfinite(period) else 1 / system.frequency if system.frequency else total
-    events = Budget(table, scale=scale, most=budget)
-    pieces = _Log(table.physical if len(table.tones) == 1 and size == table.physical + 3 else size, CHUNK)
     status = "complete"
-    heed: Callable[[], None] | None = None
-    patience = max(1, CELLS // max(1, size // SMALL) ** 2)
+    march = _March(table, state, mode, total, Budget(table, scale=scale, most=budget), tell)
     try:
-        with ExitStack() as holding:
+        with march.holding:
             for at, (signals, values) in stops_of(table, laps, offset):
-                state[signals] = values
-                came, mode = mode, kernel.begin(model.linear, mode, state, total, 1.0, work)
-                _refuse(kernel.CHATTER if mode < 0 else kernel.DONE, table, state, came, clock)
-                outcome = kernel.FULL
-                while outcome == kernel.FULL:
-                    before, goal = clock, Clock(float(at[0]), float(at[1]), 0.0)
-                    # numba makes the Clock that it hands back by calling Python, and dies of a Ctrl-C that comes just
-                    # then; the first call may compile for long, and is left to it
-                    if heed is None and getattr(kernel.march, "overloads", True):
-                        heed = holding.enter_context(held_back())
-                    room = pieces.room()
-                    outcome, count, mode, clock = kernel.march(
-                        model, before, state, mode, goal, past, room, work, patience
-                    )
-                    if heed is not None:
-                        heed()
-                    passed = until(before, clock, period)
-                    pieces.keep(count, passed, total)
-                    _refuse(outcome, table, state, mode, clock)
-                    if outcome == kernel.FULL and count < len(room.laps):  # by its patience: it goes cell by cell
-                        _require_cells(passed / patience, total - pieces.passed, table.modes[mode].name)
-                    events.spend(pieces.columns.exits[pieces.count - count : pieces.count], passed=passed, state=state)
-                    if tell:
-                        tell(pieces.passed / total)
+                march.to(Clock(float(at[0]), float(at[1]), 0.0), signals, values)
     except KeyboardInterrupt:
-        if tell is None or not pieces.count:
+        if tell is None or not march.pieces.count:
             raise
         status = "interrupted"
-    laps_, offsets, modes, durations, states, exits = pieces.done()
+    pieces = march.pieces.done()
     if status == "interrupted":
         # what the march wrote since is lost: the signal comes before Python learns of it
-        total = float(offsets[-1] + durations[-1] + (laps_[-1] * period if math.isfinite(period) else 0.0))
-    if status == "complete":
-        if tell:
-            tell(1.0)
-        status = "at rest" if _at_rest(table, state, mode) else status
-    return Trajectory(system, table, laps_, offsets, modes, durations, states, exits, total, status)
+        begun = pieces.laps[-1] * period if math.isfinite(period) else 0.0
+        total = float(pieces.offsets[-1] + pieces.durations[-1] + begun)
+    elif tell:
+        tell(1.0)
+    if status == "complete" and _at_rest(table, march.state, march.mode):
+        status = "at rest"
+    return Trajectory(system, table, *pieces, total, status)
+
+
+class _March:
+    """A run under way: where it is, the pieces that it keeps, and what it may still spend."""
+
+    def __init__(
+        self, table: Tables, state: Array, mode: int, total: float, events: Budget, tell: Callable[[float], None] | None
+    ) -> None:
+        size = len(table.names)
+        self.table, self.total, self.events, self.tell, self.holding = table, total, events, tell, ExitStack()
+        self.model = Model(table.linear, fast_tables(table), table.motion.period)
+        self.past, self.work = blank_past(), kernel.scratch(size)
+        self.clock, self.state, self.mode = Clock(0.0, 0.0, 0.0), state.copy(), mode
+        tonal = len(table.tones) == 1 and size == table.physical + 3
+        self.pieces = _Log(table.physical if tonal else size, CHUNK)
+        self.patience = max(1, CELLS // max(1, size // SMALL) ** 2)
+        self.heed: Callable[[], None] | None = None
+
+    def to(self, goal: Clock, signals: list[int], values: Array | list[float]) -> None:
+        """March to a stop; the signals take their new values before."""
+        self.state[signals] = values
+        came, self.mode = self.mode, kernel.begin(self.model.linear, self.mode, self.state, self.total, 1.0, self.work)
+        _refuse(kernel.CHATTER if self.mode < 0 else kernel.DONE, self.table, self.state, came, self.clock)
+        while self._chunk(goal) == kernel.FULL:
+            pass
+
+    def _chunk(self, goal: Clock) -> int:
+        """March until the room is full, patience ends, or the goal is reached."""
+        # numba makes the Clock that it hands back by calling Python, and dies of a Ctrl-C that comes just
+        # then; the first call may compile for long, and is left to it
+        if self.heed is None and getattr(kernel.march, "overloads", True):
+            self.heed = self.holding.enter_context(held_back())
+        before, room = self.clock, self.pieces.room()
+        outcome, count, self.mode, self.clock = kernel.march(
+            self.model, before, self.state, self.mode, goal, self.past, room, self.work, self.patience
+        )
+        if self.heed is not None:
+            self.heed()
+        passed = until(before, self.clock, self.table.motion.period)
+        self.pieces.keep(count, passed, self.total)
+        _refuse(outcome, self.table, self.state, self.mode, self.clock)
+        if outcome == kernel.FULL and count < len(room.laps):  # by its patience: it goes cell by cell
+            name = self.table.modes[self.mode].name
+            _require_cells(passed / self.patience, self.total - self.pieces.passed, name)
+        last = self.pieces.columns.exits[self.pieces.count - count : self.pieces.count]
+        self.events.spend(last, passed=passed, state=self.state)
+        if self.tell:
+            self.tell(self.pieces.passed / self.total)
+        return int(outcome)
 
 
 class _Log:

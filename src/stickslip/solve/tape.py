@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -15,17 +14,15 @@ from numpy.typing import NDArray
 from stickslip.drives.kinds import Motion
 from stickslip.errors import ModelError
 from stickslip.laws.base import Exit, Mode
-from stickslip.laws.curved import Creeping, CurvedMode, Expression
+from stickslip.laws.curved import Creeping, CurvedMode
 from stickslip.laws.filippov import with_sliding_modes
 from stickslip.oscillator import Oscillator
-from stickslip.solve import taylor
 from stickslip.solve.bound import Bound, Form, combined, stilled
+from stickslip.solve.operations import Operations, Scaled, flat, guards_of, sums_of
 from stickslip.solve.series import Nodes
 from stickslip.solve.tables import JointMode, System, by_value, mode_number, numbered, reached
 from stickslip.solve.taylor import Array, Exits, Guards, Sums
 from stickslip.structure import Contact, Structure
-
-Scaled = tuple[int, float]  # a node and a factor
 
 DTYPES = (np.int64, np.float64)
 LEAST = 1e-13  # some hundred roundings of the motion's own speed: below it a velocity that falls can not be followed
@@ -130,113 +127,6 @@ class Tape:
         return mode_number(self.modes, mode)
 
 
-class _Operations:
-    """Nodes of one mode's tape; equal formulas share a node."""
-
-    def __init__(self, size: int, symbols: Mapping[str, Form]) -> None:
-        self.size, self.symbols = size, symbols
-        self.rows: list[tuple[int, int, int, float, Form]] = []
-        self.known: dict[Any, int] = {}
-
-    def put(self, kind: int, left: int = 0, right: int = 0, power: float = 0.0, form: Form = ({}, 0.0)) -> int:
-        """A node's number; a new one only where no equal one is there."""
-        key = (kind, left, right, power, tuple(sorted(form[0].items())), form[1])
-        if key not in self.known:
-            self.known[key] = self.size + len(self.rows)
-            self.rows.append((kind, left, right, power, form))
-        return self.known[key]
-
-    def node(self, form: Form) -> int:
-        """The node that has a linear form's value."""
-        weights, constant = form
-        if constant == 0.0 and len(weights) == 1 and next(iter(weights.values())) == 1.0:
-            return next(iter(weights))
-        return self.put(taylor.LINEAR, form=form)
-
-    def scaled(self, form: Form) -> Scaled:
-        """A linear form as a node and a factor: a multiple of a node needs none of its own."""
-        weights, constant = form
-        if constant == 0.0 and len(weights) == 1:
-            return next(iter(weights.items()))
-        return self.node(form), 1.0
-
-    def form(self, expression: Expression) -> Form:
-        """An expression as a linear form of nodes."""
-        kind, parts = expression.kind, expression.parts
-        if kind == "number":
-            return {}, expression.value
-        if kind == "symbol":
-            if expression.name not in self.symbols:
-                raise ModelError(
-                    f"a law speaks of '{expression.name}'",
-                    f"the state has {', '.join(self.symbols)}",
-                    "correct the law",
-                )
-            return self.symbols[expression.name]
-        forms = [self.form(part) for part in parts]
-        if kind == "sum":
-            return combined((1.0, form) for form in forms)
-        if kind == "product":
-            return self.product(*forms)
-        if kind == "quotient":
-            return self.quotient(*forms)
-        if kind == "power":
-            return self.power(forms[0], expression.value)
-        return self.function(kind, forms[0])
-
-    def product(self, a: Form, b: Form) -> Form:
-        """a b; a number only scales."""
-        if not a[0] or not b[0]:
-            return combined([(a[1], b)] if not a[0] else [(b[1], a)])
-        (left, one), (right, other) = self.scaled(a), self.scaled(b)
-        if left == right:
-            return {self.put(taylor.SQUARE, left): one * other}, 0.0
-        return {self.put(taylor.PRODUCT, min(left, right), max(left, right)): one * other}, 0.0
-
-    def quotient(self, a: Form, b: Form) -> Form:
-        """a / b."""
-        if not b[0]:
-            return combined([(1 / b[1], a)])
-        (over, one), (under, other) = self.scaled(a), self.scaled(b)
-        return {self.put(taylor.QUOTIENT, over, under): one / other}, 0.0
-
-    def power(self, base: Form, exponent: float) -> Form:
-        """base ** exponent; whole exponents are products."""
-        if not base[0]:
-            return {}, float(base[1] ** exponent)
-        if exponent == int(exponent) and 0 <= exponent <= 64:
-            result: Form = ({}, 1.0)
-            square, left = base, int(exponent)
-            while left:
-                result = self.product(result, square) if left % 2 else result
-                left //= 2
-                square = self.product(square, square) if left else square
-            return result
-        return {self.put(taylor.POWER, self.node(base), power=exponent): 1.0}, 0.0
-
-    def function(self, kind: str, of: Form) -> Form:
-        """A function, with the node its derivative needs."""
-        if not of[0]:
-            return {}, float(getattr(math, kind)(of[1]))
-        at = self.node(of)
-        if kind == "sqrt":
-            return self.power(of, 0.5)
-        if kind == "exp":
-            return {self.put(taylor.EXP, at): 1.0}, 0.0
-        if kind == "log":
-            return {self.put(taylor.LOG, at, at): 1.0}, 0.0
-        if kind == "asinh":
-            root = self.power(combined([(1.0, self.product(of, of)), (1.0, ({}, 1.0))]), 0.5)
-            return {self.put(taylor.ASINH, at, self.node(root)): 1.0}, 0.0
-        known = self.known.get((taylor.TANH, at))
-        if known is None:
-            known = self.known[(taylor.TANH, at)] = self.put(taylor.TANH, at, power=float(at))
-            slope = self.put(taylor.SLOPE, at, self.put(taylor.SQUARE, known))
-            row = self.rows[known - self.size]
-            self.rows[known - self.size] = (row[0], row[1], slope, row[3], row[4])
-        return {known: 1.0}, 0.0
-
-
 def tape(system: System) -> Tape:
     """The flat arrays of a system with a curved law."""
     return _known(system) if isinstance(system, Oscillator) and by_value(system) else _built(system)
@@ -253,7 +143,7 @@ class _Made(NamedTuple):
     """A mode: its nodes for the march, node and factor of each entry's rate, what each contact knows, the rates as
     linear forms of nodes, and the friction of each contact."""
 
-    moving: _Operations
+    moving: Operations
     entries: list[Scaled]
     known: list[dict[str, Form]]
     rates: dict[int, Form]
@@ -399,7 +289,7 @@ class _Builder:
                 )
         return combined((value, known[name]) for name, value in row.items())
 
-    def slides(self, contact: _Contact, part: Any, moving: _Operations) -> Form:
+    def slides(self, contact: _Contact, part: Any, moving: Operations) -> Form:
         """Friction of a contact that slides: a curved law's is a coefficient of the load."""
         if isinstance(part, Mode):
             return self.told(contact, part.friction or {}, contact.symbols)
@@ -408,7 +298,7 @@ class _Builder:
 
     def mode(self, parts: Sequence[Any]) -> _Made:
         """Nodes for the march and with outputs, rates of the entries, nodes of the exits and of the outputs."""
-        moving, n = _Operations(self.size, {}), self.degrees
+        moving, n = Operations(self.size, {}), self.degrees
         still: Form = ({}, 0.0)
         landing = any(part.kind == "landing" for part in parts)  # no time passes: a contact has yet to find its mode
         friction: list[Form] = [still for _ in parts]
@@ -453,7 +343,7 @@ class _Builder:
             self.mass, self.inverse, np.array([self.contacts[c].tangent for c in held]).reshape(-1, self.degrees)
         )
 
-    def knows(self, c: int, part: Any, friction: Form, moving: _Operations) -> dict[str, Form]:
+    def knows(self, c: int, part: Any, friction: Form, moving: Operations) -> dict[str, Form]:
         """What the exits and the memory of a contact may speak of in a mode."""
         contact = self.contacts[c]
         known = {**contact.symbols, "f": friction}
@@ -467,7 +357,7 @@ class _Builder:
         return known | {name: moving.product(moving.form(level), load) for name, level in part.levels.items()}
 
     def remembered(
-        self, contact: _Contact, part: Any, known: Mapping[str, Form], moving: _Operations
+        self, contact: _Contact, part: Any, known: Mapping[str, Form], moving: Operations
     ) -> dict[int, Form]:
         """The rates of a contact's memory in a mode."""
         rates: dict[int, Form] = {}
@@ -489,9 +379,9 @@ class _Builder:
             rates[j] = rate
         return rates
 
-    def shown(self, made: _Made, parts: Sequence[Any]) -> tuple[_Operations, dict[str, list[int]]]:
+    def shown(self, made: _Made, parts: Sequence[Any]) -> tuple[Operations, dict[str, list[int]]]:
         """Nodes with those of all outputs, and which these are."""
-        watched, n = _Operations(self.size, {}), self.degrees
+        watched, n = Operations(self.size, {}), self.degrees
         watched.rows, watched.known = list(made.moving.rows), dict(made.moving.known)
         still: Form = ({}, 0.0)
         creeps = any(getattr(part, "creep", None) is not None for part in parts)
@@ -529,7 +419,7 @@ class _Builder:
         rate = tuple(np.array([[r[c] for r in one.entries] for one in made], dtype=d) for c, d in enumerate(DTYPES))
         exits = self.exits(joints, parts, leaving, quantities)
         operations = [one.moving for one in made]
-        guards, sums = _guards(operations), _sums(operations, [one.entries for one in made], quantities)
+        guards, sums = guards_of(operations), sums_of(operations, [one.entries for one in made], quantities)
         modes: tuple[Any, ...] = tuple(own[0] for own in parts) if not self.joint else tuple(
             JointMode.of(tuple(own), [(own[c].exits[e], c) for c, e in joint.exits])
             for own, joint in zip(parts, joints, strict=True)
@@ -547,10 +437,10 @@ class _Builder:
             opening=self.opening(),
             tones=np.array(tones, dtype=np.float64).reshape(len(tones), 4),
             outputs={"face_rate": self.row(self.face[1]), "slip": slip if self.joint else slip[0]},
-            nodes=Nodes(*_flat(operations), *rate),
+            nodes=Nodes(*flat(operations), *rate),
             kept=_kept(self.size, sums, exits, guards),
             sums=sums,
-            watched=Nodes(*_flat([watched for watched, _ in shown]), *rate),
+            watched=Nodes(*flat([watched for watched, _ in shown]), *rate),
             exits=exits,
             guards=guards,
             places={name: np.array([own[name] for _, own in shown], dtype=np.int64) for name in shown[0][1]},
@@ -624,44 +514,6 @@ def _alone(system: Oscillator) -> Structure:
     """The structure of one mass and one contact that an oscillator is."""
     contact = Contact(system.law, [1.0])  # type: ignore[arg-type]
     return Structure(system.mass, system.damping, system.stiffness, [contact], system.drive, damper=system.damper)
-
-
-def _flat(modes: list[_Operations]) -> tuple[NDArray[Any], ...]:
-    """The nodes of all modes, one after the other."""
-    blank: tuple[int, int, int, float, Form] = (taylor.LINEAR, 0, 0, 0.0, ({}, 0.0))
-    kinds, left, right, power, forms = zip(*(row for m in modes for row in [blank] * m.size + m.rows), strict=True)
-    weights = np.array([weight for form, _ in forms for weight in form.values()], dtype=np.float64)
-    low = [0, *itertools.accumulate(len(form) for form, _ in forms)]
-    index = [node for form, _ in forms for node in form]
-    first = [0, *itertools.accumulate(m.size + len(m.rows) for m in modes)]
-    whole = (np.array(column, dtype=np.int64) for column in (kinds, left, right, low, index, first))
-    kinds_, left_, right_, low_, index_, first_ = whole
-    constant = np.array([value for _, value in forms])
-    return kinds_, left_, right_, np.array(power), low_, weights, index_, constant, first_
-
-
-def _guards(modes: list[_Operations]) -> Guards:
-    """The nodes whose series may know nothing of what is ahead: what they are, and of what; and the first by mode."""
-    kinds = (taylor.EXP, taylor.TANH, taylor.POWER)
-    guarded = [[row[:2] for row in mode.rows if row[0] in kinds] for mode in modes]
-    pairs = np.array([row for rows in guarded for row in rows], dtype=np.int64).reshape(-1, 2)
-    return Guards(pairs[:, 0].copy(), pairs[:, 1].copy(), np.cumsum([0, *map(len, guarded)]))
-
-
-def _sums(modes: list[_Operations], rates: Any, exits: Any) -> Sums:
-    """What rounds each rate (by mode and entry) and each exit: sizes of the weights of a sum, and their nodes."""
-    low, weights, constant = [0], list[float](), list[float]()
-    index: list[int] = []
-    for kind in (rates, exits):
-        for mode, pairs in zip(modes, kind, strict=True):
-            for node, factor in pairs:
-                row = mode.rows[node - mode.size] if node >= mode.size else None
-                form = row[4] if row and row[0] == taylor.LINEAR else ({} if node < 0 else {node: 1.0}, 0.0)
-                weights.extend(abs(factor * weight) for weight in form[0].values())
-                index.extend(form[0])
-                low.append(len(weights))
-                constant.append(abs(factor * form[1]))
-    return Sums(np.array(low), np.array(weights), np.array(index, dtype=np.int64), np.array(constant))
 
 
 def _kept(size: int, sums: Sums, exits: Exits, guards: Guards) -> tuple[tuple[int, ...], ...]:

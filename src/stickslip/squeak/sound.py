@@ -53,6 +53,7 @@ def sound_pressure(
     area: float = TIP,
     distance: float = MICROPHONE,
     normal: ArrayLike | str | None = None,
+    baffled: bool = False,
 ) -> Record:
     r"""How loud is a vibrating surface at a distance?
 
@@ -61,7 +62,12 @@ def sound_pressure(
     .. math:: p(t) = \frac{\rho\,S\,a_n(t - r/c)}{4\pi r}
 
     with S its area, a_n its acceleration towards the outside, r the distance, and air of 20 C: 1.204 kg/m^3, 343.2 m/s.
-    Nothing is heard before the first wave arrives.
+    Nothing is heard before the first wave arrives. A flat disk in a wall is exact on its axis at any distance, near too
+    (Stepanishen, J. Acoust. Soc. Am. 49, 1971): what its middle and its edge send,
+
+    .. math:: p(t) = \rho c\,[v_n(t - r/c) - v_n(t - R/c)], \quad R = \sqrt{r^2 + S/\pi}
+
+    which far away is twice the point source, as the wall gives half of the sound back.
 
     Parameters
     ----------
@@ -76,6 +82,8 @@ def sound_pressure(
     normal : array_like or str, optional
         Of a Trajectory: the share of each degree of freedom in a_n; the second alone of a structure where left out. Of
         a Record: the channel, "normal_acceleration" or "a" where left out.
+    baffled : bool
+        Whether it is a flat disk in a wall, and not a small surface in a free field.
 
     Returns
     -------
@@ -101,22 +109,27 @@ def sound_pressure(
     """
     finite("area", area, unit="m^2", positive=True)
     finite("distance", distance, unit="m", positive=True)
-    if distance < math.sqrt(area / math.pi):
+    if distance < math.sqrt(area / math.pi) and not baffled:
         raise ModelError(
             f"distance = {distance:g} m from a surface of {area:g} m^2",
             "a point source is heard from farther away than its radius",
-            "give a larger distance= or a smaller area=",
+            "give a larger distance= or a smaller area=, or ask for a disk in a wall: baffled=True",
         )
-    gain, lag = AIR * area / (4 * math.pi * distance), distance / SPEED_OF_SOUND
-    step = Step("sound_pressure", {"area": area, "distance": distance}, f"{lag * 1e3:.3g} ms later")
+    paths = _disk(area, distance) if baffled else [(AIR * area / (4 * math.pi * distance), distance / SPEED_OF_SOUND)]
+    lag, told = paths[0][1], {"area": area, "distance": distance, "baffled": baffled}
+    step = Step("sound_pressure", told, f"{lag * 1e3:.3g} ms later")
     if isinstance(run, Record):
         name = normal if isinstance(normal, str) else "normal_acceleration" if "normal_acceleration" in run else "a"
         run.require_clean(name, question="the sound of a surface")
-        return run.with_channel("sound", gain * _later(run[name], lag * run.fs), unit="Pa", source=name, step=step)
+        sent = _velocity(run[name], run.fs) if baffled else run[name]
+        heard = sum((gain * _later(sent, lag * run.fs) for gain, lag in paths), np.zeros(len(run)))
+        return run.with_channel("sound", heard, unit="Pa", source=name, step=step)
     if fs is None or not (math.isfinite(fs) and fs > 0):
         raise RecordError(f"fs = {fs}", "the sound of a simulated run is sampled at a positive rate", "give fs= in Hz")
     times = np.arange(int(np.floor(run.duration * fs * (1 + 1e-12))) + 1) / fs
-    samples = {"sound": gain * _leaving(run, times - lag, _share(run, normal))}
+    share, signal = _share(run, normal), "v" if baffled else "a"
+    heard = sum((gain * _leaving(run, times - lag, share, signal) for gain, lag in paths), np.zeros(len(times)))
+    samples = {"sound": heard}
     channels = {"sound": Channel("sound", "Pa", described("sound", "Pa"), source="sound_pressure")}
     return Record(samples, channels, float(fs), 0.0, (step,), None, {"system": repr(run.system)})
 
@@ -129,6 +142,7 @@ def squeak_record(
     rng: int | np.random.Generator | None = None,
     area: float = TIP,
     distance: float = MICROPHONE,
+    baffled: bool = False,
 ) -> Record:
     """What the sensors of a squeak rig would have written of a run of :func:`squeak_rig`.
 
@@ -145,7 +159,7 @@ def squeak_record(
         Signal to noise [dB]: each channel's RMS about its mean over that of its white noise; none where infinite.
     rng : int or Generator, optional
         Where the noise comes from.
-    area, distance : float
+    area, distance, baffled : float, bool
         As in :func:`sound_pressure`.
 
     Returns
@@ -174,7 +188,7 @@ def squeak_record(
         )
     if math.isnan(snr):
         raise ModelError("snr = nan", "a signal-to-noise ratio is a number of decibel", "give snr= in dB")
-    heard = sound_pressure(run, fs=fs, area=area, distance=distance)
+    heard = sound_pressure(run, fs=fs, area=area, distance=distance, baffled=baffled)
     times = np.minimum(heard.time, run.duration)
     motion, _ = run.sample(times, ("x", "v", "a", "friction", "z"))
     rows = {
@@ -224,11 +238,25 @@ def _share(run: Trajectory, normal: ArrayLike | str | None) -> Array:
     return given
 
 
-def _leaving(run: Trajectory, times: Array, share: Array) -> Array:
-    """Normal acceleration at instants, 0 before the run begins."""
+def _disk(area: float, distance: float) -> list[tuple[float, float]]:
+    """What a disk's middle and edge send: pressure over velocity [Pa s/m], and how late [s]."""
+    edge = math.hypot(distance, math.sqrt(area / math.pi))
+    resistance = AIR * SPEED_OF_SOUND
+    return [(resistance, distance / SPEED_OF_SOUND), (-resistance, edge / SPEED_OF_SOUND)]
+
+
+def _velocity(acceleration: Array, fs: float) -> Array:
+    """Its integral without mean, by the trapezoidal rule."""
+    steps = (acceleration[1:] + acceleration[:-1]) / (2 * fs)
+    summed = np.concatenate([[0.0], np.cumsum(steps)])
+    return np.asarray(summed - np.mean(summed))
+
+
+def _leaving(run: Trajectory, times: Array, share: Array, signal: str) -> Array:
+    """Normal acceleration or velocity at instants, 0 before the run begins."""
     begun = times >= 0
     values = np.zeros(len(times))
-    values[begun] = share @ run.sample(np.minimum(times[begun], run.duration), ("a",))[0]
+    values[begun] = share @ run.sample(np.minimum(times[begun], run.duration), (signal,))[0]
     return values
 
 
@@ -273,8 +301,9 @@ def squeak_rig(surface: str = "wet", load: float | str = HEAVY, *, amplitude: fl
     load : float or str
         Normal load on both contacts together [N]; the thesis has 6.13 and 1.23.
     amplitude : float
-        Of the mass's motion [m], roughly: the base moves as far as that takes against the friction (the thesis drove
-        each case to a like motion).
+        Of the mass's motion [m], roughly: the base moves as far as that takes against the friction by harmonic balance.
+        Where friction nearly holds the mass the motion is up to two thirds smaller; to drive it to like motions, as
+        the thesis did, move the base as the mass alone needs it (``stickslip_thesis.chapter7.base_for``).
 
     Returns
     -------

@@ -1,21 +1,63 @@
-"""A commissioned rig told: its constants, its sensors, what each step did, and the rig.toml that came of it."""
+"""A rig told: the plan of an experiment, a simulated record with its truth, and what commissioning found."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from functools import partial
 from pathlib import Path
 
+from stickslip.answers.experiment import ExperimentPlan
+from stickslip.answers.findings import record_name
 from stickslip.bench.calibration import Calibration
 from stickslip.bench.response import ModalFit
-from stickslip.bench.steps import STEPS, BenchStep
-from stickslip.bench.walk import Commissioned
+from stickslip.bench.steps import STEPS, BenchStep, Commissioned
 from stickslip.estimate import Estimate, Result, stands
-from stickslip.figures.bench import plot_calibrations, plot_response
+from stickslip.figures.bench import plot_calibrations, plot_plan, plot_response
 from stickslip.figures.plate import Plate, plate
+from stickslip.files.write import require_form, write_record
+from stickslip.record.record import Record
 from stickslip.story.findings import plain
-from stickslip.story.story import Line, Story, Table
+from stickslip.story.story import Line, Story, Table, logged
 from stickslip.story.words import Caution, interval_of, value_of
+
+CAPTION = "Root-mean-square error against the sampling rate, for each choice of sensors."
+
+
+def of_record(record: Record, *, form: str = "csv") -> Story:
+    """A record, with what is true of it and what is wrong with it; its folder holds it too, in `form`."""
+    require_form(form)
+    faults = [str(fault) for fault in record.check()]
+    true = [(name, f"{value:.6g}") for name, value in record.truth.items() if name != "events"]
+
+    def write(folder: Path) -> None:
+        write_record(record, folder / f"record.{form}")
+
+    return Story.of_record(
+        record_name(record), record, headline=[repr(record)], faults=faults,
+        tables=[*([Table("What is true", ("what is true", "SI"), true)] if true else []), *logged(record)],
+        data=lambda: {"fs": record.fs, "truth": dict(record.truth), "faults": faults}, write=write,
+    )  # fmt: skip
+
+
+def of_plan(plan: ExperimentPlan, *, needs: Sequence[tuple[str, str]] = ()) -> Story:
+    """Every setup with its accuracy, and the least that is enough for what is needed."""
+    rows = [
+        [f"{setup.fs:g}", ", ".join(setup.sensors), *(str(setup.accuracy[question]) for question in plan.questions)]
+        for setup in plan.setups
+    ]
+    errors = f"Root-mean-square errors of {plan.draws} record{'s' * (plan.draws > 1)} at each rate."
+    return Story(
+        "Plan of an experiment", ["; ".join(_enough(plan, *need) for need in needs)] * bool(needs), notes=plan.refusals,
+        tables=[Table("What each setup tells", ("fs [Hz]", "sensors", *plan.questions), rows, errors)],
+        draw=lambda: [plate("plan", partial(plot_plan, plan), "What each setup tells", CAPTION)], data=plan.to_dict,
+    )  # fmt: skip
+
+
+def _enough(plan: ExperimentPlan, question: str, error: str) -> str:
+    setup = plan.enough(question, error)
+    found = f"{', '.join(setup.sensors)} at {setup.fs:g} Hz" if setup else "none of these"
+    return f"{question} within {error}: {found}"
+
 
 # What leads: of which step, and which of its numbers; the rest stands in the tables.
 LEADING = (
@@ -38,8 +80,8 @@ def of_commissioned(done: Commissioned) -> Story:
     known, found = done.known, done.results
     constants = known.constants
     own = [*(constants.estimates if constants else ()), *([known.damping] if known.damping else [])]
-    lines = [Line.of(each, done.true_value(each.name)) for each in own]
-    lines += [Line.of(each, done.true_value(each.name, step)) for step, each in _leading(done)]
+    lines = [Line.of(estimate, done.true_value(estimate.name)) for estimate in own]
+    lines += [Line.of(estimate, done.true_value(estimate.name, step)) for step, estimate in _leading(done)]
     cautions = [Caution(f"{_title(name)} {why}") for name, why in done.refused.items()]
     cautions += [
         Caution(f"{_title(name)} {status}.")
@@ -70,9 +112,9 @@ def _headline(done: Commissioned) -> str:
 
 def _leading(done: Commissioned) -> Iterator[tuple[str, Estimate]]:
     for step, name in LEADING:
-        for each in done.results[step].estimates if step in done.results else ():
-            if each.name == name:
-                yield step, each
+        for estimate in done.results[step].estimates if step in done.results else ():
+            if estimate.name == name:
+                yield step, estimate
 
 
 def _title(name: str) -> str:
@@ -86,33 +128,39 @@ def _tables(done: Commissioned) -> list[Table]:
         if step.name in done.results or step.name in done.refused
     ]
     tables = [Table("What was done", ("question", "at the rig", "answer"), rows)]
-    truth = any(done.true_value(each.name, name) is not None for name, each in _numbers(done))
+    truth = any(done.true_value(estimate.name, name) is not None for name, estimate in _numbers(done))
     heads = ("step", "quantity", "value", "95 % interval", *(["true value"] if truth else []))
     cells = [
-        [name, each.name, value_of(each), interval_of(each), *([_true(done, name, each)] if truth else [])]
-        for name, each in _numbers(done)
+        [
+            name,
+            estimate.name,
+            value_of(estimate),
+            interval_of(estimate),
+            *([_true(done, name, estimate)] if truth else []),
+        ]
+        for name, estimate in _numbers(done)
     ]
     return [*tables, Table("Which number did each step find?", heads, cells, folded=True)]
 
 
 def _numbers(done: Commissioned) -> Iterable[tuple[str, Estimate]]:
-    return ((name, each) for name, result in done.results.items() for each in result.estimates)
+    return ((name, estimate) for name, result in done.results.items() for estimate in result.estimates)
 
 
-def _true(done: Commissioned, step: str, each: Estimate) -> str:
-    true = done.true_value(each.name, step)
-    return "–" if true is None else value_of(each, true)
+def _true(done: Commissioned, step: str, estimate: Estimate) -> str:
+    true = done.true_value(estimate.name, step)
+    return "–" if true is None else value_of(estimate, true)
 
 
 def _short(done: Commissioned, step: BenchStep) -> str:
     """The first numbers of a step, in a cell."""
     if step.name in done.refused:
         return f"refused: {done.refused[step.name]}"
-    return "; ".join(f"{each.name} {value_of(each)}" for each in _first(done.results[step.name]))
+    return "; ".join(f"{estimate.name} {value_of(estimate)}" for estimate in _first(done.results[step.name]))
 
 
 def _first(result: Result) -> tuple[Estimate, ...]:
-    return tuple(each for each in result.estimates if each.known)[:3]
+    return tuple(estimate for estimate in result.estimates if estimate.known)[:3]
 
 
 def _settings(done: Commissioned) -> dict[str, str]:
@@ -125,7 +173,7 @@ def _settings(done: Commissioned) -> dict[str, str]:
 
 
 def _plates(done: Commissioned) -> list[Plate]:
-    sensors = {each.channel: each for each in done.results.values() if isinstance(each, Calibration)}
+    sensors = {result.channel: result for result in done.results.values() if isinstance(result, Calibration)}
     plates = []
     sweep = done.results.get("sweep")
     if isinstance(sweep, ModalFit) and sweep.response is not None:

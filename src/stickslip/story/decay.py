@@ -32,7 +32,7 @@ METHODS = {"all": "whole waveform, and decrements", "waveform": "whole waveform"
 def of_findings(findings: Findings) -> Story:
     """One record."""
     decay, chosen = findings.decay, findings.settings
-    beside = [replace(each, status="for comparison") for each in decay.comparisons]
+    beside = [replace(comparison, status="for comparison") for comparison in decay.comparisons]
     motions = () if decay.motion is None else [told[1:] for told in decay.motion.candidates]
     units = rig_units(chosen["channel"])
     settings = {"methods": METHODS[chosen["method"]], "channel": chosen["channel"], "spring": chosen["restoring"]}
@@ -69,7 +69,7 @@ def _scope(findings: Findings) -> Scope | None:
 def _by_other_ways(estimates: list[Estimate]) -> Iterator[Table]:
     """What is not quoted, folded away."""
     headings = ("quantity", "value", "95 % interval", "how sure")
-    rows = [(each.name, value_of(each), interval_of(each), each.status) for each in estimates]
+    rows = [(estimate.name, value_of(estimate), interval_of(estimate), estimate.status) for estimate in estimates]
     if rows:
         yield Table("The same by other ways", headings, rows, folded=True)
 
@@ -98,8 +98,8 @@ def _data(decay: Decay) -> dict[str, Any]:
         "model": decay.best.model,
         "status": decay.best.status,
         "releases": [
-            {**{key: getattr(each, key) for key in keys}, "extremes": len(each.turns)}
-            for each in decay.releases.ring_downs
+            {**{key: getattr(ring_down, key) for key in keys}, "extremes": len(ring_down.turns)}
+            for ring_down in decay.releases.ring_downs
         ],
         "motions": [{"name": name, "words": words, "verdict": verdict} for name, words, verdict in tried],
         "viscous_residual": decay.viscous_residual,
@@ -108,20 +108,20 @@ def _data(decay: Decay) -> dict[str, Any]:
     }
 
 
-def _decrements(found: Decrement) -> dict[str, Any]:
+def _decrements(decrement: Decrement) -> dict[str, Any]:
     """Extremes, and the table of the bounds."""
-    bounds = found.bounds
+    bounds = decrement.bounds
     rows = ("m", "rate", "rate_first_order", "rate_worst", "dry", "dry_first_order", "dry_worst")
     return {
-        "extremes": {"time": found.time, "value": found.extremes, "sd": found.sd},
-        "differences": found.differences,
+        "extremes": {"time": decrement.time, "value": decrement.extremes, "sd": decrement.sd},
+        "differences": decrement.differences,
         "bounds": {
             "i": bounds.i, "best_m": bounds.best, "error": bounds.error,
             **{name: getattr(bounds, name) for name in rows},
         },
         "scatter": {
             name: {"mean": values.mean(), "sd": values.std()}
-            for name, values in vars(found.scatter).items() if len(values)
+            for name, values in vars(decrement.scatter).items() if len(values)
         },
     }  # fmt: skip
 
@@ -130,7 +130,7 @@ def _headline(findings: Findings) -> Iterator[str]:
     """What was found, in a few sentences."""
     decay = findings.decay
     if slips := findings.results.get("slips"):
-        yield f"Probably {' or '.join(each.words for each in slips)}: until that is mended no friction is given."
+        yield f"Probably {' or '.join(slip.words for slip in slips)}: until that is mended no friction is given."
         return
     yield from _frictions(findings)
     yield from _left_over(decay)
@@ -157,7 +157,7 @@ def _frictions(findings: Findings) -> Iterator[str]:
             "true ones too one in twenty does so."
         )
     swings = decay.releases.ring_downs
-    far = max(abs(each.amplitude) for each in swings)
+    far = max(abs(swing.amplitude) for swing in swings)
     straight = findings.settings["channel"] == "theta" and findings.settings["restoring"] == "linear"
     if straight and far > FAR and (decay.against < CLEAR or not swings[0].isochronous):
         yield f'A swing of {far:.2g} rad is far for a straight spring: of a pendulum ask with restoring="pendulum".'
@@ -171,7 +171,7 @@ def _dying(decay: Decay) -> str:
     curved = decay.best is decay.thesis and not decay.releases.ring_downs[0].isochronous
     if decay.motion is not None and decay.best is decay.motion:
         words = decay.motion.choice.chosen.fitted.motion.words
-        return f"The motion dies away by {words}: {_listed([_told(each) for each in decay.motion.terms])}."
+        return f"The motion dies away by {words}: {_listed([_told(term) for term in decay.motion.terms])}."
     if decay.denied and decay.whichever:
         ratio, dry = decay.whichever
         reach = f"the damping ratio is {_reach(ratio)} and the dry friction displacement {_reach(dry)}"
@@ -198,9 +198,9 @@ def _chosen(decay: Decay) -> Iterator[str]:
     motion = decay.motion
     if motion is None:
         return
-    kept = [each.fitted.motion.words for each in motion.choice.candidates if each.kept]
+    kept = [candidate.fitted.motion.words for candidate in motion.choice.candidates if candidate.kept]
     tried = len(motion.candidates)
-    nearest = max(motion.choice.candidates, key=lambda each: each.p_value)
+    nearest = max(motion.choice.candidates, key=lambda candidate: candidate.p_value)
     if kept and motion.choice.status == "ok":
         yield f"Of {tried} motions tried the record does not speak against {len(kept)}: {'; '.join(kept)}."
     elif kept:
@@ -337,7 +337,7 @@ def _together(comparison: Comparison) -> Iterator[str]:
         yield f"Whichever motion it was, the dry friction displacement is {_reach(either)}."
     if static is not None:
         waveforms = [each.decay.waveform for each in comparison.findings]
-        alone = [each.static_displacement for each in waveforms if each is not None]
+        alone = [waveform.static_displacement for waveform in waveforms if waveform is not None]
         least = min(alone, key=lambda each: each.interval[1] - each.interval[0])
         yield (
             f"The static friction displacement lies within {_reach(static).removeprefix('within ')}; the surest record "

@@ -19,19 +19,19 @@ def of_one(estimate: Estimate, *, record: Record | None = None) -> Story:
     return of_several([estimate], record=record)
 
 
-def of_tap(found: ImpactTest, *, record: Record | None = None) -> Story:
+def of_tap(test: ImpactTest, *, record: Record | None = None) -> Story:
     """What rings after a tap, and whose resonance each is."""
-    named = [f"{each.name} at {value_of(each.frequency)}" for each in found.resonances]
+    named = [f"{resonance.name} at {value_of(resonance.frequency)}" for resonance in test.resonances]
     many = f"{len(named)} resonance{'s' * (len(named) > 1)} ring{'s' * (len(named) == 1)} after the tap"
     lines = [
-        Line.of(number, name=f"{quantity}, {each.name}")
-        for each in found.resonances
-        for quantity, number in (("frequency", each.frequency), ("damping ratio", each.damping))
+        Line.of(number, name=f"{quantity}, {resonance.name}")
+        for resonance in test.resonances
+        for quantity, number in (("frequency", resonance.frequency), ("damping ratio", resonance.damping))
     ]
-    rows = [(each.name, ", ".join(each.channels), each.evidence) for each in found.resonances]
+    rows = [(resonance.name, ", ".join(resonance.channels), resonance.evidence) for resonance in test.resonances]
     told: dict[str, Any] = {
-        "headline": [f"{many}: {'; '.join(named)}."], "lines": lines, "data": found.to_dict,
-        "cautions": [] if found.status == "ok" else [found.status],
+        "headline": [f"{many}: {'; '.join(named)}."], "lines": lines, "data": test.to_dict,
+        "cautions": [] if test.status == "ok" else [test.status],
         "tables": [Table("Why each is called so", ("resonance", "seen by", "evidence"), rows, folded=True)],
     }  # fmt: skip
     return Story("Tap", **told) if record is None else Story.of_record(record_name(record), record, **told)

@@ -18,7 +18,7 @@ from stickslip.story.story import Line, Story, logged
 from stickslip.story.words import leading, number
 
 # The file that tells findings which hold a result of this name; friction.py tells all others.
-FAMILIES = {"decay": "decay", "squeaks": "squeak"}
+FAMILIES = {"decay": "decay", "squeaks": "squeak", "joint": "joint"}
 
 
 # What an engineer looks for first: these quantities lead the table, those without a value end it.
@@ -75,7 +75,7 @@ def of_comparison(comparison: Comparison) -> Story:
     estimates = comparison.estimates
 
     def data() -> dict[str, Any]:
-        told = {**own.data(), "estimates": [each.to_dict() for each in estimates], "notes": comparison.notes}
+        told = {**own.data(), "estimates": [estimate.to_dict() for estimate in estimates], "notes": comparison.notes}
         return {"comparison": plain(told), "records": [part.data() for part in parts]}
 
     return replace(own, lines=[*map(Line.of, estimates), *own.lines], notes=comparison.notes, parts=parts, data=data)

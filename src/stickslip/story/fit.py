@@ -1,8 +1,9 @@
-"""A fitted law or curve, or several laws compared, told."""
+"""A fitted law or curve, several laws compared, or records as a law predicts them, told."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any, TypeAlias
@@ -10,10 +11,11 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from stickslip.answers.findings import record_name
+from stickslip.answers.fits import Prediction, Predictions
 from stickslip.balance.motion import forcing_frequency
 from stickslip.drives.kinds import Drive, HarmonicBase, Ramp, Release
 from stickslip.errors import ModelError
-from stickslip.estimate import doubts_of
+from stickslip.estimate import UNKNOWN, doubts_of
 from stickslip.figures.law import law_plates
 from stickslip.law.fit_curve import CurveFit
 from stickslip.law.law import LawFit
@@ -22,9 +24,9 @@ from stickslip.laws.export import export_law, toml_table
 from stickslip.laws.formula import quoted
 from stickslip.parameters import unit
 from stickslip.record.record import Record
-from stickslip.story.scope import Scope, of_fit
+from stickslip.story.scope import Panel, Scope, command_of, of_fit
 from stickslip.story.story import Line, Story, Table
-from stickslip.story.words import Caution, doubts, leading, number
+from stickslip.story.words import Caution, doubts, interval_of, leading, number, value_of
 
 Fit: TypeAlias = LawComparison | LawFit | CurveFit
 Records: TypeAlias = Record | Sequence[Record]  # what it was fitted to
@@ -38,38 +40,38 @@ STEADY = 0.05  # of its spread that a base may stray from a straight line: a ton
 ALONE = "# a law alone: to simulate it, add [system] with its mass and stiffness, and [drive]"
 
 
-def of_curve(found: CurveFit, *, record: Records = ()) -> Story:
+def of_curve(fit: CurveFit, *, record: Records = ()) -> Story:
     """A curve of friction."""
-    return _story(found, record, list(_curve_told(found)), data=partial(_curve_numbers, found))
+    return _story(fit, record, list(_curve_told(fit)), data=partial(_curve_numbers, fit))
 
 
-def of_law(found: LawFit, *, record: Records = ()) -> Story:
+def of_law(fit: LawFit, *, record: Records = ()) -> Story:
     """One law."""
-    return _story(found, record, list(_law_told(found)), notes=list(found.checks), data=found.to_dict)
+    return _story(fit, record, list(_law_told(fit)), notes=list(fit.checks), data=fit.to_dict)
 
 
-def of_laws(found: LawComparison, *, record: Records = ()) -> Story:
+def of_laws(comparison: LawComparison, *, record: Records = ()) -> Story:
     """Several laws compared."""
-    laws = sorted(found.candidates, key=lambda each: each.standing.misfit)
+    laws = sorted(comparison.candidates, key=lambda candidate: candidate.standing.misfit)
     rows = [
-        (each.name, _ratio(each.standing.misfit), "yes" if each.standing.kept else "no", _values(each.oscillator.law))
-        for each in laws
+        (law.name, _ratio(law.standing.misfit), "yes" if law.standing.kept else "no", _values(law.oscillator.law))
+        for law in laws
     ]
-    verdicts = [(each.name, each.standing.verdict) for each in laws]
+    verdicts = [(law.name, law.standing.verdict) for law in laws]
     note = "Misfit: mean square left over, in channels and records together, over the least that any law leaves."
     ranked = Table("Laws by misfit", ("law", "misfit", "possible", "parameters"), rows, note)
     why = Table("Why each law is possible or not", ("law", "verdict"), verdicts, folded=True)
     return _story(
-        found, record, [found.verdict], notes=[*found.checks, *found.fit.checks], tables=[ranked, why],
-        history=found.history, data=found.to_dict,
+        comparison, record, [comparison.verdict], notes=[*comparison.checks, *comparison.fit.checks],
+        tables=[ranked, why], history=comparison.history, data=comparison.to_dict,
     )  # fmt: skip
 
 
-def _story(found: Fit, record: Records, headline: list[str], **told: Any) -> Story:
+def _story(fit: Fit, record: Records, headline: list[str], **told: Any) -> Story:
     """What all fits tell of their parameters and of the records that they were made to."""
     records = [record] if isinstance(record, Record) else list(record)
     units = list(dict.fromkeys(words for each in records for words in leading(each.check())))
-    cautions = [*map(Caution, (doubt.words for doubt in doubts_of(found.status))), *doubts(found.estimates)]
+    cautions = [*map(Caution, (doubt.words for doubt in doubts_of(fit.status))), *doubts(fit.estimates)]
     if records:
         first = records[0]
         told = {"channels": list(first.channels.values()), "history": first.history, **told}
@@ -79,9 +81,9 @@ def _story(found: Fit, record: Records, headline: list[str], **told: Any) -> Sto
         }  # fmt: skip
     title = record_name(records[0]) if len(records) == 1 else f"{len(records)} records" if records else "Fit"
     return Story(
-        title, [*units, *headline], cautions, lines=list(map(Line.of, found.estimates)),
-        draw=lambda: law_plates(found), look=lambda: _scope(found, records),
-        write=partial(write_law, result=found, records=records), **told,
+        title, [*units, *headline], cautions, lines=list(map(Line.of, fit.estimates)),
+        draw=lambda: law_plates(fit), look=lambda: _scope(fit, records),
+        write=partial(write_law, result=fit, records=records), **told,
     )  # fmt: skip
 
 
@@ -99,21 +101,21 @@ def _ratio(misfit: float) -> str:
     return f"{misfit:.2f}" if misfit < 10 else f"{misfit:.0f}"
 
 
-def _curve_told(found: CurveFit) -> Iterator[str]:
-    follows = "the friction follows" if found.follows else "the friction does not follow"
-    if found.follows and found.unexplained > LOUD:
+def _curve_told(fit: CurveFit) -> Iterator[str]:
+    follows = "the friction follows" if fit.follows else "the friction does not follow"
+    if fit.follows and fit.unexplained > LOUD:
         follows = f"as far as its noise lets it be seen, {follows}"
-    yield f'{follows[0].upper()}{follows[1:]} the curve "{found.curve}": {found.formula}.'
-    left = f"{found.unexplained:.1%} of the friction, {number(found.residual, found.residual / 100, found.unit)}"
-    what = "It leaves" if found.follows else "The best of that kind leaves"
-    yield f"{what} {left} root mean square; {found.model_error:.1%} is no noise."
+    yield f'{follows[0].upper()}{follows[1:]} the curve "{fit.curve}": {fit.formula}.'
+    left = f"{fit.unexplained:.1%} of the friction, {number(fit.residual, fit.residual / 100, fit.unit)}"
+    what = "It leaves" if fit.follows else "The best of that kind leaves"
+    yield f"{what} {left} root mean square; {fit.model_error:.1%} is no noise."
 
 
-def _law_told(found: LawFit) -> Iterator[str]:
-    how = "fitted to" if found.parameters else "as it was given, predicts"
-    surface = " on a rough surface" if found.surface == "rough" else ""
-    yield f"The law {type(found.law).__name__}{surface}, {how} {', '.join(found.misfit)}: {_values(found.law)}."
-    yield f"It leaves {', '.join(f'{times:.3g} times the noise of {name}' for name, times in found.misfit.items())}."
+def _law_told(fit: LawFit) -> Iterator[str]:
+    how = "fitted to" if fit.parameters else "as it was given, predicts"
+    surface = " on a rough surface" if fit.surface == "rough" else ""
+    yield f"The law {type(fit.law).__name__}{surface}, {how} {', '.join(fit.misfit)}: {_values(fit.law)}."
+    yield f"It leaves {', '.join(f'{times:.3g} times the noise of {name}' for name, times in fit.misfit.items())}."
 
 
 def _values(law: object) -> str:
@@ -121,13 +123,13 @@ def _values(law: object) -> str:
     return ", ".join(f"{key} {number(value, abs(value) / 1000, unit(law, key))}" for key, value in told.items())
 
 
-def _curve_numbers(found: CurveFit) -> dict[str, object]:
+def _curve_numbers(fit: CurveFit) -> dict[str, object]:
     """Plain data for JSON: SI numbers, None where a number does not exist."""
     return {
-        "curve": found.curve, "formula": found.formula, "residual": found.residual,
-        "unexplained": found.unexplained, "model_error": found.model_error, "follows": found.follows,
-        "unit": found.unit, "status": found.status,
-        "estimates": [each.to_dict() for each in found.estimates],
+        "curve": fit.curve, "formula": fit.formula, "residual": fit.residual,
+        "unexplained": fit.unexplained, "model_error": fit.model_error, "follows": fit.follows,
+        "unit": fit.unit, "status": fit.status,
+        "estimates": [estimate.to_dict() for estimate in fit.estimates],
     }  # fmt: skip
 
 
@@ -193,3 +195,107 @@ def _plain(name: str, values: Mapping[str, Any]) -> str:
         f"{key} = {quoted(value) if isinstance(value, str) else repr(float(value))}" for key, value in values.items()
     ]
     return "\n".join([f"[{name}]", *lines])
+
+
+DEFINITION = (
+    "Follows: 100 (1 - |y - yhat| / |y - mean y|) %, the fit of system identification: 100 % is the record itself, 0 % "
+    "no better than its mean. Nothing was fitted to it but how the motion begins and each sensor's zero."
+)
+COMPARED = "Coulomb: the same of one level of friction and a viscous damper, both fitted to the record itself."
+
+
+def of_predictions(predictions: Predictions) -> Story:
+    """One record by itself; several in a table, a row each, with a section of the page for each."""
+    parts = [_of_one(part, _law(predictions)) for part in predictions.parts]
+    if len(parts) == 1:
+        return _noted(parts[0], predictions)
+    least = _listed(predictions.least)
+    headline = f"{_law(predictions)}, as it was given, follows at least {least} in each of {len(parts)} records."
+    first = next(iter(predictions.least))
+    rows = [
+        (part.name, *(_percent(part.follows.get(name)) for name in predictions.least), _percent(part.plain.get(first)),
+         *_stops(part)) for part in predictions.parts
+    ]  # fmt: skip
+    headings = ("record", *predictions.least, f"{first}, Coulomb", "stops per cycle", "predicted")
+    table = Table("How much is followed", headings, rows, f"{DEFINITION} {COMPARED}")
+    return _noted(Story(f"{len(parts)} records predicted", [headline], tables=[table], parts=parts), predictions)
+
+
+def _noted(story: Story, predictions: Predictions) -> Story:
+    return replace(story, notes=[*story.notes, *predictions.notes], data=predictions.to_dict)
+
+
+def _of_one(part: Prediction, law: str) -> Story:
+    record, fit = part.record, part.fit
+    rows = [
+        (name, _percent(value), _percent(part.plain.get(name)), _left(part, name), f"{fit.misfit[name]:.3g}")
+        for name, value in part.follows.items()
+    ]
+    headings = ("channel", "follows", "Coulomb", "left (rms)", "over its noise")
+    note = f"{DEFINITION} {COMPARED}" if part.plain else DEFINITION
+    tables = [Table("How much is followed", headings, rows, note)]
+    if part.sticks:
+        of = [(stick.per_cycle, stick.share) for stick in part.sticks]
+        stops = [
+            (pair[0].name, *(text for each in pair for text in (value_of(each), interval_of(each))))
+            for pair in zip(*of, strict=True)
+        ]
+        tables.append(Table("Stops, by the speed", ("", "measured", "95 %", "predicted", "95 %"), stops))
+    return Story.of_record(
+        part.name, record, headline=[*leading(record.check()), *_headline(part, law)],
+        cautions=[*_cautions(part), *doubts(part.estimates[:2])], tables=tables, draw=lambda: law_plates(fit),
+        look=lambda: _scope_of(part, law), data=part.to_dict,
+    )  # fmt: skip
+
+
+def _headline(part: Prediction, law: str) -> Iterator[str]:
+    yield f"{law}, as it was given, follows {_listed(part.follows)} in {part.name}."
+    better = {name: value for name, value in part.plain.items() if value >= part.follows[name]}
+    if better:
+        yield f"Plain Coulomb friction, fitted to this record, follows no less: {_listed(better)}."
+
+
+def _cautions(part: Prediction) -> Iterator[str]:
+    if {"z", "force"}.isdisjoint(part.record):
+        yield "Neither the base's motion z nor a force was recorded: the motion is driven as the law's file says."
+    least = min(part.follows, key=lambda name: part.follows[name])
+    if part.follows[least] < 0:
+        yield f"{least} is predicted worse than by its mean: the law, a constant, a unit or the drive is another one."
+
+
+def _scope_of(part: Prediction, law: str) -> Scope | None:
+    """Each channel with what the law's sensor would have read over it; none of a broken clock."""
+    record, traces = part.record, part.fit.traces[0]
+    if record.stamps is not None:
+        return None
+    panels = [
+        Panel(name, record.channels[name].unit, {
+            "measured": record[name],
+            "model": np.interp(record.time, traces.time[name], traces.fitted[name], left=np.nan, right=np.nan),
+        }) for name in part.follows
+    ]  # fmt: skip
+    command, first = command_of(record, "analyze")
+    return Scope(record.start, record.fs, panels, f"{law}, as it was given", command=command, first=first)
+
+
+def _law(predictions: Predictions) -> str:
+    return type(predictions.oscillator.law).__name__
+
+
+def _stops(part: Prediction) -> Sequence[str]:
+    """Per cycle, as measured and as predicted."""
+    return [value_of(stick.per_cycle) for stick in part.sticks] or [UNKNOWN, UNKNOWN]
+
+
+def _left(part: Prediction, name: str) -> str:
+    residual = part.fit.residual[name]
+    return number(residual, residual / 100, part.record.channels[name].unit)
+
+
+def _listed(follows: Mapping[str, float]) -> str:
+    told = [f"{_percent(value)} of {name}" for name, value in follows.items()]
+    return " and ".join([", ".join(told[:-1]), told[-1]] if len(told) > 1 else told)
+
+
+def _percent(value: float | None) -> str:
+    return "-" if value is None else f"{value:.1f} %" if value < 99 else f"{value:.2f} %"

@@ -104,7 +104,7 @@ def _wrong(findings: Findings) -> Iterator[str]:
     """What is stated wrongly, or not at all, and leaves no force to be given."""
     slips, missing = findings.results.get("slips") or (), findings.results.get("lacking") or ()
     if slips:
-        yield f"Probably {' or '.join(each.words for each in slips)}: until that is mended no force is given."
+        yield f"Probably {' or '.join(slip.words for slip in slips)}: until that is mended no force is given."
     elif apart := hopeless(findings.consistency):
         yield f"{sentence(apart)}. Until that is mended no force is given."
     elif missing:
@@ -225,8 +225,8 @@ def _of_sticks(findings: Findings) -> str:
     return f"it {'sticks' if stands(sticks.share.status) else 'seems to stick'} {share} of the time{stops}"
 
 
-def _of_breakaway(found: Breakaway) -> Iterator[str]:
-    ratio = found.ratio
+def _of_breakaway(breakaway: Breakaway) -> Iterator[str]:
+    ratio = breakaway.ratio
     low, high = ratio.interval
     if not math.isfinite(low + high):
         yield f"The breakaway force is not known: {ratio.status}."
@@ -235,14 +235,16 @@ def _of_breakaway(found: Breakaway) -> Iterator[str]:
         yield f"At breakaway it seems to bear {value_of(ratio)} times as much as while it slides."
         return
     more = "more than" if low > 1 + ALIKE else "less than" if high < 1 - ALIKE else "about as much as"
-    sides = " and ".join(f"{value_of(each)} {each.name.split()[-1]}" for each in (found.forward, found.back) if each)
+    sides = " and ".join(
+        f"{value_of(each)} {each.name.split()[-1]}" for each in (breakaway.forward, breakaway.back) if each
+    )
     yield (
         f"At breakaway it bears {sides}: {more} while it slides ({value_of(ratio)} times, 95 %: {interval_of(ratio)})."
     )
-    rings = [each for each in (found.ringing_forward, found.ringing_back) if each is not None]
+    rings = [each for each in (breakaway.ringing_forward, breakaway.ringing_back) if each is not None]
     if rings:
         yield f"After slip begins it rings at {' and '.join(f'{value_of(e)} {e.name.split()[-1]}' for e in rings)}."
-    apart = found.ringing_difference
+    apart = breakaway.ringing_difference
     if apart is not None and not apart.interval[0] <= 0 <= apart.interval[1]:
         yield f"The two directions ring apart by {value_of(apart)} (95 %: {interval_of(apart)})."
 
@@ -254,32 +256,32 @@ def _of_contact(stiffness: Estimate, damping: Estimate | None) -> str:
     )
 
 
-def _of_presliding(found: Presliding) -> Iterator[str]:
-    if found.verdict == "gives way" and found.stiffness is not None:
-        gap = found.backlash
+def _of_presliding(presliding: Presliding) -> Iterator[str]:
+    if presliding.verdict == "gives way" and presliding.stiffness is not None:
+        gap = presliding.backlash
         play = f", with {value_of(gap)} of play" if gap is not None and gap.interval[0] > 0 else ""
-        gives = "gives" if stands(found.stiffness.status) else "seems to give"
+        gives = "gives" if stands(presliding.stiffness.status) else "seems to give"
         yield (
-            f"Before it slips the contact {gives} way, with a stiffness of {value_of(found.stiffness)} "
-            f"(95 %: {interval_of(found.stiffness)}){play}."
+            f"Before it slips the contact {gives} way, with a stiffness of {value_of(presliding.stiffness)} "
+            f"(95 %: {interval_of(presliding.stiffness)}){play}."
         )
-    elif found.verdict == "rigid":
-        yield f"Before it slips the contact is rigid as far as the record shows: {found.evidence}."
+    elif presliding.verdict == "rigid":
+        yield f"Before it slips the contact is rigid as far as the record shows: {presliding.evidence}."
     else:
-        yield f"Whether the contact gives way before it slips is not resolved: {found.evidence}."
+        yield f"Whether the contact gives way before it slips is not resolved: {presliding.evidence}."
 
 
-def _of_pull(found: Pull) -> Iterator[str]:
-    if found.regime == "stick-slip":
+def _of_pull(pull: Pull) -> Iterator[str]:
+    if pull.regime == "stick-slip":
         yield (
-            f"The slider sticks and slips at {value_of(found.frequency)}: while it sticks the force rises by "
-            f"{value_of(found.loading_rate)} (95 %: {interval_of(found.loading_rate)}), to "
-            f"{value_of(found.breakaway)}, and falls by {value_of(found.drop)} in a slip."
+            f"The slider sticks and slips at {value_of(pull.frequency)}: while it sticks the force rises by "
+            f"{value_of(pull.loading_rate)} (95 %: {interval_of(pull.loading_rate)}), to "
+            f"{value_of(pull.breakaway)}, and falls by {value_of(pull.drop)} in a slip."
         )
     else:
         yield (
-            f"The slider does not stick: it swings about its steady sliding at {value_of(found.frequency)}, as its own "
-            f"inertia lets it (the force rises for {value_of(found.rise_over_fall)} times as long as it falls)."
+            f"The slider does not stick: it swings about its steady sliding at {value_of(pull.frequency)}, as its own "
+            f"inertia lets it (the force rises for {value_of(pull.rise_over_fall)} times as long as it falls)."
         )
 
 

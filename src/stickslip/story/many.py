@@ -58,9 +58,11 @@ def _headline(batch: Batch, leading: Sequence[str]) -> Iterator[str]:
         yield Caution(_several(refused, "give no answer", "gives no answer", lambda row: row.refusal.rstrip(".")))
 
 
-def _range(name: str, found: Sequence[Estimate]) -> str:
-    low, middle, high = (value_of(found[0], float(v)) for v in np.percentile([e.value for e in found], [0, 50, 100]))
-    return f"{name} {low} to {high}, median {middle}, in {len(found)}"
+def _range(name: str, estimates: Sequence[Estimate]) -> str:
+    low, middle, high = (
+        value_of(estimates[0], float(v)) for v in np.percentile([e.value for e in estimates], [0, 50, 100])
+    )
+    return f"{name} {low} to {high}, median {middle}, in {len(estimates)}"
 
 
 def _several(rows: Sequence[Row], are: str, is_one: str, word: Any) -> str:
@@ -70,7 +72,7 @@ def _several(rows: Sequence[Row], are: str, is_one: str, word: Any) -> str:
 
 
 def _cell(row: Row, name: str) -> str:
-    found = next((each for each in row.estimates if each.name == name), None)
+    found = next((estimate for estimate in row.estimates if estimate.name == name), None)
     if found is None or not found.known:
         return "-"
     return f"{value_of(found)} ({interval_of(found)})"
@@ -81,10 +83,10 @@ def _remark(row: Row) -> str:
 
 
 def _data(batch: Batch) -> Mapping[str, Any]:
-    together = [each.to_dict() for each in batch.estimates]
+    together = [estimate.to_dict() for estimate in batch.estimates]
     rows = [
         {"name": row.name, "sha256": row.key, "answer": row.answer, "refusal": row.refusal, "same_as": row.same_as,
-         "normal_load": row.normal, "estimates": [each.to_dict() for each in row.estimates]}
+         "normal_load": row.normal, "estimates": [estimate.to_dict() for estimate in row.estimates]}
         for row in batch.rows
     ]  # fmt: skip
     return {"comparison": {"estimates": together, "notes": plain(batch.notes)}, "records": plain(rows)}

@@ -106,87 +106,92 @@ def _settings(attributes: Mapping[str, Any]) -> dict[str, str]:
 # ---- along a parameter, over starts, between regimes and under dither: a figure each
 
 
-def of_bifurcation(found: Bifurcation) -> Story:
+def of_bifurcation(diagram: Bifurcation) -> Story:
     """Attractors along a parameter."""
-    rows = [(each.direction, f"{each.value:.6g}", each.before, each.after) for each in found.changes]
-    ways = (("up", found.up), ("down", found.down))
+    rows = [(change.direction, f"{change.value:.6g}", change.before, change.after) for change in diagram.changes]
+    ways = (("up", diagram.up), ("down", diagram.down))
     return _story(
-        "Motion along a parameter", "bifurcation", partial(plot_bifurcation, found),
+        "Motion along a parameter", "bifurcation", partial(plot_bifurcation, diagram),
         "Where the mass is once in each period of the drive: blue followed upwards, orange downwards; lines mark "
         "where the kind of motion changes. Below, the largest multiplier: at 1 the motion ceases to attract.",
-        headline=list(_along(found)),
-        tables=[Table("Changes of the motion", ("way", found.parameter, "before", "after"), rows)] if rows else (),
+        headline=list(_along(diagram)),
+        tables=[Table("Changes of the motion", ("way", diagram.parameter, "before", "after"), rows)] if rows else (),
         data=lambda: {
-            "parameter": found.parameter, "values": found.values.tolist(), "coexisting": found.coexisting.tolist(),
+            "parameter": diagram.parameter, "values": diagram.values.tolist(),
+            "coexisting": diagram.coexisting.tolist(),
             "regimes": {name: [each.regime for each in way] for name, way in ways},
-            "changes": [vars(each) for each in found.changes],
+            "changes": [vars(change) for change in diagram.changes],
         },
     )  # fmt: skip
 
 
-def _along(found: Bifurcation) -> Iterator[str]:
-    low, high = (f"{value:.6g}" for value in found.values[[0, -1]])
-    if not found.changes:
-        yield f"From {found.parameter} {low} to {high} the motion does not change its kind: {found.up[0].regime}."
+def _along(diagram: Bifurcation) -> Iterator[str]:
+    low, high = (f"{value:.6g}" for value in diagram.values[[0, -1]])
+    if not diagram.changes:
+        yield f"From {diagram.parameter} {low} to {high} the motion does not change its kind: {diagram.up[0].regime}."
         return
     yield (
-        f"From {found.parameter} {low} to {high} the motion changes its kind {len(found.changes)} times on the way up "
-        "and down."
+        f"From {diagram.parameter} {low} to {high} the motion changes its kind {len(diagram.changes)} times on the way "
+        "up and down."
     )
-    if len(found.coexisting):
-        ends = f"{found.coexisting[0]:.6g} to {found.coexisting[-1]:.6g}"
-        many = f"{len(found.coexisting)} of {len(found.values)} values"
+    if len(diagram.coexisting):
+        ends = f"{diagram.coexisting[0]:.6g} to {diagram.coexisting[-1]:.6g}"
+        many = f"{len(diagram.coexisting)} of {len(diagram.values)} values"
         yield f"Motions exist side by side at {many}, {ends}: hysteresis."
 
 
-def of_stability(found: Stability) -> Story:
+def of_stability(stability: Stability) -> Story:
     """Whether steady sliding lasts, mode by mode."""
-    rows = [(f"{each.frequency:.5g} Hz", f"{each.growth:.4g} 1/s", f"{each.damping_ratio:.3g}") for each in found.modes]
-    tone = f"at {found.frequency:.5g} Hz"
-    if found.stable:
-        told = f"Steady sliding is stable: the slowest vibration, {tone}, dies away by {abs(found.growth):.4g} 1/s."
+    rows = [
+        (f"{mode.frequency:.5g} Hz", f"{mode.growth:.4g} 1/s", f"{mode.damping_ratio:.3g}") for mode in stability.modes
+    ]
+    tone = f"at {stability.frequency:.5g} Hz"
+    if stability.stable:
+        told = f"Steady sliding is stable: the slowest vibration, {tone}, dies away by {abs(stability.growth):.4g} 1/s."
     else:
-        told = f"Steady sliding is unstable by {found.mechanism}: a vibration {tone} grows by {found.growth:.4g} 1/s."
+        growth = f"{stability.growth:.4g} 1/s"
+        told = f"Steady sliding is unstable by {stability.mechanism}: a vibration {tone} grows by {growth}."
     keys = ("stable", "mechanism", "growth", "without_coupling", "without_slope", "place", "loads", "status")
-    modes = [{key: getattr(each, key) for key in ("frequency", "growth", "damping_ratio")} for each in found.modes]
+    modes = [{key: getattr(mode, key) for key in ("frequency", "growth", "damping_ratio")} for mode in stability.modes]
     return Story(
-        "Stability of steady sliding", [told], [] if found.status == "ok" else [found.status],
+        "Stability of steady sliding", [told], [] if stability.status == "ok" else [stability.status],
         tables=[Table("Modes", ("frequency", "growth", "damping ratio"), rows)],
-        data=lambda: plain({**{key: getattr(found, key) for key in keys}, "modes": modes}),
+        data=lambda: plain({**{key: getattr(stability, key) for key in keys}, "modes": modes}),
     )  # fmt: skip
 
 
-def of_basins(found: Basins) -> Story:
+def of_basins(basins: Basins) -> Story:
     """Attractors over starts."""
     return _story(
-        "Which start leads where", "basins", partial(plot_basins, found),
+        "Which start leads where", "basins", partial(plot_basins, basins),
         "Each start in the colour of the motion it leads to; crosses: where that motion is at phase zero.",
     )  # fmt: skip
 
 
-def of_boundary(found: Boundary) -> Story:
+def of_boundary(boundary: Boundary) -> Story:
     """Where the kind of motion changes."""
     return _story(
-        "Where the kind of motion changes", "boundary", partial(plot_boundary, found),
+        "Where the kind of motion changes", "boundary", partial(plot_boundary, boundary),
         "Points: found by bisection of exact runs. Line: the closed form.",
     )  # fmt: skip
 
 
-def of_dither(found: Dither) -> Story:
+def of_dither(dither: Dither) -> Story:
     """What dither leaves of the sticks and of the friction."""
     return _story(
-        "What dither does", "dither", partial(plot_dither, found),
+        "What dither does", "dither", partial(plot_dither, dither),
         "Top: the longest stick left; below the line none outlasts a period of the dither. Bottom: the friction "
         "left on average, and what the averaged law says; where they part, friction moves the mass in a period, "
         "or the contact gives way.",
         headline=[
-            f"Dither of {value_of(found.amplitude)} at {found.frequency:.5g} Hz on the {found.on} removes stick-slip: "
-            f"the longest stick falls from {found.sticks[0]:.3g} s to {found.sticks[1]:.3g} s."
+            f"Dither of {value_of(dither.amplitude)} at {dither.frequency:.5g} Hz on the {dither.on} removes "
+            f"stick-slip: the longest stick falls from {dither.sticks[0]:.3g} s to {dither.sticks[1]:.3g} s."
         ],
-        lines=[Line.of(found.amplitude)], notes=found.checks,
+        lines=[Line.of(dither.amplitude)], notes=dither.checks,
         data=lambda: plain({
-            "frequency": found.frequency, "amplitude": found.amplitude.to_dict(), "on": found.on, "speed": found.speed,
-            "sticks": found.sticks, "tried": found.tried, "scan": found.scan, "checks": found.checks,
+            "frequency": dither.frequency, "amplitude": dither.amplitude.to_dict(), "on": dither.on,
+            "speed": dither.speed, "sticks": dither.sticks, "tried": dither.tried, "scan": dither.scan,
+            "checks": dither.checks,
         }),
     )  # fmt: skip
 

@@ -267,7 +267,7 @@ def corrected(findings: Findings, slip: Slip, question: str = "analyze", options
 def completed(findings: Findings, question: str = "analyze", options: Sequence[str] = ()) -> str:
     """The command that asks again with what was not stated: a constant left to fill in, a unit as it was read."""
     record, read = findings.record, dict(_read(findings.record))
-    assumed = {name: each.unit for name, each in record.channels.items() if each.assumed}
+    assumed = {name: channel.unit for name, channel in record.channels.items() if channel.assumed}
     if assumed:
         read["units"] = {**read.get("units", {}), **assumed}
     clock = next((file["seconds"] for file in read.get("files", ()) if file.get("seconds")), "")
@@ -287,7 +287,7 @@ def _again(
     words = _asked(findings.record, question, (*_stated(settings), *_loaded(findings), *options), read)
     rows = read.get("rows")
     if words and rows:
-        words += ["--rows", ":".join("" if each is None else str(each) for each in rows)]
+        words += ["--rows", ":".join("" if row is None else str(row) for row in rows)]
     return shlex.join(words)
 
 

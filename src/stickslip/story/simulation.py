@@ -13,6 +13,7 @@ import numpy as np
 
 from stickslip import scenarios
 from stickslip.errors import ModelError
+from stickslip.figures.animation import animate, require_writer
 from stickslip.figures.plate import Plate
 from stickslip.figures.trajectory import (
     contacts_of,
@@ -146,8 +147,6 @@ def of_outcome(
         write_record(run.record(fs=rate), folder / f"record.{form}")
         _write_events(run, folder / "events.csv")
         if animation is not None:
-            from stickslip.figures.animation import animate
-
             animate(run, folder / f"animation.{animation}", tell=lambda n, of: tell("animating", 3 + n / of))
         if sound:
             _write_sound(run, folder, fs or case.fs or HEARD, form)
@@ -283,8 +282,6 @@ def require_output(
 def _require_record(case: Case, fs: float | None, form: str, animation: str | None) -> None:
     require_form(form)
     if animation is not None:
-        from stickslip.figures.animation import require_writer
-
         require_writer(f".{animation}")
     rate = fs or case.fs
     if rate is not None and not (math.isfinite(rate) and rate > 0 and rate * case.duration <= REFUSED_ROWS):

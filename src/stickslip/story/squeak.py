@@ -12,9 +12,9 @@ from stickslip.answers.findings import Comparison, Findings
 from stickslip.answers.squeaks import Condition, trend_of
 from stickslip.estimate import Estimate, decimals, doubts_of
 from stickslip.figures.squeak import plates_of, plates_together
-from stickslip.squeak.bursts import WORDS, Squeak, Squeaks
 from stickslip.squeak.couplings import Coupling, Pair
 from stickslip.squeak.spectra import burst_clips
+from stickslip.squeak.squeaks import WORDS, Squeak, Squeaks
 from stickslip.story.story import Story, Table
 from stickslip.story.words import cautions, interval_of, number, value_of
 from stickslip.units import prefixed
@@ -45,18 +45,18 @@ def of_comparison(comparison: Comparison) -> Story:
     )
 
 
-def _data(found: Findings) -> dict[str, Any]:
+def _data(findings: Findings) -> dict[str, Any]:
     """Bursts, coupling and how it is heard, for JSON."""
-    heard = found.squeaks.to_dict()
-    parts = {"coupling": found.coupling, "sound_quality": found.quality, "impulses": found.impulses}
+    heard = findings.squeaks.to_dict()
+    parts = {"coupling": findings.coupling, "sound_quality": findings.quality, "impulses": findings.impulses}
     return {
-        "normal_load": found.normal,
+        "normal_load": findings.normal,
         "squeaks": {key: value for key, value in heard.items() if key not in ("notes", "history")},
         "beside": {
             each.channel: {
                 "kind": each.kind, "reference": each.reference, "bursts": [burst.to_dict() for burst in each.bursts],
             }
-            for each in found.beside
+            for each in findings.beside
         },
         **{name: None if part is None else part.to_dict() for name, part in parts.items()},
     }  # fmt: skip
@@ -65,16 +65,16 @@ def _data(found: Findings) -> dict[str, Any]:
 def _together(comparison: Comparison) -> dict[str, Any]:
     """The conditions and what they say together, for JSON."""
     rows = [
-        {key: value.to_dict() if isinstance(value, Estimate) else value for key, value in vars(each).items()}
-        for each in comparison.conditions
+        {key: value.to_dict() if isinstance(value, Estimate) else value for key, value in vars(condition).items()}
+        for condition in comparison.conditions
     ]
-    told = [{**row, "trend": each.trend} for row, each in zip(rows, comparison.conditions, strict=True)]
+    told = [{**row, "trend": condition.trend} for row, condition in zip(rows, comparison.conditions, strict=True)]
     return {"conditions": told, "verdicts": comparison.verdicts}
 
 
-def _headline(found: Findings) -> Iterator[str]:
+def _headline(findings: Findings) -> Iterator[str]:
     """What was heard, in a few sentences."""
-    squeaks, record = found.squeaks, found.record
+    squeaks, record = findings.squeaks, findings.record
     heard = squeaks.of("squeak", "squeal")
     where = "" if squeaks.channel == "sound" else f" in the channel {squeaks.channel}"
     if not squeaks.bursts:
@@ -98,14 +98,16 @@ def _headline(found: Findings) -> Iterator[str]:
     loudest = squeaks.loudest
     if loudest is not None:
         yield _of_one(loudest, squeaks)
-    if found.coupling is not None:
-        yield _of_pairs(found.coupling)
-        yield from _of_energy(found.coupling, torsion="torsion_velocity" in record)
-    if found.loops is not None:
-        slope = found.loops.slope
+    if findings.coupling is not None:
+        yield _of_pairs(findings.coupling)
+        yield from _of_energy(findings.coupling, torsion="torsion_velocity" in record)
+    if findings.loops is not None:
+        slope = findings.loops.slope
         trend = trend_of(slope)
         sure = f" {trend}" if trend in ("falls", "rises") else " can not be told to change"
-        yield (f"Friction is {value_of(found.loops.level)} and{sure} with speed: {value_of(slope)} ({_ends(slope)}).")
+        yield (
+            f"Friction is {value_of(findings.loops.level)} and{sure} with speed: {value_of(slope)} ({_ends(slope)})."
+        )
 
 
 def _of_pairs(joined: Coupling) -> str:
@@ -188,15 +190,15 @@ def _counted(bursts: Sequence[Squeak]) -> str:
     return f"{len(bursts)} burst{'s' if len(bursts) > 1 else ''}"
 
 
-def _cautions(found: Findings) -> list[str]:
+def _cautions(findings: Findings) -> list[str]:
     """What should keep the reader from trusting it."""
-    told = list(found.squeaks.cautions)
-    if any(fault.kind == "spike" for fault in found.faults):
+    told = list(findings.squeaks.cautions)
+    if any(fault.kind == "spike" for fault in findings.faults):
         told.append(
             "What stands off as a spike may be a contact that sticks, lifts or lands: look before it is replaced."
         )
     spoilt: dict[str, list[str]] = {}
-    for place, burst in enumerate(found.squeaks.bursts):
+    for place, burst in enumerate(findings.squeaks.bursts):
         for doubt in doubts_of(burst.status):
             spoilt.setdefault(doubt.words, []).append(str(place + 1))
     return told + [
@@ -204,25 +206,25 @@ def _cautions(found: Findings) -> list[str]:
     ]
 
 
-def _tables(found: Findings) -> Iterator[Table]:
+def _tables(findings: Findings) -> Iterator[Table]:
     """The bursts, the channels, how it is heard, and what moves together."""
-    bursts, joined = found.squeaks.bursts, found.coupling
+    bursts, joined = findings.squeaks.bursts, findings.coupling
     if bursts:
         more = f", the first {MOST}" if len(bursts) > MOST else ""
-        title = f"{len(bursts)} burst{'s' if len(bursts) > 1 else ''}{more}, levels re {found.squeaks.reference}"
-        yield Table(title, *_burst_table(found))
-    if found.beside:
-        yield Table("In every channel that vibrates", *_channel_table(found))
-    if found.quality is not None or found.impulses is not None:
-        yield Table("How it is heard", *_hearing_table(found), _hearing_note(found))
+        title = f"{len(bursts)} burst{'s' if len(bursts) > 1 else ''}{more}, levels re {findings.squeaks.reference}"
+        yield Table(title, *_burst_table(findings))
+    if findings.beside:
+        yield Table("In every channel that vibrates", *_channel_table(findings))
+    if findings.quality is not None or findings.impulses is not None:
+        yield Table("How it is heard", *_hearing_table(findings), _hearing_note(findings))
     if joined is not None:
         title = f"What moves together at {number(joined.frequency, 0.5, 'Hz')}"
         yield Table(title, *_coupling_table(joined), _coupling_note(joined))
 
 
-def _burst_table(found: Findings) -> tuple[Sequence[str], list[list[str]]]:
+def _burst_table(findings: Findings) -> tuple[Sequence[str], list[list[str]]]:
     """Headings and a row for each burst."""
-    squeaks = found.squeaks
+    squeaks = findings.squeaks
     moves, calibrated = not math.isnan(squeaks.forcing), any(not math.isnan(b.weighted_level) for b in squeaks.bursts)
     headings = [
         "", "begins [s]", "lasts [s]", "kind", "Hz", "dB", *(["dB(A)"] if calibrated else []), "tonal",
@@ -240,10 +242,10 @@ def _burst_table(found: Findings) -> tuple[Sequence[str], list[list[str]]]:
     return headings, rows
 
 
-def _channel_table(found: Findings) -> tuple[Sequence[str], list[list[str]]]:
+def _channel_table(findings: Findings) -> tuple[Sequence[str], list[list[str]]]:
     """Headings and a row for each channel that vibrates."""
     rows = []
-    for squeaks in (found.squeaks, *found.beside):
+    for squeaks in (findings.squeaks, *findings.beside):
         heard = squeaks.of("squeak", "squeal")
         frequency = f"{np.median([burst.frequency for burst in heard]):.1f}" if heard else NONE
         levels = [burst.level for burst in heard or squeaks.bursts if not math.isnan(burst.level)]
@@ -252,9 +254,9 @@ def _channel_table(found: Findings) -> tuple[Sequence[str], list[list[str]]]:
     return ["channel", "what it is", "squeaks", "Hz", "loudest, dB"], rows
 
 
-def _hearing_table(found: Findings) -> tuple[Sequence[str], list[list[str]]]:
+def _hearing_table(findings: Findings) -> tuple[Sequence[str], list[list[str]]]:
     """Headings and a row for each measure of how it is heard."""
-    rows, quality, impulses = [], found.quality, found.impulses
+    rows, quality, impulses = [], findings.quality, findings.impulses
     if quality is not None:
         rows += [
             ["loudness N5", f"{quality.loudness:.3g} sone", "exceeded 5 % of the time; Zwicker, ISO 532-1, free field"],
@@ -274,9 +276,9 @@ def _hearing_table(found: Findings) -> tuple[Sequence[str], list[list[str]]]:
     return ["", "value", "what it is"], rows
 
 
-def _hearing_note(found: Findings) -> str:
+def _hearing_note(findings: Findings) -> str:
     """By what, and that no conformity is claimed."""
-    by = "" if found.quality is None else f"Loudness, sharpness and roughness by {found.quality.method}. "
+    by = "" if findings.quality is None else f"Loudness, sharpness and roughness by {findings.quality.method}. "
     return f"{by}No conformity to a standard is claimed; the pulses follow none."
 
 
@@ -333,30 +335,31 @@ def _pair(pair: Pair, *, rest: bool) -> list[str]:
 def _condition_table(comparison: Comparison) -> tuple[Sequence[str], list[list[str]]]:
     """Headings and a row for each condition; a column that is known of none is left out."""
     headings = ["condition", "load", "driven, stroke", "friction", "slope against speed (95 %)", "heard", "Hz", "dB"]
-    rows = [_condition(each) for each in comparison.conditions]
+    rows = [_condition(condition) for condition in comparison.conditions]
     known = [place for place in range(len(headings)) if any(row[place] != NONE for row in rows)]
     return [headings[place] for place in known], [[row[place] for place in known] for row in rows]
 
 
-def _condition(each: Condition) -> list[str]:
-    forcing = "" if math.isnan(each.forcing) else f"{each.forcing:.3g} Hz"
-    stroke = "" if math.isnan(each.stroke) else f"±{number(each.stroke, each.stroke / 100, 'm')}"
-    slope = NONE if each.slope is None else f"{value_of(each.slope)} ({_ends(each.slope)})"
+def _condition(condition: Condition) -> list[str]:
+    forcing = "" if math.isnan(condition.forcing) else f"{condition.forcing:.3g} Hz"
+    stroke = "" if math.isnan(condition.stroke) else f"±{number(condition.stroke, condition.stroke / 100, 'm')}"
+    slope = NONE if condition.slope is None else f"{value_of(condition.slope)} ({_ends(condition.slope)})"
     return [
-        each.name, NONE if each.normal is None else number(each.normal, 0.0, "N"),
-        ", ".join(part for part in (forcing, stroke) if part) or NONE, _value(each.level), slope, _heard(each),
-        NONE if each.frequency is None else f"{each.frequency.value:.1f}", _or_none(each.sound, ".1f"),
+        condition.name, NONE if condition.normal is None else number(condition.normal, 0.0, "N"),
+        ", ".join(part for part in (forcing, stroke) if part) or NONE, _value(condition.level), slope,
+        _heard(condition),
+        NONE if condition.frequency is None else f"{condition.frequency.value:.1f}", _or_none(condition.sound, ".1f"),
     ]  # fmt: skip
 
 
-def _heard(each: Condition) -> str:
+def _heard(condition: Condition) -> str:
     """Squeaks and their number, or what is heard instead."""
-    if each.squeaks:
-        name = "squeal" if each.answer == "squeals" else "squeak"
-        return f"{each.count} {name}{'s' * (each.count > 1)} ({each.rate:.2g} in a second)"
-    if each.answer == "creaks":
-        return f"creak, {each.pulses:.3g} pulses in a second"
-    return "can not be told" if each.answer == "can not be told" else f"no squeak ({each.kind})"
+    if condition.squeaks:
+        name = "squeal" if condition.answer == "squeals" else "squeak"
+        return f"{condition.count} {name}{'s' * (condition.count > 1)} ({condition.rate:.2g} in a second)"
+    if condition.answer == "creaks":
+        return f"creak, {condition.pulses:.3g} pulses in a second"
+    return "can not be told" if condition.answer == "can not be told" else f"no squeak ({condition.kind})"
 
 
 def _ends(estimate: Estimate) -> str:

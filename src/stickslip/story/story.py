@@ -10,12 +10,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from stickslip.errors import ModelError
+from stickslip.figures.plate import Plate, drawable
 from stickslip.printing import html_table
 from stickslip.story.words import Caution, flags, interval_of, value_of
 
 if TYPE_CHECKING:
     from stickslip.estimate import Estimate
-    from stickslip.figures.plate import Plate
     from stickslip.record.channels import Channel
     from stickslip.record.record import Record, Step
     from stickslip.squeak.spectra import Clip
@@ -26,9 +26,9 @@ TELLERS = {
     "Findings": "findings.of_findings", "Comparison": "findings.of_comparison",
     "TimeFrequency": "frequencies.of_map",
     "LawComparison": "fit.of_laws", "LawFit": "fit.of_law", "CurveFit": "fit.of_curve",
-    "Predictions": "prediction.of_predictions", "Batch": "many.of_batch",
+    "Predictions": "fit.of_predictions", "Batch": "many.of_batch",
     "Outcome": "simulation.of_outcome", "Trajectory": "simulation.of_run",
-    "Record": "rig.of_record", "ExperimentPlan": "rig.of_plan",
+    "Record": "bench.of_record", "ExperimentPlan": "bench.of_plan",
     "Bifurcation": "maps.of_bifurcation", "Basins": "maps.of_basins", "Boundary": "maps.of_boundary",
     "Dither": "maps.of_dither", "Stability": "maps.of_stability",
     "ImpactTest": "estimates.of_tap", "Dataset": "maps.of_map",
@@ -199,22 +199,22 @@ class Story:
         """The cautions, each reason once: those of rows in the rows' order, which numbers them, then the others."""
         said = " ".join(self.headline).casefold()
         rows = [
-            each
-            for each in flags((line.name, line.status) for line in self.lines)
-            if each.reason.casefold() not in said
+            flag
+            for flag in flags((line.name, line.status) for line in self.lines)
+            if flag.reason.casefold() not in said
         ]
-        reasons, kinds = {each.reason for each in rows}, {each.kind for each in rows} - {""}
-        plain = [each if isinstance(each, Caution) else Caution(each) for each in self.cautions]
+        reasons, kinds = {row.reason for row in rows}, {row.kind for row in rows} - {""}
+        plain = [caution if isinstance(caution, Caution) else Caution(caution) for caution in self.cautions]
         others = [
             each
             for each in plain
             if each.reason not in reasons and each.kind not in kinds and each.reason.casefold() not in said
         ]
-        return [*rows, *(each for each in others if not each.names), *(each for each in others if each.names)]
+        return [*rows, *(other for other in others if not other.names), *(other for other in others if other.names)]
 
     def marks(self, line: Line) -> str:
         """The numbers of the cautions that concern a row; none of one that is sure."""
-        numbers = [str(place) for place, each in enumerate(self.notices, start=1) if line.name in each.names]
+        numbers = [str(place) for place, notice in enumerate(self.notices, start=1) if line.name in notice.names]
         return " ".join(numbers) or ("" if line.status == "ok" else ABOVE)
 
     def mark(self, caution: Caution) -> str:
@@ -230,7 +230,7 @@ class Story:
     def concerned(self, rows: Sequence[Line]) -> list[Caution]:
         """The cautions of the record as a whole, and of these rows."""
         names = {line.name for line in rows}
-        return [each for each in self.notices if not self.mark(each) or not names.isdisjoint(each.names)]
+        return [notice for notice in self.notices if not self.mark(notice) or not names.isdisjoint(notice.names)]
 
     @property
     def shown(self) -> list[Caution]:
@@ -240,7 +240,7 @@ class Story:
     @property
     def hidden(self) -> list[Caution]:
         """The cautions of further rows alone."""
-        return [each for each in self.notices if each not in self.shown]
+        return [notice for notice in self.notices if notice not in self.shown]
 
     @functools.cached_property
     def plates(self) -> tuple[Plate, ...]:
@@ -259,8 +259,6 @@ class Story:
 
     def drawn(self, *, png: bool = False) -> Story:
         """With the figures that can be drawn, as PNG too where these are asked for, and of the others a note."""
-        from stickslip.figures.plate import drawable
-
         plates, lost = drawable(self.plates, png=png)
         return replace(self, notes=(*self.notes, *lost), draw=lambda: plates)
 

@@ -16,82 +16,82 @@ from stickslip.story.story import Line, Story, Table
 from stickslip.story.words import value_of
 
 
-def of_tour(found: Tour) -> Story:
+def of_tour(tour: Tour) -> Story:
     """One page, as a lab would hand it in."""
     driven = [
         replace(of_findings(each), title=f"The base at {run.frequency:g} Hz")
-        for each, run in zip(found.comparison.findings, found.runs, strict=True)
+        for each, run in zip(tour.comparison.findings, tour.runs, strict=True)
     ]
     parts = [
-        replace(of_commissioned(found.commissioned), title="The rig"),
+        replace(of_commissioned(tour.commissioned), title="The rig"),
         *driven,
-        replace(of_findings(found.decay), title="A free decay over the contact"),
-        replace(of_laws(found.laws), title="Which law is it?"),
-        *(replace(of_findings(each), title=each.name.capitalize()) for each in found.squeaks.findings),
+        replace(of_findings(tour.decay), title="A free decay over the contact"),
+        replace(of_laws(tour.laws), title="Which law is it?"),
+        *(replace(of_findings(each), title=each.name.capitalize()) for each in tour.squeaks.findings),
     ]
 
     def write(folder: Path) -> None:
-        (folder / "rig.toml").write_text(found.commissioned.known.toml(), encoding="utf-8")
-        if found.proposals:
-            (folder / "next.toml").write_text(run_list(found.proposals).toml(), encoding="utf-8")
+        (folder / "rig.toml").write_text(tour.commissioned.known.toml(), encoding="utf-8")
+        if tour.proposals:
+            (folder / "next.toml").write_text(run_list(tour.proposals).toml(), encoding="utf-8")
 
     return Story(
-        "Dry friction of an air-track slider", _abstract(found), lines=_lines(found), tables=_tables(found),
-        parts=parts, settings=_settings(found), data=lambda: dict(plain(_data(found))), write=write,
+        "Dry friction of an air-track slider", _abstract(tour), lines=_lines(tour), tables=_tables(tour),
+        parts=parts, settings=_settings(tour), data=lambda: dict(plain(_data(tour))), write=write,
     )  # fmt: skip
 
 
-def _abstract(found: Tour) -> list[str]:
+def _abstract(tour: Tour) -> list[str]:
     """What was done and found, a sentence each."""
-    known = found.commissioned.known
+    known = tour.commissioned.known
     constants = known.require_constants()
-    contact = _of(found.laws.estimates, "contact stiffness")
-    level = _of(found.laws.estimates, "sliding friction")
-    first = found.laws.verdict.partition(":")[0].partition(". ")[0].rstrip(".")
+    contact = _of(tour.laws.estimates, "contact stiffness")
+    level = _of(tour.laws.estimates, "sliding friction")
+    first = tour.laws.verdict.partition(":")[0].partition(". ")[0].rstrip(".")
     told = [
         f"{first}"
         + (f": it slides at {value_of(level)}" if level else "")
         + (f", and before it slides gives way like a spring of {value_of(contact)}." if contact else "."),
         f"The rig, commissioned from nothing, is a mass of {value_of(constants.mass)} on a spring of "
-        f"{value_of(constants.stiffness)} with a damping ratio of {_ratio(found)}.",
-        _held(found),
-        *_squeaked(found),
+        f"{value_of(constants.stiffness)} with a damping ratio of {_ratio(tour)}.",
+        _held(tour),
+        *_squeaked(tour),
     ]
-    if found.proposals:
-        told.append(_advice(found.proposals[0]))
+    if tour.proposals:
+        told.append(_advice(tour.proposals[0]))
     return told
 
 
 def _of(estimates: tuple[Estimate, ...], name: str) -> Estimate | None:
-    return next((each for each in estimates if each.name == name and each.known), None)
+    return next((estimate for estimate in estimates if estimate.name == name and estimate.known), None)
 
 
-def _ratio(found: Tour) -> str:
-    free = found.commissioned.results.get("free")
+def _ratio(tour: Tour) -> str:
+    free = tour.commissioned.results.get("free")
     ratio = _of(free.estimates, "damping ratio") if free is not None else None
     return value_of(ratio) if ratio is not None else "unknown size"
 
 
-def _held(found: Tour) -> str:
+def _held(tour: Tour) -> str:
     """Which runs stuck."""
     stuck = [
         f"{run.frequency:g} Hz ({value_of(share)} of the time)"
-        for each, run in zip(found.comparison.findings, found.runs, strict=True)
+        for each, run in zip(tour.comparison.findings, tour.runs, strict=True)
         if (share := _share(each)) is not None and share.interval[0] > 0
     ]
-    free = len(found.runs) - len(stuck)
+    free = len(tour.runs) - len(stuck)
     if not stuck:
         return "The contact never sticks in the runs measured."
     return f"It sticks at {', '.join(stuck)}{f'; in the other {free} runs it slides throughout' if free else ''}."
 
 
-def _share(found: Findings) -> Estimate | None:
-    return _of(tuple(found.estimates), "stuck share of the time")
+def _share(findings: Findings) -> Estimate | None:
+    return _of(tuple(findings.estimates), "stuck share of the time")
 
 
-def _squeaked(found: Tour) -> list[str]:
-    conditions = getattr(found.squeaks, "conditions", ())
-    return [f"The {each.name} {each.answer}." for each in conditions]
+def _squeaked(tour: Tour) -> list[str]:
+    conditions = getattr(tour.squeaks, "conditions", ())
+    return [f"The {condition.name} {condition.answer}." for condition in conditions]
 
 
 def _advice(first: Proposal) -> str:
@@ -101,15 +101,15 @@ def _advice(first: Proposal) -> str:
     )
 
 
-def _lines(found: Tour) -> list[Line]:
+def _lines(tour: Tour) -> list[Line]:
     """The numbers that a reader looks for, with the truth beside."""
-    done, truth = found.commissioned, found.truth
+    done, truth = tour.commissioned, tour.truth
     constants = done.known.require_constants()
-    lines = [Line.of(each, truth.get(each.name)) for each in constants.estimates]
+    lines = [Line.of(estimate, truth.get(estimate.name)) for estimate in constants.estimates]
     if done.known.damping is not None:
         lines.append(Line.of(done.known.damping, truth.get("damping of the suspension")))
     for name, key in (("sliding friction", "kinetic friction"), ("contact stiffness", "contact stiffness")):
-        each = _of(found.laws.estimates, name)
+        each = _of(tour.laws.estimates, name)
         if each is not None:
             lines.append(Line.of(each, truth.get(key), name=f"{name}, by the law"))
     stick = done.results.get("stick")
@@ -120,15 +120,15 @@ def _lines(found: Tour) -> list[Line]:
     return lines
 
 
-def _tables(found: Tour) -> list[Table]:
-    return [_runs(found), _next(found)] if found.proposals else [_runs(found)]
+def _tables(tour: Tour) -> list[Table]:
+    return [_runs(tour), _next(tour)] if tour.proposals else [_runs(tour)]
 
 
-def _runs(found: Tour) -> Table:
+def _runs(tour: Tour) -> Table:
     """Every run in a row."""
     names = ("sliding friction", "stuck share of the time", "contact stiffness", "static over sliding friction")
     rows = []
-    for each, run in zip(found.comparison.findings, found.runs, strict=True):
+    for each, run in zip(tour.comparison.findings, tour.runs, strict=True):
         cells = [value_of(one) if (one := _of(tuple(each.estimates), name)) else "–" for name in names]
         rows.append([f"{run.frequency:g} Hz", f"{1e3 * run.amplitude:g} mm", run.why, *cells])
     heads = ("base", "amplitude", "what for", "sliding friction", "stuck", "contact stiffness", "static over sliding")
@@ -136,10 +136,10 @@ def _runs(found: Tour) -> Table:
     return Table("What the runs tell", heads, rows, note)
 
 
-def _next(found: Tour) -> Table:
+def _next(tour: Tour) -> Table:
     rows = [
         [f"{p.frequency:g} Hz", f"{1e3 * p.amplitude:.3g} mm", f"{p.pair[0]} from {p.pair[1]}", f"{p.separation:.3g}"]
-        for p in found.proposals
+        for p in tour.proposals
     ]
     note = (
         "By how many standard deviations of a sample's noise two laws differ there, after what refitting could take "
@@ -148,19 +148,19 @@ def _next(found: Tour) -> Table:
     return Table("What to measure next", ("base", "amplitude", "tells", "by"), rows, note, folded=True)
 
 
-def _settings(found: Tour) -> dict[str, str]:
-    log = found.commissioned.known.rig.log
+def _settings(tour: Tour) -> dict[str, str]:
+    log = tour.commissioned.known.rig.log
     return dict(log.rows()) if log is not None else {}
 
 
-def _data(found: Tour) -> dict[str, object]:
+def _data(tour: Tour) -> dict[str, object]:
     return {
-        "rig": found.commissioned.to_dict(),
-        "runs": [run.model_dump() for run in found.runs],
-        "records": [of_findings(each).data() for each in found.comparison.findings],
-        "decay": of_findings(found.decay).data(),
-        "laws": found.laws.to_dict(),
-        "squeaks": of_comparison(found.squeaks).data(),
-        "next": [vars(each) for each in found.proposals],
-        "truth": dict(found.truth),
+        "rig": tour.commissioned.to_dict(),
+        "runs": [run.model_dump() for run in tour.runs],
+        "records": [of_findings(each).data() for each in tour.comparison.findings],
+        "decay": of_findings(tour.decay).data(),
+        "laws": tour.laws.to_dict(),
+        "squeaks": of_comparison(tour.squeaks).data(),
+        "next": [vars(proposal) for proposal in tour.proposals],
+        "truth": dict(tour.truth),
     }

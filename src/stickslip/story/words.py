@@ -111,7 +111,7 @@ def cautions(findings: Findings, said: Iterable[Estimate] = ()) -> list[Caution]
 
 def doubts(estimates: Iterable[Estimate]) -> list[Caution]:
     """The estimates that are flagged, with the reason, each reason once."""
-    return flags((each.name, each.status) for each in estimates)
+    return flags((estimate.name, estimate.status) for estimate in estimates)
 
 
 def flags(told: Iterable[tuple[str, str]]) -> list[Caution]:

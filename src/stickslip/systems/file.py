@@ -18,6 +18,7 @@ from pydantic import BaseModel, BeforeValidator, Field, create_model
 from stickslip import scenarios
 from stickslip.drives.kinds import Drive
 from stickslip.errors import ModelError
+from stickslip.files.read import read_record
 from stickslip.laws.base import Law
 from stickslip.laws.curved import CurvedLaw
 from stickslip.laws.formula import Formula
@@ -416,8 +417,6 @@ def _built(table: str, register: Mapping[str, Callable[..., Any]], values: Mappi
 
 def _recorded(parameters: Mapping[str, Any], source: _Source) -> dict[str, Any]:
     """Samples and rate of the motion or force that stands in a file of its own."""
-    from stickslip.files.read import read_record
-
     path, channel = parameters["record"], parameters.get("channel")
     of = "force" if parameters.get("on") == "force" else "z"
     if source.folder is None:
