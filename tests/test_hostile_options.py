@@ -40,6 +40,7 @@ CALLS: dict[str, list[str]] = {
     "fit": ["x.csv", "--json", "--mass=1", "--stiffness=100"],
     "impact": ["x.csv", "--json"],
     "init": ["x.csv", "--yes", "--force"],
+    "joint": ["x.csv", "--json", "--kp=100"],
     "lab": ["--no-browser"],
     "predict": ["slider.toml", "x.csv", "--no-plain", "--json"],
     "rig join": ["x.csv", "x.csv", "--json"],

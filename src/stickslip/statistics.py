@@ -22,6 +22,7 @@ Array = NDArray[np.float64]
 FEW_CYCLES = 8  # below this no test of the interval holds at 0.5 correlation between neighbours
 HALF_ERROR = 0.5  # standard errors by which correlation is taken to be stronger: too weak a one costs more
 FEW_INDEPENDENT = 8.0  # independent samples per coefficient, below which an interval is not to be trusted
+MOST_LEVERAGE = 0.9  # of a sample and its neighbours: beyond, one stroke alone tells a coefficient
 INSEPARABLE = 1e3  # condition number of columns of unit length; a force balance that can be read has less than 30
 
 
@@ -41,6 +42,10 @@ class LeastSquares:
         Condition number of the design after scaling its columns to unit length.
     independent : float
         Number of independent samples that the residual is worth.
+    projection : ndarray, shape (p, n)
+        The coefficients as linear forms of the data.
+    leverage : ndarray, shape (n,)
+        By how much of the error of a sample and of its neighbours, which share it, the fit follows them.
     """
 
     coefficients: Array
@@ -49,6 +54,8 @@ class LeastSquares:
     residual: Array
     condition: float
     independent: float
+    projection: Array
+    leverage: Array
 
     def estimate(self, index: int, name: str, unit: str, method: str, **more: Any) -> Estimate:
         """Coefficient number `index` as an Estimate."""
@@ -56,6 +63,27 @@ class LeastSquares:
             name, self.coefficients[index], sd=self.sd[index], unit=unit, method=method,
             quantile=student(float(self.freedom[index])), **more,
         )  # fmt: skip
+
+    def combined(
+        self, weights: ArrayLike, name: str, unit: str, method: str, *, beside: float = 0.0, **more: Any
+    ) -> Estimate:
+        """A weighted sum of coefficients as an Estimate; `beside` is a standard deviation that the data do not know.
+
+        Each residual counts by what it would be, had the fit not followed it: over one less its leverage (MacKinnon and
+        White 1985). On simulated joints that makes intervals which hold 91 % hold 94 %.
+        """
+        form = np.asarray(weights, dtype=float) @ self.projection
+        sd, freedom = mean_uncertainty(len(form) * form * self.residual / (1 - self.leverage))
+        return Estimate.normal(
+            name, float(np.asarray(weights) @ self.coefficients), sd=math.hypot(sd, beside), unit=unit, method=method,
+            quantile=student(freedom), **more,
+        )  # fmt: skip
+
+
+def _influenced(form: Array, residual: Array, independent: float, terms: int) -> tuple[float, float]:
+    """Standard deviation of a linear form of the data, and its degrees of freedom."""
+    sd, freedom = mean_uncertainty(len(residual) * form * residual)
+    return sd * math.sqrt(independent / max(1.0, independent - terms)), freedom
 
 
 def student(freedom: float) -> float:
@@ -243,12 +271,15 @@ def _values(estimates: Sequence[Estimate]) -> tuple[Array, Array]:
     return values, np.maximum(sds, 1e-12 * max(1e-300, float(np.abs(values).max())))
 
 
-def least_squares(design: ArrayLike, data: ArrayLike) -> LeastSquares:
+def least_squares(design: ArrayLike, data: ArrayLike, *, instruments: ArrayLike | None = None) -> LeastSquares:
     """Linear least squares whose uncertainties hold for correlated, uneven residuals.
 
     ``b = (X'X)^-1 X'y``. Each sample's influence on b is ``psi_t = n (X'X)^-1 x_t u_t`` with residual u; b varies as
     the mean of psi does, so :func:`mean_uncertainty` of psi is its standard deviation. It is scaled by
     ``sqrt(m / (m - p))``, m the number of independent samples, for the p coefficients fitted.
+
+    With instruments, ``b = (Z'X)^-1 Z'y``: columns that go with those of the design and know nothing of the noise in
+    them, which would else pull the coefficients towards zero (Reiersol 1945).
 
     Parameters
     ----------
@@ -256,6 +287,8 @@ def least_squares(design: ArrayLike, data: ArrayLike) -> LeastSquares:
         One column per coefficient.
     data : array_like, shape (n,)
         What the columns explain, in order of time.
+    instruments : array_like, shape (n, p), optional
+        One for each column; the columns themselves where left out.
 
     Returns
     -------
@@ -282,7 +315,11 @@ def least_squares(design: ArrayLike, data: ArrayLike) -> LeastSquares:
             "give a record with more motion",
         )
     unit = columns / lengths
-    inner = unit.T @ unit
+    known = unit if instruments is None else np.asarray(instruments, dtype=float)
+    sizes = np.linalg.norm(known, axis=0)
+    if not np.all(sizes > 0):
+        raise EstimateError("an instrument of zeros", "every column needs an instrument", "leave the term out")
+    inner = (known / sizes).T @ unit
     condition = math.sqrt(float(np.linalg.cond(inner)))
     if condition > INSEPARABLE:
         raise EstimateError(
@@ -290,14 +327,17 @@ def least_squares(design: ArrayLike, data: ArrayLike) -> LeastSquares:
             "the columns must be told apart",
             "leave a term out, or give a record whose speed and acceleration vary more",
         )
-    bread = np.linalg.inv(inner)
-    scaled = bread @ (unit.T @ values)
+    projection = np.linalg.inv(inner) @ (known / sizes).T
+    scaled = projection @ values
     residual = values - unit @ scaled
     independent = count / correlation_time(residual)
-    shrinkage = math.sqrt(independent / max(1.0, independent - terms))
-    found = [mean_uncertainty(count * (unit @ row) * residual) for row in bread]
-    sd = np.array([each for each, _ in found]) * shrinkage / lengths
-    return LeastSquares(scaled / lengths, sd, np.array([q for _, q in found]), residual, condition, independent)
+    leverage = np.einsum("ij,ji->i", unit, projection)
+    sure = [_influenced(form, residual, independent, terms) for form in projection]
+    sd = np.array([each for each, _ in sure]) / lengths
+    return LeastSquares(
+        scaled / lengths, sd, np.array([freedom for _, freedom in sure]), residual, condition, independent,
+        projection / lengths[:, None], np.clip(leverage * count / independent, 0.0, MOST_LEVERAGE),
+    )  # fmt: skip
 
 
 def follows(measured: Array, model: Array) -> float:

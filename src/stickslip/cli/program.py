@@ -16,6 +16,7 @@ from stickslip.cli.exchange import check, convert, datasets
 from stickslip.cli.fit import fit, predict
 from stickslip.cli.impact import impact
 from stickslip.cli.init import init
+from stickslip.cli.joint import joint
 from stickslip.cli.lab import lab
 from stickslip.cli.progress import compiling
 from stickslip.cli.regimes import bifurcation, dither, stability, sweep
@@ -97,6 +98,7 @@ for _command in (
     fit,
     impact,
     init,
+    joint,
     lab,
     predict,
     rig,

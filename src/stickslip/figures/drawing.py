@@ -39,7 +39,8 @@ if TYPE_CHECKING:
 # What draws each kind of result, the file of this room and the function. One that takes no `ax` fills a whole figure.
 DRAWN = {
     "Record": "drawing.of_record", "Findings": "drawing.of_findings", "Comparison": "drawing.of_comparison",
-    "Loops": "drawing.of_loops", "DecayFit": "drawing.of_decay", "Decrement": "decay.plot_differences",
+    "Loops": "drawing.of_loops", "JointFriction": "joint.plot_joint",
+    "DecayFit": "drawing.of_decay", "Decrement": "decay.plot_differences",
     "ForceComparison": "traces.plot_force_comparison", "Consistency": "friction.plot_consistency",
     "TransitionSpeed": "contact.plot_transition_speed", "Trial": "traces.plot_twin", "Squeaks": "squeak.plot_squeaks",
     "TimeFrequency": "drawing.of_frequencies", "DataArray": "wavelet.plot_wavelet",
@@ -139,12 +140,14 @@ def of_record(record: Record, *, ax: Axes | None = None, channels: Sequence[str]
 
 
 def of_findings(findings: Findings, *, ax: Axes | None = None) -> Figure | Axes:
-    """The friction loop, the decay, the squeaks, or else the record."""
+    """The friction loop, the decay, the joint, the squeaks, or else the record."""
     results = findings.results
     if results.get("loops") is not None:
         return _named("contact.plot_displacement_loop")(findings, ax=ax)
     if results.get("decay") is not None:
         return _named("decay.plot_decay")(findings.decay, ax=ax)
+    if results.get("joint") is not None:
+        return _named("joint.plot_joint")(findings.joint, ax=ax)
     if results.get("squeaks") is not None and ax is None:
         return _named("squeak.plot_squeaks")(findings.squeaks)
     return of_record(findings.record, ax=ax)

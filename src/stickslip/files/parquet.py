@@ -15,6 +15,7 @@ from stickslip.record.metadata import KEY, parse_metadata
 
 NAME = "Parquet"
 SUFFIXES = (".parquet", ".pq")
+MOST = 256  # numbers in a cell: the joints of a robot; more are a picture
 
 
 def recognise(path: Path, head: bytes) -> bool:
@@ -23,11 +24,16 @@ def recognise(path: Path, head: bytes) -> bool:
 
 
 def read(path: Path, options: Options) -> Table:
-    """The numeric columns, and dates as seconds since the first."""
+    """The numeric columns, and dates as seconds since the first; of lists as long as the first one a column each.
+
+    Robots' logs (LeRobot's) hold a row of numbers for all joints in a cell: ``observation.state`` is read as
+    ``observation.state.0``, ``observation.state.1`` ...
+    """
     types = optional("pyarrow.types")
     columns: list[Column] = []
     left_out: list[str] = []
     record: Mapping[str, Any] = {}
+    lists: dict[str, tuple[str, int]] = {}
     with _opened(path) as file:
         rows, schema = int(file.metadata.num_rows), file.schema_arrow
         if (schema.metadata or {}).get(KEY.encode()):
@@ -38,6 +44,10 @@ def read(path: Path, options: Options) -> Table:
             if dates or types.is_floating(kind) or types.is_integer(kind) or types.is_boolean(kind):
                 unit = (field.metadata or {}).get(b"unit", b"").decode("utf-8", "replace")
                 columns.append(Column(field.name, "s" if dates else unit or None, rows))
+            elif length := _length(file, field, types):
+                parts = {f"{field.name}.{place}": (field.name, place) for place in range(length)}
+                columns += [Column(name, None, rows) for name in parts]
+                lists |= parts
             else:
                 left_out.append(f"{field.name} ({kind})")
     names = [column.name for column in columns]
@@ -52,9 +62,10 @@ def read(path: Path, options: Options) -> Table:
         origins: dict[str, Any] = {}
         count = 0
         with _opened(path) as file:
-            for batch in file.iter_batches(batch_size=size, columns=list(wanted), use_threads=False):
+            whole = list(dict.fromkeys(lists.get(name, (name, 0))[0] for name in wanted))
+            for batch in file.iter_batches(batch_size=size, columns=whole, use_threads=False):
                 count += len(batch)
-                yield {name: _numbers(batch.column(name), name, origins) for name in wanted}
+                yield {name: _column(batch, name, lists, origins) for name in wanted}
         if count != rows:
             raise FormatError(
                 f"'{path.name}' holds {count} of {rows} rows",
@@ -72,6 +83,29 @@ def _opened(path: Path) -> Iterator[Any]:
     # pyarrow takes no path that is not UTF-8
     with reading(path, NAME), path.open("rb") as handle, parquet.ParquetFile(handle, pre_buffer=False) as file:
         yield file
+
+
+def _length(file: Any, field: Any, types: Any) -> int:
+    """How many numbers each cell of a column of lists holds, by its type or its first row; 0 where it holds none."""
+    kind = field.type
+    if not (types.is_list(kind) or types.is_fixed_size_list(kind)):
+        return 0
+    if not (types.is_floating(kind.value_type) or types.is_integer(kind.value_type)):
+        return 0
+    if types.is_fixed_size_list(kind):
+        return int(min(kind.list_size, MOST))
+    first = next(file.iter_batches(batch_size=1, columns=[field.name], use_threads=False), None)
+    cell = None if first is None or not len(first) else first.column(0)[0].as_py()
+    return len(cell) if cell and len(cell) <= MOST else 0
+
+
+def _column(batch: Any, name: str, lists: Mapping[str, tuple[str, int]], origins: dict[str, Any]) -> Array:
+    """A column of a batch, or a place of one of lists."""
+    if name not in lists:
+        return _numbers(batch.column(name), name, origins)
+    own, place = lists[name]
+    compute = optional("pyarrow.compute")
+    return _numbers(compute.list_element(batch.column(own), place), name, origins)
 
 
 def _numbers(values: Any, name: str, origins: dict[str, Any]) -> Array:

@@ -26,7 +26,7 @@ TABLE = 33  # points of a curve over the speed, where a program takes a table
 WIDE, FASTEST = 10.0, 1.0  # it goes to ten times the law's own speed, or to 1 m/s where it has none
 
 
-def export_law(law: Law | CurvedLaw, *, format: str = "toml") -> str:
+def export_law(law: Law | CurvedLaw, *, format: str = "toml", turning: bool = False) -> str:
     """How is a friction law written for another program?
 
     * ``"toml"``: the table ``[law]`` of a system's file; with ``[system]`` beside it :func:`read_system` reads it;
@@ -46,6 +46,9 @@ def export_law(law: Law | CurvedLaw, *, format: str = "toml") -> str:
         Any of the friction laws.
     format : str
         One of the names above.
+    turning : bool
+        Whether it is the friction of something that turns, its numbers in N m and rad/s: MuJoCo's joint is then a
+        hinge, Modelica's model that of a bearing.
 
     Returns
     -------
@@ -76,7 +79,19 @@ def export_law(law: Law | CurvedLaw, *, format: str = "toml") -> str:
             "its friction follows a place by chance, and has no formula",
             "export the contact on it, law.contact",
         )
-    return FORMATS[format](law).rstrip("\n") + "\n" * (format == "c")
+    write = TURNING.get(format, FORMATS[format]) if turning else FORMATS[format]
+    return write(law).rstrip("\n") + "\n" * (format == "c")
+
+
+def urdf_dynamics(law: Coulomb | LinearSlope) -> str:
+    """The friction of a joint as URDF's element, whose friction is Coulomb's.
+
+    Examples
+    --------
+    >>> urdf_dynamics(LinearSlope(0.052, slope=0.6))
+    '<dynamics damping="0.6" friction="0.052"/>'
+    """
+    return f'<dynamics damping="{getattr(law, "slope", 0.0)!r}" friction="{law.kinetic!r}"/>'
 
 
 def formula_of(law: Any) -> str:
@@ -193,11 +208,11 @@ def _table(law: Law | CurvedLaw) -> Tabulated | None:
     return Tabulated.of(lambda speed: lifted(curve(lifted(speed))).at(), speeds, law.breakaway)
 
 
-def _mujoco(law: Law | CurvedLaw) -> str:
+def _mujoco(law: Law | CurvedLaw, joint: str = "slide") -> str:
     name, static = type(law).__name__, getattr(law, "static", None)
     if isinstance(law, Coulomb | LinearSlope) and static in (None, law.kinetic) and getattr(law, "slope", 0.0) >= 0:
         where = "include this file in the body that rubs"
-        own = [f'  <joint type="slide" frictionloss="{law.kinetic!r}" damping="{getattr(law, "slope", 0.0)!r}"/>']
+        own = [f'  <joint type="{joint}" frictionloss="{law.kinetic!r}" damping="{getattr(law, "slope", 0.0)!r}"/>']
     elif isinstance(law, LuGre) and law.exponent == 2 and law.viscous >= 0:
         where = "include this file in the model, with the name of the joint that rubs for JOINT; MuJoCo 4 or later"
         own = _dcmotor(law)
@@ -225,7 +240,7 @@ def _dcmotor(law: LuGre) -> list[str]:
     ]
 
 
-def _modelica(law: Law | CurvedLaw) -> str:
+def _modelica(law: Law | CurvedLaw, *, turning: bool = False) -> str:
     name, table = type(law).__name__, _table(law)
     rubs = table is not None and table.forces[0] > 0
     lines = [f"// {remark(formula_of(law))}", f"{'model' if rubs else 'record'} {name}Friction"]
@@ -233,9 +248,12 @@ def _modelica(law: Law | CurvedLaw) -> str:
         speeds, forces = list(table.speeds), list(table.forces)
         if isinstance(law, Tabulated):  # level beyond the last: Modelica goes on as the last two points
             speeds, forces = [*speeds, 2 * speeds[-1]], [*forces, forces[-1]]
+        within = "Rotational.Components.BearingFriction" if turning else "Translational.Components.SupportFriction"
         rows = "; ".join(f"{speed!r}, {force!r}" for speed, force in zip(speeds, forces, strict=True))
-        lines.append(f"{_strays(table, '  //')}  extends Modelica.Mechanics.Translational.Components.SupportFriction(")
-        lines.append(f"    f_pos = [{rows}],\n    peak = {table.breakaway / table.forces[0]!r});")
+        lines.append(f"{_strays(table, '  //')}  extends Modelica.Mechanics.{within}(")
+        lines.append(
+            f"    {'tau' if turning else 'f'}_pos = [{rows}],\n    peak = {table.breakaway / table.forces[0]!r});"
+        )
     for key, value in _flat(law):
         if isinstance(value, bool):
             lines.append(f"  parameter Boolean {key} = {_number(value)};")
@@ -275,4 +293,7 @@ def _strays(table: Tabulated, comment: str) -> str:
 FORMATS: dict[str, Callable[[Law | CurvedLaw], str]] = {
     "toml": _toml, "python": _python, "c": lambda law: c_code(law, formula_of(law)), "mujoco": _mujoco,
     "modelica": _modelica, "simulink": _simulink,
+}  # fmt: skip
+TURNING: dict[str, Callable[[Law | CurvedLaw], str]] = {
+    "mujoco": lambda law: _mujoco(law, "hinge"), "modelica": lambda law: _modelica(law, turning=True),
 }  # fmt: skip

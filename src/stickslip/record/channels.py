@@ -31,6 +31,8 @@ VOCABULARY: dict[str, Quantity] = {
     "force": Quantity("applied force", ("N", "N m")),
     "normal": Quantity("normal force", ("N",)),
     "theta": Quantity("angle", ("rad",)),
+    "reference": Quantity("position that a controller is told to reach", ("rad", "m")),
+    "current": Quantity("motor current", ("A",)),
     "sound": Quantity("sound pressure (unit 1: not calibrated)", ("Pa", "1")),
     "y": Quantity("displacement in the normal direction", ("m",)),
     "normal_acceleration": Quantity("acceleration in the normal direction", ("m/s^2",)),

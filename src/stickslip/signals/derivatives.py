@@ -150,7 +150,7 @@ class Filter:
 
     def _derivative(self, values: Array, order: int) -> Array:
         if self.method == "smoother":
-            return _differences(values, order) * self.fs**order
+            return five_point_difference(values, order) * self.fs**order
         for _ in range(order):
             values = five_point_average(np.gradient(values, axis=0, edge_order=2)) * self.fs
         return values
@@ -458,7 +458,7 @@ def _half_power(response: Callable[[Any], Array], top: float) -> float:
     return float(brentq(lambda f: float(response(f)) - math.sqrt(0.5), 0, top))
 
 
-def _differences(values: Array, order: int) -> Array:
+def five_point_difference(values: Array, order: int) -> Array:
     """Five-point difference along the first axis; two samples beyond each end are put on the parabola there."""
     if order == 0:
         return values

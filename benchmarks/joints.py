@@ -1,0 +1,83 @@
+"""How often do the intervals of a joint's friction hold, on joints of an integrator of our own (`tests/joints.py`)?
+
+Seven servos' published parameters as centres, encoders of 8 to 16 bit, 50 Hz to 1 kHz, gravity, currents with noise;
+with the torque measured to 1 %, or by the controller's kp alone, known to 1 %, its kd unknown. Counted are the numbers
+that stand without a grave doubt.
+
+    python benchmarks/joints.py --draws 100 --first 1000
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
+import joints
+import stickslip as ss
+
+TOLD = ("level", "forward", "back", "load", "viscous", "inertia", "damping")
+
+
+def truths(joint: joints.Joint, carried: float) -> dict[str, float]:
+    """The true values under the names of the answer."""
+    true = joint.truth
+    return {
+        **{name: true[name] for name in ("forward", "back", "load", "viscous", "inertia")}, "damping": true["kd"],
+        "level": (true["forward"] + true["back"]) / 2 + true["load"] * carried,
+    }  # fmt: skip
+
+
+def asked(joint: joints.Joint, *, torque: bool, reference: bool) -> ss.cycle.JointFriction:
+    """What is said of one joint."""
+    record = joint.record
+    if torque and not reference:
+        alone = {name: record[name] for name in ("theta", "force")}
+        record = ss.Record.of(alone, fs=record.fs, units={"force": "N m"}).with_details("force", gain_sd=joints.GAIN)
+    return ss.cycle.regress_joint(record, **({} if torque else {"kp": joint.kp}))
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--draws", type=int, default=100, help="joints of each kind")
+    parser.add_argument("--first", type=int, default=1000, help="seed of the first")
+    parser.add_argument("--kinds", default="torque,controller,torque alone", help="which, with commas")
+    parser.add_argument("--misses", action="store_true", help="print each interval that does not hold")
+    options = parser.parse_args()
+    for kind in options.kinds.split(","):
+        held: dict[str, list[float]] = {name: [] for name in TOLD}
+        wide: dict[str, list[float]] = {name: [] for name in TOLD}
+        refused, spent = 0, []
+        for seed in range(options.first, options.first + options.draws):
+            joint = joints.drawn(seed, torque=kind != "controller")
+            begun = time.process_time()
+            try:
+                found = asked(joint, torque=kind != "controller", reference=kind == "torque")
+            except ss.StickslipError as error:
+                refused += 1
+                if options.misses:
+                    print(f"{seed} {joint.servo}: {error}")
+                continue
+            spent.append(time.process_time() - begun)
+            true = truths(joint, found.carried)
+            for name in TOLD:
+                estimate = getattr(found, name)
+                if estimate is None or not estimate.known or not ss.estimate.stands(estimate.status):
+                    continue
+                held[name].append(estimate.includes(true[name]))
+                wide[name].append((estimate.interval[1] - estimate.interval[0]) / 2 / true[name])
+                if options.misses and not held[name][-1] and name in ("level", "load"):
+                    print(f"{seed} {joint.servo} {joint.record.fs:.0f} Hz: {true[name]:.4g}, {estimate}")
+        print(f"{kind}: {options.draws - refused} of {options.draws} answered, {np.mean(spent):.2f} s each")
+        for name in TOLD:
+            if held[name]:
+                told = f"{np.mean(held[name]):6.1%} of {len(held[name])}"
+                print(f"  {name:9} held {told}, half width {np.median(wide[name]):.1%}")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,56 @@
+"""stickslip joint"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+import stickslip as ss
+from stickslip.cli.options import reading_options, result_options
+from stickslip.cli.progress import progress
+from stickslip.cli.records import default_folder, groups_of, read, rig_of
+from stickslip.cli.show import show
+
+
+@click.command()
+@click.argument("file", metavar="LOG")
+@click.option("--inertia", metavar="VALUE", help="Moment of inertia in kg m^2, or with its unit; found unless given.")
+@click.option("--kp", metavar="VALUE", help="The controller's gain in N m/rad, for a log without torque and current.")
+@click.option("--kd", metavar="VALUE", help="The controller's damping in N m s/rad; found unless given.")
+@click.option("--torque-constant", metavar="VALUE", help="Torque per current at the joint in N m/A.")
+@click.option("--gravity/--no-gravity", default=None, help="Whether gravity acts on it; of an angle yes unless said.")
+@click.option("--axis", metavar="NAME", help="Which axis of a log of several: a part of its columns' names.")
+@result_options("LOG-joint")
+@reading_options
+def joint(file: str, output: Path | None, as_json: bool, everything: bool, **options: Any) -> None:
+    """How much friction is in this joint of a robot, servo or axis?
+
+    LOG holds its position with one of: the torque, the motor's current (then --torque-constant), or the controller's
+    reference (then --kp). Columns are known by the names that ROS, LeRobot, MuJoCo, Dynamixel and drives give them.
+
+    Told are the friction either way, its viscous part, what of it grows with the load, inertia and gravity, breakaway
+    and stops; or what the log can not tell, and which motion would.
+
+    Results go into a folder: report.html to open in a browser, results.json, the figures, and the joint for MuJoCo,
+    URDF, Modelica, Simulink and C.
+
+    \b
+    stickslip joint shoulder.csv --torque-constant "0.87 N m/A"
+    stickslip joint episode.parquet --axis 2 --kp "17.8 N m/rad" --units "observation.state.2=deg"
+    """
+    names = ("inertia", "kp", "kd", "torque_constant", "gravity", "axis")
+    asked = {name: options.pop(name) for name in names}
+    rig = rig_of(**options)
+    groups = groups_of(file)
+    if len(groups) != 1:
+        raise click.BadParameter(f"'{file}' fits {len(groups)} logs; give one at a time", param_hint="LOG")
+    folder = output or (None if as_json else default_folder(groups, "joint"))
+    with progress(2) as tell:
+        tell(f"reading {file}", 0)
+        record = read(groups[0], rig)
+        tell("asking", 1)
+        found = ss.answers.analyze_joint(record, **asked)
+        written = ss.publish(found, folder=folder) if folder else None
+    show(found, written, as_json=as_json, everything=everything)

@@ -1,0 +1,106 @@
+"""A joint's friction, told."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from stickslip.answers.findings import Comparison, Findings
+from stickslip.cycle.joint import JointFriction
+from stickslip.errors import ModelError
+from stickslip.estimate import stands
+from stickslip.figures.joint import plates_of
+from stickslip.laws.export import export_law, urdf_dynamics
+from stickslip.laws.linear_slope import LinearSlope
+from stickslip.story.fit import ALONE, FILES
+from stickslip.story.story import Story
+from stickslip.story.words import Caution, cautions, interval_of, number, value_of
+
+APART = 0.05  # of the level, by which forward and back must differ to be worth a sentence
+
+
+def of_findings(findings: Findings) -> Story:
+    """One log."""
+    joint = findings.joint
+    return Story(
+        findings.name, list(_headline(findings)), [*cautions(findings), *map(Caution, _untold(joint))],
+        settings={key: str(value) for key, value in findings.settings.items()},
+        draw=lambda: plates_of(joint), data=lambda: _data(joint), write=partial(write_joint, joint=joint),
+    )  # fmt: skip
+
+
+def of_comparison(comparison: Comparison) -> Story:
+    """Several logs side by side."""
+    return Story(f"{len(comparison.findings)} logs compared", [])
+
+
+def _headline(findings: Findings) -> Iterator[str]:
+    joint = findings.joint
+    level, unit = joint.level, joint.level.unit
+    doubt = "" if stands(level.status) else f", which is not to be trusted ({level.status})"
+    under = f" under a mean load of {number(joint.carried, joint.carried / 100, unit)}" if joint.carried else ""
+    yield f"The joint slides against {value_of(level)} of friction{under} (95 %: {interval_of(level)}){doubt}."
+    yield from _directions(joint)
+    parts = [f"{value_of(joint.viscous)} of viscous friction"]
+    if joint.load is not None and joint.load.known:
+        most = f"less than {value_of(joint.load, joint.load.interval[1])}"
+        parts.append(f"{value_of(joint.load) if joint.load.interval[0] > 0 else most} of gravity's torque")
+    fastest = float(np.abs(joint.speed).max())
+    rate = f"{fastest:.3g} rad/s" if unit == "N m" else f"{fastest:.3g} m/s"
+    yield f"To that come {' and '.join(parts)}; it was moved at up to {rate}."
+    told = {"reference": "its controller's gains make", "current": "its current makes"}
+    torque = "the torque that" if unit == "N m" else "the force that"
+    yield (
+        f"With an inertia of {value_of(joint.inertia)} that explains {torque} {told.get(joint.source, 'was measured')};"
+        f" {100 * joint.residual:.2g} % of it is left unexplained while it slides."
+    )
+    if findings.breakaway is not None:
+        ratio = findings.breakaway.ratio
+        yield f"It breaks away at {value_of(ratio)} times its sliding friction (95 %: {interval_of(ratio)})."
+    if findings.sticks is not None and stands(findings.sticks.share.status):
+        yield f"It stands still up to {value_of(findings.sticks.share)} of the time."
+
+
+def _directions(joint: JointFriction) -> Iterator[str]:
+    forward, back = joint.forward, joint.back
+    if not (forward.known and back.known):
+        return
+    apart = abs(forward.value - back.value)
+    if apart > APART * joint.level.value and apart > 2 * (forward.sd + back.sd):
+        yield (
+            f"The two directions differ: {value_of(forward)} forward and {value_of(back)} back without load; a torque "
+            "sensor's zero offset looks the same."
+        )
+
+
+def _untold(joint: JointFriction) -> Iterator[str]:
+    for words in joint.left_out:
+        yield f"This log does not tell {words}."
+
+
+def _data(joint: JointFriction) -> dict[str, Any]:
+    return {
+        "residual": joint.residual, "condition": joint.condition, "carried": joint.carried, "source": joint.source,
+        "left_out": list(joint.left_out),
+    }  # fmt: skip
+
+
+def write_joint(folder: Path, *, joint: JointFriction) -> None:
+    """Its friction under the mean load in every form that another program reads, into the folder joint."""
+    if not (joint.level.known and joint.viscous.known):
+        return
+    (folder / "joint").mkdir()
+    turning = joint.level.unit == "N m"
+    law = LinearSlope(joint.level.value, slope=max(joint.viscous.value, 0.0))
+    (folder / "joint" / "dynamics.urdf").write_text(urdf_dynamics(law) + "\n", encoding="utf-8")
+    for form, file in FILES.items():
+        try:
+            text = export_law(law, format=form, turning=turning)
+        except ModelError:  # it has no such form
+            continue
+        text = f"{ALONE}\n{text}" if form == "toml" else text
+        (folder / "joint" / file).write_text(text.rstrip("\n") + "\n", encoding="utf-8")

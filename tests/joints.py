@@ -1,0 +1,126 @@
+"""Joints of robots under PD control, by an integrator of our own with nothing of the engine in it.
+
+Moreau's time stepping: in each short step the dry friction takes off as much speed as it can, so that a joint comes to
+rest and stays there as long as the friction bears the torque. Gravity, friction in proportion to the torque that
+gravity puts on the joint, other friction either way, a controller at 1 kHz, encoder counts, currents with noise.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numba
+import numpy as np
+
+import stickslip as ss
+
+STEPS = 20_000  # a second at least
+GAIN = 0.01  # by which the torque's gain and the stated kp are off
+# Seven servos as they were identified elsewhere (models with load of Rhoban's bam, parameters of 2024 to 2026):
+# armature [kg m^2], Coulomb friction [N m], share of the load, viscous friction [N m s/rad].
+SERVOS = {
+    "STS3215": (0.0234, 0.0519, 0.208, 0.0338), "MX-64": (0.0110, 0.0615, 0.117, 0.0148),
+    "MX-106": (0.0248, 0.1134, 0.108, 0.0119), "XL-320": (0.00148, 0.0108, 0.221, 0.0078),
+    "XL-330": (0.00258, 0.0022, 0.252, 0.0178), "eRob80:50": (0.334, 3.454, 0.0631, 1.217),
+    "eRob80:100": (0.989, 4.832, 0.148, 7.395),
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Joint:
+    """A joint as it is, and what was logged of it.
+
+    Attributes
+    ----------
+    servo : str
+        Of SERVOS, whose numbers it has but for a factor.
+    truth : mapping of str to float
+        inertia, forward, back (Coulomb friction), load (part of gravity's torque), viscous, sine, cosine (gravity),
+        kp, kd, static (over the sliding friction).
+    record : Record
+        theta, reference, and where it is measured force [N m], whose gain is off by what is stated.
+    kp : (float, float)
+        As its owner states it, with the standard deviation of that.
+    """
+
+    servo: str
+    truth: dict[str, float]
+    record: ss.Record
+    kp: tuple[float, float]
+
+
+@numba.njit
+def march(p, reference, slope, steps, count, control):  # type: ignore[no-untyped-def]
+    """Angle and motor torque at each sample of a reference that is known at `steps` instants a sample."""
+    inertia, forward, back, share, viscous, sine, cosine, kp, kd, static, excess_speed = p
+    samples = (reference.shape[0] - 1) // steps
+    dt = 1.0 / (control * steps)
+    angle, torque = np.zeros(samples), np.zeros(samples)
+    q, v, motor = reference[0], 0.0, 0.0
+    for i in range(samples * steps):
+        if i % count == 0:
+            motor = kp * (reference[i] - q) + kd * (slope[i] - v)
+        if i % steps == count // 2:  # in the middle of what the controller holds
+            angle[i // steps], torque[i // steps] = q, motor
+        load = sine * np.sin(q) + cosine * np.cos(q)
+        level = (forward if v > 0 or (v == 0 and motor > load) else back) + share * abs(load)
+        level *= 1 + (static - 1) * np.exp(-((v / excess_speed) ** 2))
+        free = v + dt * (motor - load - viscous * v) / inertia
+        most = dt * level / inertia
+        v = free - most if free > most else free + most if free < -most else 0.0
+        q += dt * v
+    return angle, torque
+
+
+def _reference(kind: str, time: np.ndarray, chance: np.random.Generator) -> np.ndarray:
+    """What the joint is told [rad]: sines about a place, or stairs of minimum jerk with rests between."""
+    about, size = chance.uniform(-1.0, 1.0), chance.uniform(0.4, 1.2)
+    if kind == "sines":
+        tones = np.exp(chance.uniform(np.log(0.15), np.log(1.2), 4))
+        weights = chance.uniform(0.4, 1.0, 4) / np.sqrt(tones)
+        phases = chance.uniform(0, 2 * np.pi, 4)
+        moved = sum(w * np.sin(2 * np.pi * f * time + p) for w, f, p in zip(weights, tones, phases, strict=True))
+        return about + size * moved / np.abs(moved).max()
+    moved, now, place = np.empty_like(time), 0.0, about
+    while now < time[-1]:
+        last, lasts, rests = place, chance.uniform(0.4, 2.0), chance.uniform(0.1, 0.8)
+        place = about + size * chance.uniform(-1, 1)
+        here = (time >= now) & (time <= now + lasts + rests)
+        share = np.clip((time[here] - now) / lasts, 0, 1)
+        moved[here] = last + (place - last) * (10 * share**3 - 15 * share**4 + 6 * share**5)
+        now += lasts + rests
+    return moved
+
+
+def drawn(seed: int, *, torque: bool, seconds: float = 30.0, loaded: bool = True) -> Joint:
+    """A joint by chance, about one of the seven servos; with the motor's torque logged, or positions alone."""
+    chance = np.random.default_rng([seed, torque, loaded])
+    servo = str(chance.choice(list(SERVOS)))
+    armature, coulomb, share, viscous = SERVOS[servo] * np.exp(chance.uniform(-0.4, 0.4, 4))
+    inertia = armature * chance.uniform(1.0, 3.0)
+    kp = inertia * (2 * np.pi * chance.uniform(3.0, 8.0)) ** 2
+    carried = coulomb * chance.uniform(1.0, 8.0) if loaded else 0.0
+    tilt = chance.uniform(-np.pi, np.pi)
+    truth = {
+        "inertia": inertia, "forward": coulomb * chance.uniform(0.9, 1.1), "back": coulomb * chance.uniform(0.9, 1.1),
+        "load": share if loaded else 0.0, "viscous": viscous, "sine": carried * np.cos(tilt),
+        "cosine": carried * np.sin(tilt), "kp": kp, "kd": 2 * chance.uniform(0.2, 0.8) * np.sqrt(kp * inertia),
+        "static": float(chance.choice([1.0, 1.15, 1.4])), "fall": 0.02,
+    }  # fmt: skip
+    fs = float(np.exp(chance.uniform(np.log(50), np.log(1000))))
+    steps = int(np.ceil(STEPS / fs))
+    fine = np.arange(int(seconds * fs) * steps + 1) / (fs * steps)
+    reference = _reference(str(chance.choice(["sines", "stairs"])), fine, chance)
+    count = max(1, round(fs * steps / 1000))  # the controller runs at 1 kHz
+    angle, motor = march(np.array(list(truth.values())), reference, np.gradient(reference, fine), steps, count, fs)
+    size = 2 * np.pi / 2 ** int(chance.integers(8, 17))
+    written = {"theta": np.round(angle / size) * size, "reference": reference[count // 2 : -1 : steps]}
+    if torque:
+        noise = np.abs(motor).max() * 10 ** chance.uniform(-2.5, -1.5)
+        written["force"] = (1 + GAIN * chance.standard_normal()) * motor + noise * chance.standard_normal(len(motor))
+    units = {"reference": "rad", "force": "N m"}
+    record = ss.Record.of(written, fs=fs, units={name: units[name] for name in units if name in written})
+    if torque:
+        record = record.with_details("force", gain_sd=GAIN)
+    stated = kp * (1 + GAIN * chance.standard_normal()), GAIN * kp
+    return Joint(servo, {name: float(value) for name, value in truth.items()}, record, stated)
