@@ -266,7 +266,7 @@ def _stated(rig: RigSettings, *, all_of_it: bool) -> dict[str, Any]:
 
 def _nothing(name: str, record: Record, refusals: list[StickslipError]) -> EstimateError:
     value = f"{name} answers no question about friction"
-    still = [each for each in MOTION if each in record and constant(record[each])]
+    still = [channel for channel in MOTION if channel in record and constant(record[channel])]
     if still:
         return EstimateError(
             f"{value}: {unmoved(record, still[0])}",

@@ -335,12 +335,12 @@ def _line_costs(values: Array) -> Array:
     size = len(values)
     time = np.arange(size, dtype=float)
 
-    def sums(each: Array) -> Array:
-        return np.concatenate([[0.0], np.cumsum(each)])
+    def sums(row: Array) -> Array:
+        return np.concatenate([[0.0], np.cumsum(row)])
 
     values = values - values.mean()
-    n, t, y = (sums(each) for each in (np.ones(size), time, values))
-    tt, ty, yy = (sums(each) for each in (time * time, time * values, values * values))
+    n, t, y = (sums(row) for row in (np.ones(size), time, values))
+    tt, ty, yy = (sums(row) for row in (time * time, time * values, values * values))
 
     def over(total: Array) -> Array:
         return total[None, :] - total[:, None]

@@ -205,7 +205,7 @@ def _next(laws: LawComparison, rig: RigSettings) -> tuple[Proposal, ...]:
     other = next((candidate for candidate in laws.candidates[1:] if candidate.name != best.name), None)
     if other is None:
         return ()
-    left = {each.name: replace(each.oscillator, drive=Release()) for each in (best, other)}
+    left = {candidate.name: replace(candidate.oscillator, drive=Release()) for candidate in (best, other)}
     known = [(run.frequency, run.amplitude) for run in RUNS]
     return next_runs(left, shaker=Shaker.of(rig.shaker), done=known)
 

@@ -66,7 +66,7 @@ def acquire(names: tuple[str, ...], config: Path | None, output: Path, as_json: 
     if options["runs"]:
         _run_all(chosen, bench.read_runs(options["runs"]), output, log, as_json=as_json)
         return
-    drive = dict(_driven(each) for each in options["drives"])
+    drive = dict(_driven(text) for text in options["drives"])
     wanted = bench.Wanted(options["seconds"], _trigger(options["trigger"], options["before"]), drive, log)
     with progress(100) as tell:
         done = bench.acquire(chosen, output=output, wanted=wanted, watch=_watch(tell, options["seconds"]))
@@ -152,18 +152,18 @@ def devices(config: Path | None, as_json: bool) -> None:
     stickslip devices
     stickslip devices --config rig.toml
     """
-    found = bench.devices()
+    kinds = bench.devices()
     named = ss.rig.read_rig(config).devices if config else {}
     mine = {name: bench.find_device(name, named, folder=config.parent if config else None) for name in named}
     if as_json:
-        kinds = {each.kind: {"about": each.about, "there": [*each.there], "missing": each.missing} for each in found}
-        said = {name: {"kind": one.kind, "model": one.model, "fs": one.fs} for name, one in mine.items()}
-        say_json({"kinds": kinds, "named": said})
+        told = {kind.kind: {"about": kind.about, "there": [*kind.there], "missing": kind.missing} for kind in kinds}
+        named_so = {name: {"kind": one.kind, "model": one.model, "fs": one.fs} for name, one in mine.items()}
+        say_json({"kinds": told, "named": named_so})
         return
     for name, one in mine.items():
         inputs = ", ".join(f"{entry.name} [{entry.unit}]" for entry in one.inputs)
         outputs = "".join(f"; moves {output.name}" for output in one.outputs)
         say("\n".join(wrapped(f"{one.model}, {one.fs:g} Hz: {inputs}{outputs}", f"{name:<8} ")))
-    for each in found:
-        there = f"missing: {each.missing}" if each.missing else "; ".join(each.there) or "nothing found"
-        say("\n".join([*wrapped(each.about, f"{each.kind:<8} "), *wrapped(there, 9 * " ")]))
+    for kind in kinds:
+        there = f"missing: {kind.missing}" if kind.missing else "; ".join(kind.there) or "nothing found"
+        say("\n".join([*wrapped(kind.about, f"{kind.kind:<8} "), *wrapped(there, 9 * " ")]))

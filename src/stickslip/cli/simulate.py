@@ -61,20 +61,23 @@ def simulate(
 
 
 def _list_scenarios(*, as_json: bool, everything: bool) -> None:
-    found = {name: ss.scenarios.get(name) for name in ss.scenarios.names()}
+    scenarios = {name: ss.scenarios.get(name) for name in ss.scenarios.names()}
     if as_json:
-        say_json({name: each.about for name, each in found.items()})
+        say_json({name: scenario.about for name, scenario in scenarios.items()})
         return
     if not everything:
-        families = [list(group) for _, group in itertools.groupby(found, key=lambda name: name.partition(" ")[0])]
+        families = [list(group) for _, group in itertools.groupby(scenarios, key=lambda name: name.partition(" ")[0])]
         shown = [f'"{names[0]}"' + f" and {len(names) - 1} more" * (len(names) > 1) for names in families]
-        more = f'{len(found)} scenarios; --all has each with what is known of it; run one: stickslip simulate "NAME"'
+        more = (
+            f'{len(scenarios)} scenarios; --all has each with what is known of it; run one: stickslip simulate "NAME"'
+        )
         say("\n".join([*wrapped(", ".join(shown)), "", *wrapped(more)]))
         return
-    cases = [(ss.systems.scenario_case(name), ", ".join(each.known).replace("_", " ")) for name, each in found.items()]
-    for (about, parts, known), group in itertools.groupby(
-        cases, key=lambda each: (each[0].about, each[0].parts, each[1])
-    ):
+    cases = [
+        (ss.systems.scenario_case(name), ", ".join(scenario.known).replace("_", " "))
+        for name, scenario in scenarios.items()
+    ]
+    for (about, parts, known), group in itertools.groupby(cases, key=lambda of: (of[0].about, of[0].parts, of[1])):
         say(f"\n{about}\n  {parts}; known: {known}")
         line = ""
         for case, _ in group:
@@ -84,4 +87,4 @@ def _list_scenarios(*, as_json: bool, everything: bool) -> None:
                 line = ""
             line += name
         say(line)
-    say(f'\n{len(found)} scenarios; run one with: stickslip simulate "NAME"')
+    say(f'\n{len(scenarios)} scenarios; run one with: stickslip simulate "NAME"')

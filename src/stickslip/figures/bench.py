@@ -33,7 +33,7 @@ COLOURS, MARKS = (BLUE, ORANGE, GREEN, PURPLE), ("o", "s", "^", "D")
 
 
 @styled
-def plot_calibrations(found: Mapping[str, Calibration]) -> Figure:
+def plot_calibrations(calibrations: Mapping[str, Calibration]) -> Figure:
     """How far each sensor is off the straight line through its levels, as a part of its range.
 
     Examples
@@ -45,10 +45,10 @@ def plot_calibrations(found: Mapping[str, Calibration]) -> Figure:
     1
     """
     figure, ax = new_figure(height=3.0)
-    for number, (name, each) in enumerate(found.items()):
-        zero = each.zero.value if each.zero is not None else 0.0
-        span = np.ptp(each.gain.value * each.reference)
-        off = 100 * (each.levels - zero - each.gain.value * each.reference) / span
+    for number, (name, calibration) in enumerate(calibrations.items()):
+        zero = calibration.zero.value if calibration.zero is not None else 0.0
+        span = np.ptp(calibration.gain.value * calibration.reference)
+        off = 100 * (calibration.levels - zero - calibration.gain.value * calibration.reference) / span
         style: Any = {"color": COLOURS[number % 4], "marker": MARKS[number % 4], "linestyle": "none"}
         ax.plot(np.arange(1, len(off) + 1) + 0.08 * number, off, label=name, **style)
     ax.axhline(0.0, color=INK, linewidth=0.8)

@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from stickslip.errors import ModelError, SolveError
 from stickslip.maps.basins import Attractor, Start, numbers, require_number, require_period, settled
 from stickslip.maps.grid import START, read_grid, unit
-from stickslip.maps.measures import COUNTS, FAILED, NO_SYSTEM, STATUS, variables
+from stickslip.maps.measures import COUNTS, FAILED, NO_SYSTEM, STATUS, Variable, variables
 from stickslip.maps.plan import required
 from stickslip.maps.sweep import NoSystem, require_memory, sweep
 from stickslip.parameters import find
@@ -301,49 +302,69 @@ def refine(
     (True, 9, 129)
     """
     _require_borders(system, grid, measure, halvings)
-    step, kept = 2**halvings, variables((measure,))
-    shape = tuple((len(column) - 1) * step + 1 for column in grid.values())
-    require_memory(math.prod(shape), kept)
-    values = [_finer(np.asarray(column, dtype=np.float64), step) for column in grid.values()]
-    arrays = {name: np.full(shape, variable.fill, variable.dtype) for name, variable in kept.items()}
-    run, wanted = np.zeros(shape, dtype=bool), np.zeros(shape, dtype=bool)
-    wanted[tuple(slice(None, None, step) for _ in shape)] = True
-    whole = True
-    last: Any = None  # the answers of the last level
-    while True:
-        for name, variable in kept.items():
-            arrays[name][wanted] = variable.fill
-        places = np.argwhere(wanted)
-        points = [dict(zip(grid, (v[j] for v, j in zip(values, p, strict=True)), strict=True)) for p in places]
+    step = 2**halvings
+    known = _Refinement(grid, variables((measure,)), step)
+    ask = partial(sweep, system, measures=[measure], cycles=cycles, settle=settle, start=start, engine=engine)
+    while known.ask(ask) and step > 1:
+        step //= 2
+        known.wanted = _halved(known.arrays, step)
+    return known.labelled(system)
+
+
+class _Refinement:
+    """The finest grid, with the answers known so far: which points were run, and which are wanted next."""
+
+    def __init__(self, grid: Mapping[str, Sequence[float]], kept: Mapping[str, Variable], step: int) -> None:
+        shape = tuple((len(column) - 1) * step + 1 for column in grid.values())
+        require_memory(math.prod(shape), kept)
+        self.kept = kept
+        self.values = {name: _finer(np.asarray(column, dtype=np.float64), step) for name, column in grid.items()}
+        self.arrays = {name: np.full(shape, variable.fill, variable.dtype) for name, variable in kept.items()}
+        self.run, self.wanted = np.zeros(shape, dtype=bool), np.zeros(shape, dtype=bool)
+        self.wanted[tuple(slice(None, None, step) for _ in shape)] = True
+        self.last: Any = None  # the answers of the last level
+        self.whole = True
+
+    def ask(self, sweep: Callable[..., Any]) -> bool:
+        """Run the points that are wanted; whether none was lost to an interrupt."""
+        self._forget(self.wanted)
+        places = np.argwhere(self.wanted)
+        columns = self.values.values()
+        points = [
+            dict(zip(self.values, (v[j] for v, j in zip(columns, place, strict=True)), strict=True)) for place in places
+        ]
         try:
             if points:
-                last = sweep(
-                    system, points, measures=[measure], cycles=cycles, settle=settle, start=start, engine=engine
-                )
-                for name, array in arrays.items():
-                    array[tuple(places.T)] = last[name].values
-                run |= wanted & (arrays["status"] != STATUS.fill)
-                whole = last.attrs["status"] == "complete"
+                self.last = sweep(points)
+                for name, array in self.arrays.items():
+                    array[tuple(places.T)] = self.last[name].values
+                self.run |= self.wanted & (self.arrays["status"] != STATUS.fill)
+                self.whole = self.last.attrs["status"] == "complete"
         except NoSystem:  # of the points beside a border of what is a system
-            if last is None:
+            if self.last is None:
                 raise
-            arrays["status"][wanted] = NO_SYSTEM
-            run |= wanted
+            self.arrays["status"][self.wanted] = NO_SYSTEM
+            self.run |= self.wanted
         except KeyboardInterrupt:  # before a block of this level was done
-            if last is None:
+            if self.last is None:
                 raise
-            whole = False
-        if step == 1 or not whole:
-            break
-        step //= 2
-        wanted = _halved(arrays, step)
-    unknown = (arrays["status"] == FAILED) & ~run  # between two runs that failed: that tells of no third
-    for name, variable in kept.items():
-        arrays[name][unknown] = variable.fill
-    known = {name: (name, column, {"units": unit(system, name)}) for name, column in zip(grid, values, strict=True)}
-    data = {name: (tuple(grid), array, last[name].attrs) for name, array in arrays.items()}
-    attributes = {**last.attrs, "status": "complete" if whole else f"interrupted: {run.sum()} points were run"}
-    return required("xarray").Dataset({**data, "run": (tuple(grid), run)}, coords=known, attrs=attributes)
+            self.whole = False
+        return self.whole
+
+    def _forget(self, places: NDArray[np.bool_]) -> None:
+        for name, variable in self.kept.items():
+            self.arrays[name][places] = variable.fill
+
+    def labelled(self, system: System) -> Any:
+        """All of it as an xarray.Dataset."""
+        # between two runs that failed: that tells of no third
+        self._forget((self.arrays["status"] == FAILED) & ~self.run)
+        known = {name: (name, column, {"units": unit(system, name)}) for name, column in self.values.items()}
+        names = tuple(self.values)
+        data = {name: (names, array, self.last[name].attrs) for name, array in self.arrays.items()}
+        status = "complete" if self.whole else f"interrupted: {self.run.sum()} points were run"
+        attributes = {**self.last.attrs, "status": status}
+        return required("xarray").Dataset({**data, "run": (names, self.run)}, coords=known, attrs=attributes)
 
 
 def _require_borders(system: System, grid: Mapping[str, Sequence[float]], measure: str, halvings: int) -> None:

@@ -80,8 +80,8 @@ def of_commissioned(done: Commissioned) -> Story:
     known, found = done.known, done.results
     constants = known.constants
     own = [*(constants.estimates if constants else ()), *([known.damping] if known.damping else [])]
-    lines = [Line.of(each, done.true_value(each.name)) for each in own]
-    lines += [Line.of(each, done.true_value(each.name, step)) for step, each in _leading(done)]
+    lines = [Line.of(estimate, done.true_value(estimate.name)) for estimate in own]
+    lines += [Line.of(estimate, done.true_value(estimate.name, step)) for step, estimate in _leading(done)]
     cautions = [Caution(f"{_title(name)} {why}") for name, why in done.refused.items()]
     cautions += [
         Caution(f"{_title(name)} {status}.")
@@ -112,9 +112,9 @@ def _headline(done: Commissioned) -> str:
 
 def _leading(done: Commissioned) -> Iterator[tuple[str, Estimate]]:
     for step, name in LEADING:
-        for each in done.results[step].estimates if step in done.results else ():
-            if each.name == name:
-                yield step, each
+        for estimate in done.results[step].estimates if step in done.results else ():
+            if estimate.name == name:
+                yield step, estimate
 
 
 def _title(name: str) -> str:
@@ -128,11 +128,17 @@ def _tables(done: Commissioned) -> list[Table]:
         if step.name in done.results or step.name in done.refused
     ]
     tables = [Table("What was done", ("question", "at the rig", "answer"), rows)]
-    truth = any(done.true_value(each.name, name) is not None for name, each in _numbers(done))
+    truth = any(done.true_value(estimate.name, name) is not None for name, estimate in _numbers(done))
     heads = ("step", "quantity", "value", "95 % interval", *(["true value"] if truth else []))
     cells = [
-        [name, each.name, value_of(each), interval_of(each), *([_true(done, name, each)] if truth else [])]
-        for name, each in _numbers(done)
+        [
+            name,
+            estimate.name,
+            value_of(estimate),
+            interval_of(estimate),
+            *([_true(done, name, estimate)] if truth else []),
+        ]
+        for name, estimate in _numbers(done)
     ]
     return [*tables, Table("Which number did each step find?", heads, cells, folded=True)]
 
@@ -150,7 +156,7 @@ def _short(done: Commissioned, step: BenchStep) -> str:
     """The first numbers of a step, in a cell."""
     if step.name in done.refused:
         return f"refused: {done.refused[step.name]}"
-    return "; ".join(f"{each.name} {value_of(each)}" for each in _first(done.results[step.name]))
+    return "; ".join(f"{estimate.name} {value_of(estimate)}" for estimate in _first(done.results[step.name]))
 
 
 def _first(result: Result) -> tuple[Estimate, ...]:
