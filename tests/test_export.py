@@ -33,6 +33,7 @@ LAWS = {
     "InertialContact": ss.laws.InertialContact(1.1, stiffness=192000, mass=0.01, damping=3.0),
     "ElastoSlip": ss.laws.ElastoSlip.iwan(1e6, width=30e-6, elements=4),
     "PositionLoad": ss.laws.PositionLoad(1.0, gradient=1.5),
+    "Geared": ss.laws.Geared(1.0, 1.2, 0.1, 0.2, load=0.5, gradient=1.5, driving=0.3, driven=0.1),
     "Stribeck": ss.laws.Stribeck(1.0, 1.5, speed=0.1, exponent=1.3, viscous=0.2),
     "Dahl": ss.laws.Dahl(1.1, stiffness=192000, exponent=1.5),
     "LuGre": ss.laws.LuGre(1.0, 1.5, speed=1e-3, stiffness=1e5, damping=316.23, viscous=0.4),

@@ -163,6 +163,18 @@ def test_emps(dataset):
     assert found.residual < 0.02  # published: 0.0311
 
 
+def test_emps_is_predicted_inside_its_loop(dataset):
+    """The controller makes ``gtau kv (kp (qg - qm) - v)``: a spring to the reference and a damper to the ground."""
+    found = regress_joint(emps(dataset))
+    law = ss.laws.Geared(found.forward.value, found.back.value, found.viscous_forward.value, found.viscous_back.value)
+    damping = 35.1507 * 243.45
+    loop = ss.Oscillator(mass=found.inertia.value, stiffness=160.18 * damping, damping=damping, law=law)
+    channels = {"x": "qm [m]", "z": "qg [m]"}
+    record = ss.read_record(dataset("emps") / "DATA_EMPS.mat", channels=channels, fs=1000.0)
+    (part,) = ss.answers.predict(record, loop, plain=False).parts
+    assert 100 - part.follows["x"] < 0.01  # per cent of its spread; with the published numbers as much
+
+
 @pytest.mark.parametrize(
     ("columns", "axis", "expected"),
     [

@@ -106,6 +106,36 @@ def test_a_lifted_contact_rubs_no_more() -> None:
     assert len(piece) == 601
 
 
+def test_a_gear_without_load_is_a_slope() -> None:
+    """Also where its load changes sign and has no share in the friction."""
+    drive = ss.drives.HarmonicBase(0.5, frequency=0.3)
+    slope = ss.Oscillator(mass=1, stiffness=4, law=ss.laws.LinearSlope(0.4, slope=0.1), drive=drive)
+    times = np.linspace(0, 30, 601)
+    expected = ss.simulate(slope, duration=30).sample(times, ("x",))[0]
+    for gradient in (0.0, 1.0):
+        gear = slope.having(law=ss.laws.Geared(0.4, 0.4, 0.1, 0.1, gradient=gradient))
+        assert ss.simulate(gear, duration=30).sample(times, ("x",))[0] == pytest.approx(expected, abs=1e-11)
+
+
+def test_a_gear_rubs_more_against_its_load_than_along() -> None:
+    """Against short steps in which the dry friction takes off what speed it can; their error falls with the step."""
+    law = ss.laws.Geared(0.3, 0.2, 0.05, 0.1, load=-0.1, gradient=0.8, driving=0.4, driven=0.2)
+    drive = ss.drives.HarmonicBase(0.5, frequency=0.3)
+    run = ss.simulate(ss.Oscillator(mass=1, stiffness=9, law=law, drive=drive), duration=20)
+    x, v, step, stepped = 0.0, 0.0, 1e-4, []
+    for number in range(200_000):
+        stepped += [x] * (number % 1000 == 0)
+        pull, load = 9 * (0.5 * math.cos(2 * math.pi * 0.3 * number * step) - x), law.load + law.gradient * x
+        way = math.copysign(1.0, v or pull)
+        level = (law.forward if way > 0 else law.back) + (law.driving if way * load > 0 else law.driven) * abs(load)
+        free = v + step * (pull - (law.viscous_forward if way > 0 else law.viscous_back) * v)
+        v = math.copysign(max(abs(free) - step * level, 0.0), free)
+        x += step * v
+    exact = run.sample(np.arange(200) * 0.1, ("x",))[0][0]
+    assert np.ptp(exact) > 1
+    assert np.abs(exact - stepped).max() < 2e-4
+
+
 def _state_variable(seed: int) -> tuple[ss.Oscillator, dict[str, float], float]:
     """A system under the law as it is constructed by default, its start and its natural period [s]."""
     draw = np.random.default_rng(seed)

@@ -87,8 +87,9 @@ def axis_record(record: Record, *, axis: str | None = None) -> Record:
     columns = list(_columns(record))
     axes = list(dict.fromkeys(column.axis for column in columns if column.kind == "theta"))
     if not axes:
+        asked = "" if axis is None else f"axis = {axis!r}: "
         raise RecordError(
-            f"no column is called a position: {', '.join(_called(record, name) for name in record)}",
+            f"{asked}no column is called a position: {', '.join(_called(record, name) for name in record)}",
             "a joint's log has its position, and a torque, a current or a reference",
             'name the columns: --channels "theta=COLUMN [rad]" --channels "force=COLUMN [N m]"',
         )
