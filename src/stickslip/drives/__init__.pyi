@@ -2,6 +2,7 @@ from stickslip.drives.kinds import Belt as Belt
 from stickslip.drives.kinds import Dithered as Dithered
 from stickslip.drives.kinds import HarmonicBase as HarmonicBase
 from stickslip.drives.kinds import HarmonicForce as HarmonicForce
+from stickslip.drives.kinds import Imposed as Imposed
 from stickslip.drives.kinds import MultiTone as MultiTone
 from stickslip.drives.kinds import Ramp as Ramp
 from stickslip.drives.kinds import Recorded as Recorded

@@ -38,6 +38,8 @@ class Motion:
         Period [s]; infinite where the drive does not repeat.
     force, base, face : mapping of str to float
         Force on the mass [N], displacement of the spring's end [m], displacement of the counter-face [m].
+    imposed : mapping of str to float
+        Displacement that the mass itself has [m], whatever acts on it.
     knots : ndarray or None
         Times [s] (first column) at which the signals in `knotted` take new values (further columns).
     knotted : tuple of str
@@ -53,6 +55,7 @@ class Motion:
     force: Row = field(default_factory=dict)
     base: Row = field(default_factory=dict)
     face: Row = field(default_factory=dict)
+    imposed: Row = field(default_factory=dict)
     knots: NDArray[np.float64] | None = None
     knotted: tuple[str, ...] = ()
     end: float = math.inf
@@ -528,6 +531,55 @@ class SpeedProfile:
         steps = np.diff(times)
         ways = np.cumsum([0.0, *(steps * (speeds[1:] + speeds[:-1]) / 2)])
         return _pieces(times, [ways, speeds, [*(np.diff(speeds) / steps), 0.0]], self.on)
+
+
+@parametric
+class Imposed:
+    r"""The mass itself moves as a drive would move the spring's end: what a contact does under it, and no more.
+
+    The friction of a motion that is known beforehand (thesis, sections 3.3 and 4.5): :math:`x(t)` is imposed, mass,
+    spring and damper play no part, and the law gives :math:`f(t)`. It takes a law of linear modes whose contact gives
+    way; one that holds the mass would hold the motion.
+
+    Raises
+    ------
+    ModelError
+        A drive that moves no base, or one whose velocity jumps.
+
+    Examples
+    --------
+    >>> Imposed(HarmonicBase(1e-3, frequency=2.5)).motion().imposed
+    {'cos0': 0.001}
+    """
+
+    label = "Motion of the mass, imposed"
+
+    drive: Drive = parameter("", "whose motion of the base the mass has")
+
+    def __post_init__(self) -> None:
+        require_drive(self.drive)
+        own = self.drive.motion()
+        _require(
+            bool(own.base) and not own.force and not own.face,
+            f"{type(self.drive).__name__} imposed",
+            "a motion that is imposed is one of a base alone",
+            'give a drive with on="base" and contact="ground", as HarmonicBase(1e-3, frequency=2.5)',
+            of="drive",
+        )
+        rates = {name for name in own.base for name in own.rates.get(name, {})}
+        jumps = own.knots is not None and any(name in own.knotted and not own.rates[name] for name in rates)
+        _require(
+            not jumps,
+            f"{type(self.drive).__name__} of straight pieces, imposed",
+            "a mass has no jumps of its velocity",
+            "use order=3",
+            of="drive",
+        )
+
+    def motion(self) -> Motion:
+        """The drive's signals, its base's displacement as the mass's own."""
+        own = self.drive.motion()
+        return replace(own, base={}, imposed=own.base)
 
 
 @parametric
