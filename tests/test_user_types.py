@@ -48,6 +48,7 @@ drives: list[ss.Oscillator] = [
     for drive in (
         ss.drives.Release(), ss.drives.HarmonicBase(1e-3, frequency=2.5), ss.drives.HarmonicForce(1.0, frequency=2.5),
         ss.drives.MultiTone([(1.0, 2.0, 0.0)]), ss.drives.Belt(0.1), ss.drives.Ramp(0.1),
+        ss.drives.Crank(0.05, frequency=2.0, rod=0.2),
         ss.drives.Recorded([0.0, 1.0, 0.0, 1.0], fs=10.0),
         ss.drives.SpeedProfile([0.0, 1.0], [0.0, 0.1]),
         ss.drives.Later(ss.drives.Belt(0.1), 1.0),

@@ -1,4 +1,5 @@
 from stickslip.drives.kinds import Belt as Belt
+from stickslip.drives.kinds import Crank as Crank
 from stickslip.drives.kinds import Dithered as Dithered
 from stickslip.drives.kinds import HarmonicBase as HarmonicBase
 from stickslip.drives.kinds import HarmonicForce as HarmonicForce
