@@ -19,7 +19,7 @@ from stickslip.estimate import UNKNOWN, doubts_of
 from stickslip.figures.law import law_plates
 from stickslip.law.fit_curve import CurveFit
 from stickslip.law.law import LawFit
-from stickslip.law.which_law import LawComparison
+from stickslip.law.verdict import LawComparison
 from stickslip.laws.export import export_law, toml_table
 from stickslip.laws.formula import quoted
 from stickslip.parameters import unit
