@@ -1,4 +1,4 @@
-# make demo | lab | test | soak | lint | docs | bench | smoke | package | clean
+# make demo | lab | test | soak | lint | docs | paper | bench | smoke | package | clean
 # Set-up is part of every target: the environment lives in .venv and is made when it is missing or out of date.
 PYTHON ?= python3
 VENV := .venv
@@ -9,7 +9,7 @@ ifneq ($(wildcard ../shared/data),)
 export STICKSLIP_DATA ?= $(abspath ../shared/data)
 endif
 
-.PHONY: demo lab test soak lint docs bench smoke package clean
+.PHONY: demo lab test soak lint docs paper bench smoke package clean
 
 demo: $(VENV)/.user
 	$(BIN)/stickslip demo --output stickslip-demo
@@ -31,6 +31,10 @@ lint: $(VENV)/.dev
 
 docs: $(VENV)/.docs
 	$(BIN)/sphinx-build -W --keep-going -b html docs docs/_build/html
+
+paper: $(VENV)/.user
+	mkdir -p docs/_build
+	$(BIN)/python docs/paper/make.py > docs/_build/paper.md
 
 bench: $(VENV)/.dev
 	$(BIN)/python benchmarks/run.py

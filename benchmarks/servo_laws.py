@@ -1,17 +1,22 @@
 """Which friction law it is, on rigs of an integrator with nothing of the engine in it (`tests/servo.py`).
 
-Servo drives, x and z alone in counts, stated dampers a tenth to ten times the true one, constants and gains 0.5 % off,
-rough surfaces. Told are each rig's laws kept with the confidence, and how often the truth was left out.
+Servo drives, x and z alone in counts of 12 or 16 bits, stated dampers a tenth to ten times the true one, constants and
+gains 0.5 % off, rough surfaces. Told are each rig's laws kept with the confidence, how often the truth was left out,
+the lowest odds that a true law had (of them `LOWEST` in `law/standing.py` is made), and how often intervals held.
 
-    python benchmarks/servo_laws.py --draws 10 --first 300
+    python benchmarks/servo_laws.py --draws 10 --first 300 --keep servo.jsonl
+
+With ``--keep FILE`` every rig is written down as it is done, and a second call goes on from there.
 """
 
 from __future__ import annotations
 
 import argparse
+import json
 import sys
 import time
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -19,37 +24,83 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 import servo
 import stickslip as ss
 
-SAID = (0.0, 0.9, 0.95, 0.99)  # confidences from which on the answers are counted
+SAID = (0.0, 0.9, 0.95, 0.98, 0.99)  # confidences from which on the answers are counted
+TRUE = {
+    "kinetic": "level", "static": "static", "damping": "damping", "stiffness": "stiffness", "speed": "fall",
+    "law.stiffness": "contact", "law.damping": "loss", "rate": "rate", "steepness": "steep",
+}  # fmt: skip
+"""Of each parameter that is fitted, what it is called among the rig's numbers."""
 
 
-def asked(law: str, seed: int) -> ss.law.LawComparison:
-    """What is said of one rig."""
+def asked(law: str, seed: int) -> dict[str, Any]:
+    """What is said of one rig, and what is true."""
     rig = servo.drawn(law, np.random.default_rng([seed, servo.LAWS.index(law)]))
     stated = ss.Oscillator(law=ss.laws.Coulomb(1.0), drive=ss.drives.Release(), **rig.stated)
-    return ss.compare_laws(rig.records, stated)
+    begun = time.process_time()
+    row: dict[str, Any] = {"seed": seed, "law": law}
+    try:
+        found = ss.compare_laws(rig.records, stated)
+    except ss.StickslipError as error:
+        return {**row, "error": str(error), "seconds": time.process_time() - begun}
+    standings = [each.standing for each in found.candidates]
+    true = {**rig.numbers, "static": rig.numbers["static"] * rig.numbers["level"] / rig.numbers["kinetic"]}
+    return {
+        **row, "seconds": time.process_time() - begun, "kept": list(found.kept), "confidence": found.confidence,
+        "limits": [each.name for each in standings if each.limit], "best": found.best.name, "status": found.status,
+        "odds": {each.name: 1.0 if each.limit else each.odds for each in standings},
+        "said": {key: [true[TRUE[key]], one.value, *one.interval] for key, one in found.fit.parameters.items()
+                 if key in TRUE},
+    }  # fmt: skip
+
+
+def told(row: dict[str, Any]) -> str:
+    """One rig, in a line."""
+    said = row.get("error") or f"{', '.join(row['kept'])}, {row['confidence']:.3f}"
+    return f"{row['seed']} {row['law']}: {said}, {row['seconds']:.1f} s"
+
+
+def summed(rows: list[dict[str, Any]]) -> list[str]:
+    """What all rigs say together."""
+    answered = [row for row in rows if "error" not in row]
+    lines = []
+    for least in SAID:
+        right = [row["law"] in {*row["kept"], *row["limits"]} for row in answered if row["confidence"] >= least]
+        lines.append(f"said at {least:.0%} or more: the truth left out in {right.count(False)} of {len(right)}")
+    described = [row for row in answered if row["confidence"]]
+    odds = sorted(row["odds"][row["law"]] for row in described)
+    lines.append(f"lowest odds of the true law, of {len(odds)}: {', '.join(f'{value:.3g}' for value in odds[:12])}")
+    for key in TRUE:
+        own = [row["said"][key] for row in described if row["best"] == row["law"] and key in row["said"]]
+        if own:
+            true, value, low, high = np.array(own).T
+            off, half = np.abs(value / true - 1), np.where(true < value, value - low, high - value)
+            strays = np.abs(true - value) / np.maximum(half, 1e-300)
+            lines.append(
+                f"{key}: {np.mean(strays <= 1):.0%} of {len(own)} intervals hold, 95 % of them would at "
+                f"{np.quantile(strays, 0.95):.2f} times their width; off by {np.median(off):.2%} (median)"
+            )
+    return lines + [told(row) for row in rows if "error" in row]
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--draws", type=int, default=10, help="rigs of each law")
     parser.add_argument("--first", type=int, default=300, help="seed of the first")
+    parser.add_argument("--keep", type=Path, metavar="FILE")
     options = parser.parse_args()
-    answers: list[tuple[float, bool]] = []
+    kept = options.keep and options.keep.exists()
+    rows = [json.loads(line) for line in options.keep.read_text("utf-8").splitlines()] if kept else []
+    done = {(row["seed"], row["law"]) for row in rows}
     for seed in range(options.first, options.first + options.draws):
         for law in servo.LAWS:
-            begun = time.process_time()
-            try:
-                found = asked(law, seed)
-            except ss.StickslipError as error:
-                print(f"{seed} {law}: refused, {error}", flush=True)
+            if (seed, law) in done:
                 continue
-            possible = {each.name for each in found.candidates if each.standing.kept or each.standing.limit}
-            answers.append((found.confidence, law in possible))
-            spent = time.process_time() - begun
-            print(f"{seed} {law}: {', '.join(found.kept)}, {found.confidence:.3f}, {spent:.1f} s", flush=True)
-    for least in SAID:
-        right = [held for said, held in answers if said >= least]
-        print(f"said at {least:.0%} or more: the truth left out in {right.count(False)} of {len(right)}")
+            rows.append(asked(law, seed))
+            print(told(rows[-1]), flush=True)
+            if options.keep:
+                with options.keep.open("a", encoding="utf-8") as file:
+                    file.write(json.dumps(rows[-1]) + "\n")
+    print("\n".join(summed(rows)))
 
 
 if __name__ == "__main__":

@@ -16,7 +16,7 @@ version = release = __version__
 extensions = [
     "sphinx.ext.autodoc", "sphinx.ext.autosummary", "numpydoc", "myst_parser", "sphinx_gallery.gen_gallery", "offline",
 ]  # fmt: skip
-exclude_patterns = ["_build", "_templates", "examples"]
+exclude_patterns = ["_build", "_templates", "examples", "paper"]
 myst_enable_extensions = ["colon_fence", "deflist", "dollarmath", "substitution"]
 myst_substitutions = {"law_table": importlib.import_module("law_table").table()}
 myst_heading_anchors = 3

@@ -30,7 +30,7 @@ class Servo:
     law : str
         Of LAWS.
     numbers : mapping of str to float
-        Mass, stiffness, damping, and the law's parameters.
+        Mass, stiffness, damping, the law's parameters, and the mean of the sliding friction along the way.
     stated : mapping of str to float
         Mass, stiffness and damping as stated.
     records : tuple of Record
@@ -50,6 +50,16 @@ def _level(x, rough):  # type: ignore[no-untyped-def]
     for k in range(rough.shape[0]):
         total += rough[k, 0] * np.cos(rough[k, 1] * x + rough[k, 2])
     return total
+
+
+@numba.njit
+def _passed(x, rough):  # type: ignore[no-untyped-def]
+    """Mean of the friction over its level along the way, and the way."""
+    total, way = 0.0, 0.0
+    for i in range(x.shape[0] - 1):
+        step = abs(x[i + 1] - x[i])
+        total, way = total + step * _level((x[i] + x[i + 1]) / 2, rough), way + step
+    return total / way, way
 
 
 @numba.njit
@@ -205,7 +215,7 @@ def drawn(law: str, chance: np.random.Generator) -> Servo:
     ])  # fmt: skip
     remembers = LAWS.index(law) >= 3
     steps = STEPS * FINER if remembers else STEPS
-    records = []
+    records, passed = [], []
     bits = int(chance.choice([12, 16]))
     for _ in range(int(chance.integers(1, 4))):
         settle, seconds = 1.0, chance.uniform(5, 9) / natural
@@ -220,6 +230,7 @@ def drawn(law: str, chance: np.random.Generator) -> Servo:
         )
         x, z = march[::steps], z[:: 2 * steps][: len(march[::steps])]
         first = round(settle * fs)
+        passed.append(_passed(x[first:], rough))
         noise = size * 10 ** chance.uniform(-3.7, -2.7)
         written = {}
         for name, values in (("x", x[first:]), ("z", z[first:])):
@@ -232,6 +243,8 @@ def drawn(law: str, chance: np.random.Generator) -> Servo:
         "stiffness": stiffness * (1 + 0.005 * chance.standard_normal()),
         "damping": true * np.exp(chance.uniform(np.log(0.1), np.log(10.0))),
     }
+    means, ways = np.array(passed).T
+    numbers["level"] = kinetic * float(means @ ways / ways.sum())
     return Servo(
         law,
         {name: float(value) for name, value in numbers.items()},

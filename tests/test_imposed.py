@@ -15,6 +15,65 @@ HEAVY = 1e21  # kg: a mass that the contact can not move, so that start and coun
 ORDER = 40  # Gauss points on each half of a piece
 
 
+def imposed(law: Any, drive: Any, *, mass: float = 1.0, stiffness: float = 0.0) -> ss.Oscillator:
+    """A mass that moves as a drive says, whatever its spring and the law do."""
+    return ss.Oscillator(mass=mass, stiffness=stiffness, law=law, drive=ss.drives.Imposed(drive))
+
+
+@pytest.mark.parametrize(("mass", "stiffness"), [(1.0, 0.0), (2.42, 2310.0)])
+def test_an_imposed_motion_is_had_and_its_loop_is_the_jenkins_elements(mass: float, stiffness: float) -> None:
+    law, drive = ss.laws.CompliantContact(1.1, stiffness=192_000.0), ss.drives.HarmonicBase(20e-6, frequency=2.5)
+    run = ss.simulate(imposed(law, drive, mass=mass, stiffness=stiffness), cycles=3)
+    times = np.linspace(0.4, 0.8, 40_001)
+    (x, v, friction), _ = run.sample(times, ("x", "v", "friction"))
+    assert x == pytest.approx(20e-6 * np.cos(5 * math.pi * times), abs=1e-18)
+    assert v == pytest.approx(-1e-4 * math.pi * np.sin(5 * math.pi * times), abs=1e-16)
+    assert np.trapezoid(friction, x) == pytest.approx(4 * 1.1 * (20e-6 - 1.1 / 192_000), rel=1e-7)
+    assert ss.steady_state(imposed(law, drive)).amplitude == pytest.approx(20e-6, rel=1e-12)
+
+
+def test_a_chain_under_an_imposed_motion_is_that_on_a_moving_face_under_a_heavy_mass() -> None:
+    law = ss.laws.InSeries(ss.laws.Tabulated([0.0, 0.1, 0.2], [1.25, 1.0, 1.0]), stiffness=1e5, damping=50.0)
+    moved = ss.Oscillator(mass=HEAVY, stiffness=0, law=law, drive=ss.drives.MultiTone([(-2e-5, 2.5, 0.0)], on="face"))
+    times = np.linspace(0.4, 1.2, 5001)
+    both = [
+        ss.simulate(system, cycles=3).sample(times, ("friction",))[0][0]
+        for system in (moved, imposed(law, ss.drives.HarmonicBase(2e-5, frequency=2.5)))
+    ]
+    assert both[0] == pytest.approx(both[1], abs=1e-12)
+
+
+def test_any_motion_without_jumps_of_its_velocity_can_be_imposed() -> None:
+    law, way = ss.laws.CompliantContact(1.1, stiffness=192_000.0), 2e-5 * np.sin(np.arange(60) / 5)
+    times = np.arange(50) / 50
+    for drive, expected in (
+        (ss.drives.Recorded(way, fs=50.0), way[:50]),
+        (ss.drives.Ramp(1e-4), 1e-4 * times),
+        (ss.drives.SpeedProfile([0.0, 1.0], [0.0, 1e-4]), 5e-5 * times**2),
+        (ss.drives.MultiTone([(1e-5, 2.0, 0.0), (1e-6, 30.0, 0.0)]), None),
+    ):
+        x = ss.simulate(imposed(law, drive), duration=1.0).sample(times, ("x",))[0][0]
+        if expected is None:
+            expected = 1e-5 * np.cos(4 * math.pi * times) + 1e-6 * np.cos(60 * math.pi * times)
+        assert x == pytest.approx(expected, abs=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("make", "words"),
+    [
+        (lambda: imposed(ss.laws.Coulomb(1.0), ss.drives.Ramp(1.0)), "Coulomb.*rigid contact.*CompliantContact"),
+        (lambda: imposed(ss.laws.Dahl(1.0, stiffness=1e5), ss.drives.Ramp(1.0)), "Dahl.*linear modes"),
+        (lambda: ss.drives.Imposed(ss.drives.Belt(1.0)), "Belt imposed.*base alone"),
+        (lambda: ss.drives.Imposed(ss.drives.HarmonicBase(1.0, 1.0, contact="base")), "base alone"),
+        (lambda: ss.drives.Imposed(ss.drives.Recorded([0.0, 1, 0, 1], fs=1.0, order=1)), "jumps.*order=3"),
+        (lambda: ss.Structure([[1]], [[0]], [[0]], drive=ss.drives.Imposed(ss.drives.Ramp(1.0))), "one mass"),
+    ],
+)
+def test_what_can_not_be_imposed_is_refused(make: Any, words: str) -> None:
+    with pytest.raises(ss.errors.ModelError, match=words):
+        make()
+
+
 def means(law: Any, amplitude: float, *, speed: float = 0.0) -> tuple[float, float, float]:
     """Mean friction [N], its part along the way (f cos) and energy [J] over a cycle of dither of angular rate 1.
 
@@ -123,6 +182,27 @@ def test_a_trapezoid_of_the_base_moves_as_its_closed_form() -> None:
     after = np.clip(5.0 - np.array(times), 0, None)
     known = kinks @ (after**2 / 2 - (1 - np.cos(omega * after)) / omega**2)
     assert run.state(5.0)["x"] == pytest.approx(known, rel=1e-13)
+
+
+@pytest.mark.parametrize("rod", [None, 0.2, 0.076])
+def test_a_crank_moves_as_its_closed_form(rod: float | None) -> None:
+    radius, frequency, phase = 0.05, 2.0, 0.3
+    drive = ss.drives.Crank(radius, frequency=frequency, rod=rod, phase=phase)
+    slider = ss.Oscillator(mass=1.0, stiffness=1e3, law=ss.laws.Coulomb(1.0), drive=drive)
+    times = np.linspace(0, 1 / frequency, 501)
+    z = ss.simulate(slider, cycles=1).sample(times, ("z",))[0][0]
+    turned = 2 * math.pi * frequency * times + phase
+    expected = radius * np.cos(turned)
+    if rod is not None:
+        reach = np.sqrt(rod**2 - (radius * np.sin(turned)) ** 2)
+        expected = expected + reach - np.mean(reach[:-1])
+    assert z == pytest.approx(expected, abs=1e-8 * radius)
+    assert drive.motion().period == pytest.approx(1 / frequency)
+
+
+def test_a_rod_that_is_too_short_is_refused() -> None:
+    with pytest.raises(ss.errors.ModelError, match="longer rod"):
+        ss.drives.Crank(0.05, frequency=2.0, rod=0.06)
 
 
 @pytest.mark.parametrize(

@@ -254,3 +254,7 @@ def test_a_name_that_is_unknown_is_answered_with_the_nearest() -> None:
     assert len(str(caught.value)) < 200
     with pytest.raises(AttributeError, match=r"dir\(stickslip\) lists"):
         _ = ss.qqqqqqqq
+
+
+def test_a_room_above_the_face_is_an_attribute_too() -> None:
+    assert "STEPS" in dir(ss.bench)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from stickslip.law.trials import Rests
+from stickslip.law.trials import FALLS, Rests
 
 FS, FREQUENCY, TOP, HOLD = 4000, 2.5, 0.016, 0.055  # Hz, Hz, m/s, s of each stick
 LEVEL, EXCESS, SPEED = 0.95, 0.2, 5e-3
@@ -14,7 +14,7 @@ LEVEL, EXCESS, SPEED = 0.95, 0.2, 5e-3
 def rests(law: str, seed: int, *, roughness: float = 0.03, excess: float = EXCESS, factor: float = 1.0) -> Rests:
     """Four strokes: a stick in which the friction grows, a release, a slide of half a sine."""
     chance = np.random.default_rng(seed)
-    speed, friction = [], []
+    speeds, friction = [], []
     for stroke in range(5):
         side = (-1) ** stroke
         sliding = TOP * np.sin(np.linspace(0, np.pi, int(FS * (0.5 / FREQUENCY - HOLD)))) ** 1.5
@@ -22,10 +22,10 @@ def rests(law: str, seed: int, *, roughness: float = 0.03, excess: float = EXCES
         static = LEVEL * (1 + excess * (law != "Coulomb"))
         curve = LEVEL * (1 + excess * np.exp(-((sliding / SPEED) ** 2)) * (law == "Stribeck"))
         held = np.linspace(-0.4 * LEVEL, static, int(FS * HOLD))
-        speed += [np.zeros(len(held)), side * sliding]
+        speeds += [np.zeros(len(held)), side * sliding]
         friction += [side * held, side * curve * (1 + roughness * rough / rough.std())]
     return Rests.of(
-        factor * np.concatenate(speed), factor * np.concatenate(friction), fs=FS,
+        factor * np.concatenate(speeds), factor * np.concatenate(friction), fs=FS,
         frequency=2 * np.pi * FREQUENCY, unsure=0.0,
     )  # fmt: skip
 
@@ -58,3 +58,21 @@ def test_sliding_without_a_stop_tells_nothing() -> None:
     found = Rests.of(TOP * np.sin(100 * time), LEVEL * np.sign(np.sin(100 * time)), fs=FS, frequency=100.0, unsure=0.0)
     assert found.fall is None
     assert found.probabilities(0.01, 0.03) == pytest.approx(dict.fromkeys(("Coulomb", "static", "Stribeck"), 1 / 3))
+
+
+def test_a_reversal_between_two_samples_ends_a_stroke() -> None:
+    """A stroke went on through it, and the friction of the next one was taken for that of slow sliding: -2 levels."""
+    time = np.arange(600) / 300
+    speed = TOP * np.sin(2 * np.pi * 5 * time + 0.3)
+    found = Rests.of(speed, LEVEL * np.sign(speed), fs=300, frequency=10 * np.pi, unsure=0.0)
+    assert not len(found.rises)
+    assert found.probabilities(0.01, 0.03) == pytest.approx(dict.fromkeys(("Coulomb", "static", "Stribeck"), 1 / 3))
+
+
+def test_a_curve_that_falls_within_the_corner_is_not_told_from_static_friction() -> None:
+    """A jump spoke against a curve however quickly that was run through: odds of 1e-28 on a rig whose law it was."""
+    jumps, none = np.full(4, 0.3), np.empty((0, len(FALLS)))
+    told = Rests(jumps, np.ones((4, len(FALLS))), none[:, 0], none, np.full(4, 0.03)).probabilities(0.01, 0.03)
+    assert told["Stribeck"] == pytest.approx(told["static"])
+    slow = Rests(jumps, np.zeros((4, len(FALLS))), none[:, 0], none, np.full(4, 0.03)).probabilities(0.01, 0.03)
+    assert slow["Stribeck"] < 1e-6

@@ -44,13 +44,15 @@ smooth = ss.Oscillator(mass=1.0, stiffness=4.0, law=ss.laws.SmoothStateVariable(
 pad = ss.Contact(ss.laws.Coulomb(0.6), [1, 0], normal=[0, 1], stiffness=11.0, preload=5.0)
 squeal = ss.Structure([[1, 0], [0, 1]], [[0, 0], [0, 0]], [[2, 0], [0, 2]], contacts=[pad], drive=ss.drives.Belt(0.8))
 drives: list[ss.Oscillator] = [
-    stribeck.having(drive=drive)
+    laws[1].having(drive=drive)
     for drive in (
         ss.drives.Release(), ss.drives.HarmonicBase(1e-3, frequency=2.5), ss.drives.HarmonicForce(1.0, frequency=2.5),
         ss.drives.MultiTone([(1.0, 2.0, 0.0)]), ss.drives.Belt(0.1), ss.drives.Ramp(0.1),
+        ss.drives.Crank(0.05, frequency=2.0, rod=0.2),
         ss.drives.Recorded([0.0, 1.0, 0.0, 1.0], fs=10.0),
         ss.drives.SpeedProfile([0.0, 1.0], [0.0, 0.1]),
         ss.drives.Later(ss.drives.Belt(0.1), 1.0),
+        ss.drives.Later(ss.drives.Imposed(ss.drives.Ramp(0.1)), 1.0),
         ss.drives.Dithered(ss.drives.Belt(0.1), amplitude=1e-5, frequency=200.0),
     )
 ]

@@ -15,9 +15,10 @@ import stickslip as ss
 from stickslip.cli.program import main
 from stickslip.figures.law import law_plates
 from stickslip.law.search import Knob, Problem
+from stickslip.law.standing import CERTAIN, Evidence, Misfit, seen_above, standings
 from stickslip.law.start import Shown
 from stickslip.law.stretch import channels_of
-from stickslip.law.surety import CERTAIN, Evidence, Misfit, _end, standings
+from stickslip.law.surety import _end
 from stickslip.law.trials import Seen
 from stickslip.laws.guessing import hypotheses
 from stickslip.record.record import Step
@@ -85,6 +86,21 @@ def test_a_family_is_found_through_wrong_gains(name: str) -> None:
     assert (found.law, found.family) == (name, name)
     assert found.candidates[1].standing.misfit > 5
     assert found.status == "ok"
+
+
+def test_the_best_law_says_what_it_leaves() -> None:
+    """It was called the friction's law, and its verdict was "best", whatever it left of the motion."""
+    lagging = ss.Oscillator(
+        law=ss.laws.SmoothStateVariable(1.0, rate=60.0, steepness=2000.0),
+        drive=ss.drives.HarmonicBase(1.1e-3, frequency=2.5), **RIG,
+    )  # fmt: skip
+    rig = ss.Rig.perfect("x", "z").having("x", white=1e-6).having("z", white=1e-6)
+    record = rig.measure(ss.simulate(lagging, duration=3.0), fs=500, rng=1, start=1.0)
+    found = ss.compare_laws(record, slider(), laws=["Coulomb"], nuisance=[])
+    share = found.best.left["x"] / float(np.std(found.fit.traces[0].measured["x"]))
+    assert 0.05 < share < 0.3
+    assert found.best.standing.verdict == f"best of those tried, leaves {share:.0%} of x"
+    assert found.verdict.startswith(f"The best of those tried leaves {share:.0%} of x. Among them the friction is")
 
 
 def test_a_damper_that_is_understated_makes_no_other_law() -> None:
@@ -163,6 +179,14 @@ def test_confidence_grows_with_the_misfit_of_the_others() -> None:
     assert levels == sorted(levels)
     assert 0.95 < levels[0] < 0.99 < levels[2]
     assert levels[-1] <= CERTAIN
+
+
+def test_no_more_is_said_than_rigs_of_known_laws_have_shown() -> None:
+    """Of as many rigs as had worse odds for the truth than a law that is rejected, and one more for the rig itself."""
+    assert seen_above(0.0) == CERTAIN
+    levels = [seen_above(odds) for odds in (0.0, 0.01, 0.05, 0.2, 1.0)]
+    assert levels == sorted(levels, reverse=True)
+    assert levels[-1] < levels[0] < 1
 
 
 def test_one_of_two_that_are_left_is_surer_than_either() -> None:
@@ -311,6 +335,18 @@ def test_forces_are_no_surer_than_the_bases_calibration() -> None:
     level = found.fit.parameters["kinetic"]
     assert 0.02 * level.value <= level.sd <= 0.02 * 2**0.5 * level.value
     assert found.fit.parameters["x.gain"].sd < 0.02 / 2**0.5 * 1.1
+
+
+def test_forces_are_no_surer_than_the_mass_where_no_cell_feels_them() -> None:
+    """The spring follows the mass that is stated, by the frequency; its interval was a fiftieth of what that is off."""
+    told = record("Coulomb", frequency=6.0)
+    moved = ss.Record.of({name: told[name] for name in "xz"}, fs=FS)
+    found = ss.compare_laws(moved, slider().having(mass=0.985 * RIG["mass"]), laws=["Coulomb"], calibration=0.01)
+    spring, level = found.fit.parameters["stiffness"], found.fit.parameters["kinetic"]
+    assert spring.value == pytest.approx(0.985 * RIG["stiffness"], rel=0.005)
+    assert spring.includes(RIG["stiffness"])
+    assert level.includes(0.95)
+    assert level.sd >= 0.01 * 2**0.5 * level.value
 
 
 def test_a_nuisance_of_no_channel_is_refused() -> None:

@@ -42,6 +42,8 @@ class Oscillator:
                 f"law = {self.law!r}", "a mass rubs under a friction law", "give one, as law=Coulomb(1.1)"
             ).of("law")
         require_drive(self.drive)
+        if self.drive.motion().imposed:
+            _require_given_way(self.law)
 
     @property
     def frequency(self) -> float:
@@ -62,3 +64,18 @@ class Oscillator:
         Oscillator
         """
         return changed(self, changes)
+
+
+def _require_given_way(law: Law | CurvedLaw) -> None:
+    """Refuse a law under an imposed motion that would hold the mass, or whose branches are curved."""
+    name = type(law).__name__
+    if not hasattr(law, "modes"):
+        raise ModelError(
+            f"{name} under an imposed motion", "it takes a law of linear modes",
+            "move the counter-face under a heavy mass, or make a polygon of the curve with Tabulated.of()",
+        ).of("law")  # fmt: skip
+    if any(mode.friction is None for mode in law.modes()):
+        raise ModelError(
+            f"{name} under an imposed motion", "a rigid contact would hold the mass against it",
+            "put a spring before it: CompliantContact(), or InSeries() of this law",
+        ).of("law")  # fmt: skip

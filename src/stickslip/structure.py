@@ -232,6 +232,10 @@ class Structure:
             ).of("contacts")
         object.__setattr__(self, "contacts", tuple(self.contacts))
         require_drive(self.drive)
+        if self.drive.motion().imposed:
+            raise ModelError(
+                "a structure under an imposed motion", "a motion is imposed on one mass", "give an Oscillator"
+            ).of("drive")
         _require_directions(self.contacts, size)
         share = np.ones(size) if self.acts_on is None else _direction("acts_on", self.acts_on)
         if share.shape != (size,):

@@ -164,15 +164,14 @@ def _of_orbit(orbit: ss.solve.SteadyState) -> str:
 
 
 def imposed(law: Any, memory: tuple[str, ...] = ()) -> tuple[Array, dict[str, Array]]:
-    """A contact under an imposed motion x = -cos t, from turn to turn: a mass that no contact can move, on a moving
-    counter-face."""
-    drive = ss.drives.MultiTone([(1.0, 1 / (2 * math.pi), 0.0)], on="face")
-    run = ss.simulate(ss.Oscillator(mass=1e21, stiffness=0, law=law, drive=drive), cycles=3)
+    """A contact under the imposed motion x = -cos t, from turn to turn."""
+    drive = ss.drives.Imposed(ss.drives.HarmonicBase(-1.0, frequency=1 / (2 * math.pi)))
+    run = ss.simulate(ss.Oscillator(mass=1, stiffness=0, law=law, drive=drive), cycles=3)
     turn = 2 * math.pi
-    times, motion = exact(run, first=turn, last=2 * turn, names=("slip", "friction", *memory))
+    times, motion = exact(run, first=turn, last=2 * turn, names=("x", "v", "friction", *memory))
     sliding_now = np.array([mode.kind == "slip" for mode in run.table.modes])[run.modes]
     piece = np.searchsorted(run.starts, times, side="right") - 1
-    return times - turn, {"x": -np.cos(times), "v": motion["slip"], **motion, "sliding": sliding_now[piece]}
+    return times - turn, {**motion, "sliding": sliding_now[piece]}
 
 
 def _two_phases(ax: Axes, across: Array, up: Array, sliding_now: Array) -> None:

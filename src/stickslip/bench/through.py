@@ -23,7 +23,7 @@ from stickslip.drives.kinds import HarmonicBase, Release
 from stickslip.estimate import Estimate, Result
 from stickslip.files.read import read_record
 from stickslip.files.write import write_record
-from stickslip.law.which_law import LawComparison
+from stickslip.law.verdict import LawComparison
 from stickslip.record.log import Log
 from stickslip.record.record import Record
 from stickslip.rig.rig import Rig

@@ -18,6 +18,8 @@ from stickslip.errors import INTERRUPTED
 if TYPE_CHECKING:
     from stickslip.systems import Case
 
+CASE = click.argument("case", metavar="SCENARIO|FILE.toml")
+
 
 @click.command()
 @click.argument("file", type=click.Path(path_type=Path))
@@ -60,9 +62,6 @@ def sweep(file: Path, engine: str, store: Path | None, output: Path | None, as_j
     if not whole:
         say("Call again to go on.")
         raise SystemExit(INTERRUPTED)
-
-
-CASE = click.argument("case", metavar="SCENARIO|FILE.toml")
 
 
 @click.command()

@@ -38,6 +38,8 @@ _SPOKEN = (
         r"--\1",
     ),
 )
+# Of each kind of error the options without which the command may succeed.
+CAUSES = {MISSTATED: ("--delimiter", "--decimal"), TOO_SHORT: ("--rows",)}
 
 
 def spoken(words: object) -> str:
@@ -52,10 +54,6 @@ def spoken(words: object) -> str:
     for said, option in _SPOKEN:
         text = re.sub(said, option, text)
     return text
-
-
-# Of each kind of error the options without which the command may succeed.
-CAUSES = {MISSTATED: ("--delimiter", "--decimal"), TOO_SHORT: ("--rows",)}
 
 
 def mended(arguments: Sequence[str], error: StickslipError) -> Iterator[str]:

@@ -1,7 +1,9 @@
 from stickslip.drives.kinds import Belt as Belt
+from stickslip.drives.kinds import Crank as Crank
 from stickslip.drives.kinds import Dithered as Dithered
 from stickslip.drives.kinds import HarmonicBase as HarmonicBase
 from stickslip.drives.kinds import HarmonicForce as HarmonicForce
+from stickslip.drives.kinds import Imposed as Imposed
 from stickslip.drives.kinds import MultiTone as MultiTone
 from stickslip.drives.kinds import Ramp as Ramp
 from stickslip.drives.kinds import Recorded as Recorded

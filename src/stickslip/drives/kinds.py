@@ -19,6 +19,9 @@ Row = Mapping[str, float]
 LARGEST_FREQUENCY = 1e10  # Hz; more is a wrong unit
 LONGEST = 1000  # cycles of a tone in a period; by more, any two numbers nearly have one
 MOST_SAMPLES = 2**20  # of a signal that is given as a function
+CRANKED = 256  # places of a turn from which a crank's cosines come: of the shortest rod the 256th is below 1e-100
+FAINTEST = 1e-10  # of a crank's length: fainter cosines are left out
+SHORTEST_ROD = 1.5  # times the crank: a shorter one nearly stops at its dead centre, and has cosines without end
 SAME = 1e-9  # of a frequency: so near a ratio of whole numbers is one
 
 
@@ -38,6 +41,8 @@ class Motion:
         Period [s]; infinite where the drive does not repeat.
     force, base, face : mapping of str to float
         Force on the mass [N], displacement of the spring's end [m], displacement of the counter-face [m].
+    imposed : mapping of str to float
+        Displacement that the mass itself has [m], whatever acts on it.
     knots : ndarray or None
         Times [s] (first column) at which the signals in `knotted` take new values (further columns).
     knotted : tuple of str
@@ -53,6 +58,7 @@ class Motion:
     force: Row = field(default_factory=dict)
     base: Row = field(default_factory=dict)
     face: Row = field(default_factory=dict)
+    imposed: Row = field(default_factory=dict)
     knots: NDArray[np.float64] | None = None
     knotted: tuple[str, ...] = ()
     end: float = math.inf
@@ -241,6 +247,61 @@ class MultiTone:
         if self.on == "base":
             return _moved(motion, base=row, face=row if self.contact == "base" else {})
         return _moved(motion, force=row) if self.on == "force" else _moved(motion, face=row)
+
+
+@parametric
+class Crank:
+    r"""A motor turns a crank whose rod moves the spring's end: strokes that no shaker has (thesis, section 8.2).
+
+    .. math:: z = r \cos\theta + \sqrt{l^2 - r^2 \sin^2\theta} - \bar z, \qquad \theta = 2\pi F t + \varphi
+
+    less its mean, as a sum of cosines up to a ten-thousand-millionth of the crank. Without a rod it is a Scotch yoke,
+    whose motion is one cosine.
+
+    Raises
+    ------
+    ModelError
+        A rod that is too short to pass over the crank evenly.
+
+    Examples
+    --------
+    >>> len(Crank(0.05, frequency=2.0).motion().tones), len(Crank(0.05, frequency=2.0, rod=0.2).motion().tones)
+    (1, 6)
+    """
+
+    label = "Crank, or Scotch yoke"
+
+    radius: float = parameter("m", "length of the crank", positive=True, note="r: half of the stroke")
+    frequency: float = parameter("Hz", "turns in a second", positive=True, note="F")
+    rod: float | None = parameter(
+        "m", "length of the connecting rod", default=None, positive=True, note="l; left out: a Scotch yoke"
+    )
+    phase: float = parameter("rad", "phase", default=0.0, signed=True)
+
+    def __post_init__(self) -> None:
+        _require(
+            self.rod is None or self.rod >= SHORTEST_ROD * self.radius,
+            f"rod = {self.rod} m on a crank of {self.radius:g} m",
+            f"a rod is at least {SHORTEST_ROD:g} times as long as its crank",
+            "give a longer rod=, or none for a Scotch yoke",
+            of="rod",
+        )
+        self.motion()
+
+    def tones(self) -> list[tuple[float, float, float]]:
+        """Amplitude [m], frequency [Hz] and phase [rad] of every cosine."""
+        turned = 2 * math.pi * np.arange(CRANKED) / CRANKED
+        z = self.radius * np.cos(turned)
+        if self.rod is not None:
+            z = z + np.sqrt(self.rod**2 - (self.radius * np.sin(turned)) ** 2)
+        cosines = 2 * np.fft.rfft(z).real / CRANKED
+        kept = [k for k in range(1, CRANKED // 2) if abs(cosines[k]) > FAINTEST * self.radius]
+        return [(float(cosines[k]), k * self.frequency, k * self.phase) for k in kept]
+
+    def motion(self) -> Motion:
+        """A turning pair for every cosine."""
+        motion, row = _tones(self.tones())
+        return _moved(motion, base=row)
 
 
 @parametric
@@ -528,6 +589,55 @@ class SpeedProfile:
         steps = np.diff(times)
         ways = np.cumsum([0.0, *(steps * (speeds[1:] + speeds[:-1]) / 2)])
         return _pieces(times, [ways, speeds, [*(np.diff(speeds) / steps), 0.0]], self.on)
+
+
+@parametric
+class Imposed:
+    r"""The mass itself moves as a drive would move the spring's end: what a contact does under it, and no more.
+
+    The friction of a motion that is known beforehand (thesis, sections 3.3 and 4.5): :math:`x(t)` is imposed, mass,
+    spring and damper play no part, and the law gives :math:`f(t)`. It takes a law of linear modes whose contact gives
+    way; one that holds the mass would hold the motion.
+
+    Raises
+    ------
+    ModelError
+        A drive that moves no base, or one whose velocity jumps.
+
+    Examples
+    --------
+    >>> Imposed(HarmonicBase(1e-3, frequency=2.5)).motion().imposed
+    {'cos0': 0.001}
+    """
+
+    label = "Motion of the mass, imposed"
+
+    drive: Drive = parameter("", "whose motion of the base the mass has")
+
+    def __post_init__(self) -> None:
+        require_drive(self.drive)
+        own = self.drive.motion()
+        _require(
+            bool(own.base) and not own.force and not own.face,
+            f"{type(self.drive).__name__} imposed",
+            "a motion that is imposed is one of a base alone",
+            'give a drive with on="base" and contact="ground", as HarmonicBase(1e-3, frequency=2.5)',
+            of="drive",
+        )
+        rates = {name for name in own.base for name in own.rates.get(name, {})}
+        jumps = own.knots is not None and any(name in own.knotted and not own.rates[name] for name in rates)
+        _require(
+            not jumps,
+            f"{type(self.drive).__name__} of straight pieces, imposed",
+            "a mass has no jumps of its velocity",
+            "use order=3",
+            of="drive",
+        )
+
+    def motion(self) -> Motion:
+        """The drive's signals, its base's displacement as the mass's own."""
+        own = self.drive.motion()
+        return replace(own, base={}, imposed=own.base)
 
 
 @parametric

@@ -57,12 +57,6 @@ if TYPE_CHECKING:
 
     from stickslip.consistent.contradictions import Consistency
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
-    from stickslip.consistent.contradictions import Consistency
-
 COLOURS = {"holds": BLUE, "fails": ORANGE, "can not be told": FAINT}
 
 

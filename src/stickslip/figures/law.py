@@ -26,7 +26,7 @@ from stickslip.figures.style import (
 )
 from stickslip.law.fit_curve import CurveFit
 from stickslip.law.law import LawFit
-from stickslip.law.which_law import LawComparison
+from stickslip.law.verdict import LawComparison
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

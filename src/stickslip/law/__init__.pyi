@@ -4,6 +4,6 @@ from stickslip.law.load import LoadLine as LoadLine
 from stickslip.law.load import friction_over_load as friction_over_load
 from stickslip.law.memory import FrictionMemory as FrictionMemory
 from stickslip.law.memory import friction_memory as friction_memory
-from stickslip.law.which_law import LawComparison as LawComparison
+from stickslip.law.verdict import LawComparison as LawComparison
 
 __all__: list[str]

@@ -312,9 +312,10 @@ def descend(
     passes: int = PASSES,
     settled: float = SETTLED,
     share: float = SHARE,
+    enough: float = -math.inf,
     tell: Callable[[], None] | None = None,
 ) -> Point:
-    """Levenberg and Marquardt's descent, each stretch's start eliminated from the common step.
+    """Levenberg and Marquardt's descent, each stretch's start eliminated from the common step; no lower than `enough`.
 
     Those of a curved law cost ten steps: after one that brought what was foretold they are mended by it (Broyden's
     secants) instead of found anew, but for the last step.
@@ -334,6 +335,8 @@ def descend(
             if tried.chi2 < point.chi2 or not fresh:
                 break
             damping *= 10
+        if tried.chi2 <= enough:
+            return tried
         lowered = point.chi2 - tried.chi2
         mended, foretold = secant(slopes, point, tried) if lowered > 0 else (None, math.inf)
         trusted = curved and lowered > KEPT * foretold

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -16,9 +17,9 @@ from stickslip.errors import EstimateError
 from stickslip.estimate import NORMAL_95, Estimate
 from stickslip.law.drive import Sampled, as_driven, face_of
 from stickslip.law.search import Knob, Point, Problem, descend, rows_of
+from stickslip.law.standing import Evidence, Key, independent
 from stickslip.law.start import Shown, bounded, free_names, knob, nuisance_knobs, thinned
 from stickslip.law.stretch import Motion, Stretch, attempted
-from stickslip.law.surety import Evidence, Key, independent
 from stickslip.laws.guessing import LEAST_EXCESS, STIFF, STIFFEST, Observed
 from stickslip.oscillator import Oscillator
 from stickslip.record.record import Record
@@ -348,7 +349,9 @@ def _excess(speed: Array, friction: Array, level: float, rests: Rests) -> float:
 def _rests(told: Record, speed: Array, friction: Array, way: Array) -> Rests:
     unsure = float(np.median(told["v_sd"])) if "v_sd" in told else 0.0
     frequency = float(np.std(speed)) / max(float(np.std(way)), 1e-300)
-    return Rests.of(speed, friction, fs=told.fs, frequency=frequency, unsure=unsure)
+    width = told.rig.bandwidth if told.rig else None
+    blur = math.ceil(told.fs / (2 * width)) if width else 1
+    return Rests.of(speed, friction, fs=told.fs, frequency=frequency, unsure=unsure, blur=blur)
 
 
 def _told(record: Record, oscillator: Oscillator) -> Record:
@@ -367,6 +370,8 @@ class Rests:
     ----------
     falls : ndarray (n,)
         Of each release: by how much the friction falls at once.
+    sinks : ndarray (n, 16)
+        What a Stribeck curve of excess 1 falls there as quickly, for each v_s of FALLS.
     rises : ndarray (q,)
         Of each start and each end of a stroke: by how much it is larger in slow sliding.
     shapes : ndarray (q, 16)
@@ -376,16 +381,22 @@ class Rests:
     """
 
     falls: Array
+    sinks: Array
     rises: Array
     shapes: Array
     strays: Array
 
     @classmethod
-    def of(cls, speed: Array, friction: Array, *, fs: float, frequency: float, unsure: float) -> Rests:
-        """Those of one record; `unsure` [m/s] is the speed's deviation, `frequency` [rad/s] the motion's."""
+    def of(cls, speed: Array, friction: Array, *, fs: float, frequency: float, unsure: float, blur: int = 1) -> Rests:
+        """Those of one record; `unsure` [m/s] is the speed's deviation, `frequency` [rad/s] the motion's.
+
+        A fall is not told where smoothing spreads it beyond its corner (`blur` samples), or where the motion goes on
+        while its samples pass: at 60 samples a cycle even a friction of one level seemed to fall by its own size.
+        """
+        sudden = blur <= CORNER and AFTER / fs * frequency < HELD
         top = float(np.abs(speed).max())
         still = max(AT_REST * top, NOISY * unsure)
-        falls, rises, shapes, strays = [], [], [], []
+        falls, sinks, rises, shapes, strays = [], [], [], [], []
         ended = None
         for first, last in _strokes(speed, still, FAST * top):
             side = np.sign(speed[(first + last) // 2])
@@ -399,19 +410,23 @@ class Rests:
             begins, ends = (first, first + int(swift[0])), (first + int(swift[-1]) + 1, last)
             whole = (ended is not None, last < len(speed) - LEAST)
             for (a, b), seen in zip((begins, ends), whole, strict=True):
-                if seen and b - a >= FEW and still < CREEPING * top:
+                if seen and b - a >= max(FEW, 2 * blur) and still < CREEPING * top:
                     rises.append(float(side * friction[a:b].mean()) / level - 1)
-                    shapes.append(np.exp(-((speed[a:b, None] / (FALLS * top)) ** 2)).mean(axis=0))
+                    shapes.append(_stribeck(speed[a:b] / top))
             held = first - (first if ended is None else ended)
-            if held >= max(LEAST, HELD / frequency * fs) and first + LEAST <= len(speed):
-                falls.append(_fall(side * friction[first - held // 2 : first + LEAST], held // 2) / level)
+            if sudden and held >= max(LEAST, HELD / frequency * fs) and first + LEAST <= len(speed):
+                begun = first - held // 2
+                fall, after = _fall(side * friction[begun : first + LEAST], held // 2)
+                falls.append(fall / level)
+                sinks.append(1 - _stribeck(speed[begun:][after] / top))
             ended = last
-        return cls(np.array(falls), np.array(rises), np.array(shapes).reshape(-1, len(FALLS)), np.array(strays))
+        curves = (np.array(each).reshape(-1, len(FALLS)) for each in (sinks, shapes))
+        return cls(np.array(falls), next(curves), np.array(rises), next(curves), np.array(strays))
 
     @classmethod
     def together(cls, parts: Sequence[Rests]) -> Rests:
         """Those of several records."""
-        names = ("falls", "rises", "shapes", "strays")
+        names = ("falls", "sinks", "rises", "shapes", "strays")
         return cls(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))
 
     @property
@@ -430,12 +445,13 @@ class Rests:
 
         With J the fall at a release and R the rise in slow sliding, both over the level: Coulomb has J = R = 0; static
         friction that exceeds by e has J = e, R = 0; a Stribeck curve J = 0, :math:`R = e \exp(-(v/v_s)^2)`. An excess
-        below `least` is not asked for. What was not seen speaks for none.
+        below `least` is not asked for. What was not seen speaks for none. Where the speed has run through a curve when
+        the friction after a release is told, J is what that has fallen by.
         """
-        fall, rise, shape = 0.0, 0.0, np.ones(len(FALLS))
+        fall, rise, sink, shape = 0.0, 0.0, np.zeros(len(FALLS)), np.ones(len(FALLS))
         sharp, slow = np.inf, np.inf
         if self.fall is not None:
-            fall, sharp = float(np.median(self.falls)), self.fall.sd
+            fall, sharp, sink = float(np.median(self.falls)), self.fall.sd, np.median(self.sinks, axis=0)
         if len(self.rises) > 1:
             scatter = max(float(np.std(self.rises, ddof=1)), float(np.median(self.strays)))
             slow = float(np.hypot(scatter / len(self.rises) ** 0.5, max(ROUNDED, GAINS * calibration)))
@@ -445,10 +461,17 @@ class Rests:
         found = {
             "Coulomb": still * flat,
             "static": flat * _likely((fall - asked) / sharp),
-            "Stribeck": still * _likely((rise - np.outer(asked, shape)) / slow),
+            "Stribeck": _likely(
+                np.hypot((fall - np.outer(asked, sink)) / sharp, (rise - np.outer(asked, shape)) / slow)
+            ),
         }
         total = sum(found.values())
         return {name: each / total if total > 0 else 1 / len(found) for name, each in found.items()}
+
+
+def _stribeck(speeds: Array) -> Array:
+    """Mean of Stribeck's curve at speeds over the largest one, for each v_s of FALLS."""
+    return np.asarray(np.exp(-((speeds[:, None] / FALLS) ** 2)).mean(axis=0))
 
 
 def _likely(strays: Array | float) -> float:
@@ -463,24 +486,27 @@ def _middle(values: Array, strays: Array) -> tuple[float, float]:
 
 
 def _strokes(speed: Array, still: float, fast: float) -> list[tuple[int, int]]:
-    """First and last row of each slide in which the mass becomes fast."""
-    moving = np.concatenate([[0], (np.abs(speed) > still).astype(int), [0]])
-    edges = np.flatnonzero(np.diff(moving))
-    return [(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True) if np.abs(speed[a:b]).max() > fast]
+    """First and last row of each slide one way in which the mass becomes fast."""
+    way = np.concatenate([[0.0], np.sign(speed) * (np.abs(speed) > still), [0.0]])
+    edges = np.flatnonzero(np.diff(way))
+    slides = [(int(a), int(b)) for a, b in itertools.pairwise(edges) if way[a + 1]]
+    return [(a, b) for a, b in slides if np.abs(speed[a:b]).max() > fast]
 
 
-def _fall(friction: Array, held: int) -> float:
-    """By what the friction is less after a release than the line that it followed until then; the release is searched.
+def _fall(friction: Array, held: int) -> tuple[float, slice]:
+    """By what the friction is less after a release than the line that it followed until then, and where it is told; the
+    release is searched.
 
     `held` is the row from which on it surely slides.
     """
-    best, found = np.inf, 0.0
+    best, found = np.inf, (0.0, slice(held + CORNER, held + AFTER))
     for release in range(held // 2, held + 1):
         rows = np.arange(max(0, release - held // 2), release) - release
-        after = friction[release + CORNER : release + AFTER]
+        told = slice(release + CORNER, release + AFTER)
+        after = friction[told]
         slope, end = np.polyfit(rows, friction[release + rows], 1)
         left = np.concatenate([friction[release + rows] - end - slope * rows, after - after.mean()])
         cost = float(left @ left) / len(left)
         if cost < best:
-            best, found = cost, float(end - after.mean())
+            best, found = cost, (float(end - after.mean()), told)
     return found

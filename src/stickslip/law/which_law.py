@@ -3,20 +3,21 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from stickslip.errors import EstimateError, ModelError
-from stickslip.estimate import NORMAL_95, Doubt, Estimate, Result, Status
+from stickslip.estimate import NORMAL_95, Doubt, Estimate
 from stickslip.law.law import LawFit, answered
 from stickslip.law.search import descend
+from stickslip.law.standing import CALIBRATIONS, Evidence, Misfit, Standing, standings, undescribed
 from stickslip.law.start import CALIBRATION, Shown, require_apart, seen_damping, too_few, usual_nuisance
 from stickslip.law.stretch import Stretch, channels_of
-from stickslip.law.surety import CALIBRATIONS, Evidence, Misfit, Standing, standings, surety, times, undescribed
+from stickslip.law.surety import surety
 from stickslip.law.trials import (
     PASSES,
     Seen,
@@ -30,127 +31,29 @@ from stickslip.law.trials import (
     weighed,
     with_static,
 )
-from stickslip.laws.guessing import family_of, hypotheses
+from stickslip.law.verdict import (
+    LEFT,
+    Candidate,
+    LawComparison,
+    Remainder,
+    concluded,
+    damper_found,
+    doubt_of,
+    unexplained_part,
+)
+from stickslip.laws.guessing import hypotheses
 from stickslip.oscillator import Oscillator
-from stickslip.record.record import Record, Step, require_record
+from stickslip.record.record import Record, require_record
 
 Array = NDArray[np.float64]
 
 CALLS = 40.0  # of progress that the trial of a law is taken for
-BAD = 0.3  # of a channel's own size: a law that leaves more beyond the noise describes little
 LOOK = 2  # passes of a descent after which it is seen how the sensors' mounts swing
 RETUNED = 8  # times that mounts and law are found in turn
-REMAINDER = "remainder"  # the kind of doubt where the best law leaves more than noise
-LEFT = 0.05  # of it: so much comes of more than the chance that an interval knows
-SCALED = ("kinetic", "static", "speed", "rate", "steepness")  # parameters in proportion to the motion, or against it
-FAR = 6.0  # of how unsure a gain or a spring is, beyond which it is no calibration's error: 5 came of 3 % of roughness
-
-
-@dataclass(frozen=True, eq=False)
-class Candidate:
-    """One law that was tried.
-
-    Attributes
-    ----------
-    standing : Standing
-        How it stands among the others.
-    oscillator : Oscillator
-        With the law's fitted values.
-    left : mapping of str to float
-        Root mean square of what it leaves of each channel [unit of the channel].
-    """
-
-    standing: Standing
-    oscillator: Oscillator
-    left: Mapping[str, float]
-
-    @property
-    def name(self) -> str:
-        """Of the law."""
-        return self.standing.name
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class LawComparison(Result):
-    """What records say of several friction laws.
-
-    Attributes
-    ----------
-    candidates : tuple of Candidate
-        The laws tried, the best one first.
-    law : str or None
-        The law, where the records leave one alone.
-    family : str or None
-        "rigid", "compliant", "state variable" or "LuGre", where the records leave one alone.
-    kept : tuple of str
-        The laws that are not rejected.
-    confidence : float
-        Probability that the true law is among those kept, were it among the laws tried.
-    verdict : str
-        The answer, in a sentence or two for a report.
-    fit : LawFit
-        The best law's fit to all records, with intervals.
-    excess : Estimate or None
-        By what part static friction exceeds the kinetic, where a rigid contact is the best.
-    status : str
-        "ok", or why the answer should not be trusted.
-    checks : tuple of str
-        What was checked, with the numbers.
-    history : tuple of Step
-        How it was found.
-    """
-
-    candidates: tuple[Candidate, ...]
-    law: str | None
-    family: str | None
-    kept: tuple[str, ...]
-    confidence: float
-    verdict: str
-    fit: LawFit
-    excess: Estimate | None
-    status: str
-    checks: tuple[str, ...]
-    history: tuple[Step, ...]
-
-    @property
-    def best(self) -> Candidate:
-        """The law that stands first."""
-        return self.candidates[0]
-
-    @property
-    def estimates(self) -> tuple[Estimate, ...]:
-        """The best law's parameters."""
-        return (*self.fit.estimates, *([self.excess] if self.excess else []))
-
-    def __repr__(self) -> str:
-        return f"{self.verdict}\n{super().__repr__()}"
-
-    def to_dict(self) -> dict[str, Any]:
-        """Plain data for JSON."""
-        return {
-            "verdict": self.verdict,
-            "law": self.law,
-            "family": self.family,
-            "not_rejected": list(self.kept),
-            "confidence": self.confidence,
-            "status": self.status,
-            "checks": list(self.checks),
-            "laws": [_told(each) for each in self.candidates],
-            "estimates": [each.to_dict() for each in self.estimates],
-            "history": [step.to_dict() for step in self.history],
-        }
-
-
-def _told(candidate: Candidate) -> dict[str, Any]:
-    standing = candidate.standing
-    values = {"misfit": standing.misfit, "criterion": standing.criterion}
-    law = candidate.oscillator.law
-    return {
-        "name": standing.name, "family": standing.family, "verdict": standing.verdict, "kept": standing.kept,
-        **{key: value if math.isfinite(value) else None for key, value in values.items()},
-        "values": {key: value for key, value in vars(law).items() if isinstance(value, float)},
-        "left": dict(candidate.left),
-    }  # fmt: skip
+MOVED = {"kinetic", "static", "speed", "rate", "steepness"}  # parameters in proportion to the motion, or against it
+# times, in which 95 % of the intervals held on the first 39 rigs of `benchmarks/servo_laws.py --first 6000`
+STRAY, STRAYS = 1.25, {"stiffness": 1.0, "damping": 2.5, "speed": 4.0, "steepness": 4.0}
+WEIGHED = {"kinetic", "static", "rate", "stiffness", "damping", "viscous"}  # those that go with the mass, or against it
 
 
 def compare_laws(
@@ -238,7 +141,7 @@ def compare_laws(
     told, confidence = standings(misfits, evidence, likely=rests.probabilities(calibration, CALIBRATIONS * calibration))
     best, final = search.settled(trials[told[0].name], looked, evidence, rests.fall)
     fit = search.fitted(best, final, rests.fall)
-    doubt, confidence = _doubt(fit, oscillator, calibration), min(confidence, evidence.supported)
+    doubt, confidence = doubt_of(fit, oscillator, calibration), min(confidence, evidence.supported)
     if doubt:
         told, confidence = undescribed(told), 0.0
         fit = _flagged(fit, "none of the laws tried describes these records")
@@ -246,14 +149,13 @@ def compare_laws(
     fit = _calibrated(fit, records, calibration)
     if progress:
         progress(1.0)
-    candidates = tuple(
-        Candidate(each, fit.oscillator if each is told[0] else trials[each.name].system, _left(trials[each.name]))
-        for each in told
-    )
+    candidates = tuple(_candidate(each, trials[each.name], fit, first=each is told[0]) for each in told)
+    if not doubt:
+        candidates = tuple(each.worded(fit, first=each is candidates[0]) for each in candidates)
     worries: list[Doubt | str] = [*looked.worries]
-    worries += filter(None, [too_few(final, best.count), _remainder(fit)])
-    found = _answer(candidates, confidence, fit, rigid, calibration, records, doubt, worries)
-    return found if doubt else replace(found, verdict=" ".join([found.verdict, *_damper(fit, oscillator.damping)]))
+    worries += filter(None, [too_few(final, best.count), unexplained_part(fit)])
+    found = concluded(candidates, confidence, fit, rigid, calibration, records, doubt, worries)
+    return found if doubt else replace(found, verdict=" ".join([found.verdict, *damper_found(fit, oscillator.damping)]))
 
 
 class _Looked(NamedTuple):
@@ -339,23 +241,6 @@ class _Search(NamedTuple):
         return fit if best.name != "static" or rigid is None else _with_static(fit, rigid)
 
 
-def _remainder(fit: LawFit) -> Doubt | str:
-    """What even the best law leaves, where that is more than calibrations and noise are."""
-    name, share = _worst(fit, fit.noise)
-    if share <= LEFT:
-        return ""
-    return Doubt(
-        f"the best of those tried leaves {share:.0%} of {name}: the friction may follow none of them", REMAINDER
-    )
-
-
-def _damper(fit: LawFit, stated: float) -> Iterator[str]:
-    """The damper that was found, where it is not the stated one."""
-    found = fit.parameters.get("damping")
-    if found is not None and not found.includes(stated):
-        yield f"With it goes a {found}, where {stated:.4g} N s/m is stated."
-
-
 def _seen(records: Sequence[Record], systems: Sequence[Oscillator]) -> list[tuple[Oscillator, Seen]]:
     """What the records show by each of several dampers; one that leaves no friction is none."""
     found, refused = [], None
@@ -392,6 +277,13 @@ def _with_static(fit: LawFit, excess: Estimate) -> LawFit:
     return replace(fit, parameters={"static": static, **fit.parameters}, correlations=correlations)
 
 
+def _candidate(standing: Standing, trial: Trial, fit: LawFit, *, first: bool) -> Candidate:
+    """A law that was tried; the first one as it was fitted to all readings."""
+    if first:
+        return Candidate(standing, fit.oscillator, fit.residual)
+    return Candidate(standing, trial.system, _left(trial))
+
+
 def _left(trial: Trial) -> dict[str, float]:
     """Root mean square of what is left of each channel."""
     found: dict[str, list[float]] = {}
@@ -412,10 +304,12 @@ def _fit(trial: Trial, shown: Sequence[Shown], stretches: Sequence[Stretch], tel
     checks = tuple(
         f"{name} is left with {left / noise[name]:.3g} times its noise" for name, left in fit.residual.items()
     )
-    name, share = _worst(fit, noise)
-    if share > LEFT:
-        fit = _flagged(fit, f"the interval does not count that the law misses {share:.0%} of {name}")
-    return replace(fit, noise=noise, checks=checks)
+    fit = replace(fit, noise=noise, checks=checks)
+    remainder = Remainder.of_fit(fit)
+    if remainder.share > LEFT:
+        words = f"the interval does not count that the law misses {remainder.share:.0%} of {remainder.channel}"
+        fit = _flagged(fit, words)
+    return fit
 
 
 def _flagged(fit: LawFit, words: str) -> LawFit:
@@ -425,30 +319,31 @@ def _flagged(fit: LawFit, words: str) -> LawFit:
 
 
 def _calibrated(fit: LawFit, records: Sequence[Record], calibration: float) -> LawFit:
-    """The fit whose forces and speeds are no surer than the measured base is calibrated, by which all motion scales."""
-    if not any(name in record for record in records for name in ("z", "force")):
-        return fit
-    told = {key: _widened(one, calibration) if key in SCALED else one for key, one in fit.parameters.items()}
+    """The fit no surer than the measured base is calibrated, by which all motion scales, and than the mass is weighed.
+
+    Without a sensor of force it is the mass that makes forces of motions, and intervals are as wide besides as they had
+    to be where the truth was known: what is left over is mostly no noise.
+    """
+    driven = any(name in record for record in records for name in ("z", "force"))
+    felt = any(name in record for record in records for name in ("load", "friction"))
+    told = dict(fit.parameters)
+    for key, one in fit.parameters.items():
+        name = key.removeprefix("law.")
+        if name in MOVED | WEIGHED:
+            unsure = math.hypot(driven and name in MOVED, not felt and name in WEIGHED)
+            told[key] = _widened(one, unsure * calibration, 1.0 if felt else STRAYS.get(key, STRAY))
     return replace(fit, parameters=told)
 
 
-def _widened(estimate: Estimate, share: float) -> Estimate:
-    """The estimate, unsure by a share of its value besides."""
+def _widened(estimate: Estimate, share: float, times: float) -> Estimate:
+    """The estimate, unsure by a share of its value besides, and so many times as unsure."""
     more, (low, high) = share * abs(estimate.value), estimate.interval
     ends = (estimate.value - low, high - estimate.value)
-    below, above = (math.hypot(end, NORMAL_95 * more) for end in ends)
+    below, above = (times * math.hypot(end, NORMAL_95 * more) for end in ends)
     return replace(
-        estimate, interval=(estimate.value - below, estimate.value + above), sd=math.hypot(estimate.sd, more)
-    )
-
-
-def _worst(fit: LawFit, noise: Mapping[str, float]) -> tuple[str, float]:
-    """The channel of which a law leaves the largest share beyond the noise, and that share."""
-    shares = {}
-    for name, left in fit.residual.items():
-        size = float(np.std(np.concatenate([each.measured[name] for each in fit.traces])))
-        shares[name] = math.sqrt(max(0.0, left**2 - noise[name] ** 2)) / max(size, 1e-300)
-    return max(shares.items(), key=lambda each: each[1])
+        estimate, interval=(max(min(0.0, low), estimate.value - below), estimate.value + above),
+        sd=times * math.hypot(estimate.sd, more),
+    )  # fmt: skip
 
 
 def _guessed(name: str, given: Sequence[Any], seen: Seen) -> list[Any]:
@@ -508,102 +403,3 @@ def _name(law: Any) -> str:
             f"law {law!r}", "a law without a guess of its own needs values to start from", "give it with its values"
         )
     return kind.__name__
-
-
-def _answer(
-    candidates: tuple[Candidate, ...],
-    confidence: float,
-    fit: LawFit,
-    excess_: Estimate | None,
-    calibration: float,
-    records: Sequence[Record],
-    doubt: str,
-    worries: Sequence[Doubt | str],
-) -> LawComparison:
-    told = [each.standing for each in candidates]
-    kept = [each for each in told if each.kept]
-    families = list(dict.fromkeys(each.family for each in kept))
-    excess_ = excess_ if told[0].family == "rigid" else None
-    checks = tuple(f"{each.name}: misfit {times(each.misfit)} the least" for each in told)
-    step = Step(
-        "compare_laws",
-        {"laws": [each.name for each in candidates], "calibration": calibration},
-        f"{', '.join(each.name for each in kept)} not rejected",
-    )
-    return LawComparison(
-        candidates, kept[0].name if len(kept) == 1 and not doubt else None,
-        families[0] if len(families) == 1 and not doubt else None,
-        tuple(each.name for each in kept), confidence,
-        f"None of the laws tried describes these records: {doubt}." if doubt
-        else " ".join(_sentences(told, families, excess_, calibration, confidence)),
-        fit, excess_, Status(doubt) if doubt else Status(*worries), checks,
-        (*records[0].history, step),
-    )  # fmt: skip
-
-
-def _doubt(fit: LawFit, stated: Oscillator, calibration: float) -> str:
-    """Why even the best law is none for these records; nothing where it is."""
-    shares = {each: each.value for name, each in fit.parameters.items() if "gain" in name.split(".")}
-    if "stiffness" in fit.parameters and stated.stiffness > 0:
-        shares[fit.parameters["stiffness"]] = fit.parameters["stiffness"].value / stated.stiffness
-    far = [each for each, share in shares.items() if abs(math.log(share)) > FAR * calibration > 0]
-    if far:
-        told = ", ".join(f"the {each.name} comes out as {each.value:.3g}" for each in far)
-        return (
-            f"{told}, where calibrations are off by {100 * calibration:.2g} %: check mass=, stiffness= and the "
-            "channels' units"
-        )
-    name, share = _worst(fit, fit.noise)
-    if share <= BAD:
-        return ""
-    return f"even the best law leaves {share:.0%} of {name}: the friction may follow none of those tried"
-
-
-def _sentences(
-    laws: Sequence[Standing], families: Sequence[str], excess_: Estimate | None, calibration: float, confidence: float
-) -> Iterator[str]:
-    """The verdict, to be pasted into a report."""
-    best = laws[0]
-    kept = [each.name for each in laws if each.kept]
-    rivals = [each for each in laws if each.family != best.family and not each.limit]
-    limits = [each.name for each in laws if each.limit]
-    if len(families) > 1:
-        yield (
-            f"These records can not tell {_either(kept)} apart: what they leave over differs too little. "
-            "A record in which the contact sticks and slips, with a load cell, would tell more."
-        )
-    else:
-        said = []
-        if rivals:
-            least = min(each.misfit for each in rivals) / best.misfit
-            larger = f"the misfit of any other family tried is at least {times(least)} as large"
-            said.append(larger if least > 1 else "another family leaves no less where the records tell most")
-        if limits:
-            said.append(f"{_either(limits)} would have to be so stiff that it says the same")
-        told = "; ".join(said) or "no law of another family was tried"
-        yield f"The friction is {family_of(best.name).said}: {told}."
-    if best.family == "rigid" and len(families) == 1 and excess_ is not None:
-        low, high = excess_.interval
-        exceeds = (
-            f"by {excess_.value:.1%} (95 %: {low:.1%} to {high:.1%})"
-            if math.isfinite(high)
-            else f"by {low:.1%} or more"
-            if low > 0
-            else "by what can not be told"
-        )
-        if len(kept) > 1:
-            yield (
-                f"Within it {_either(kept)} can not be told apart: static friction exceeds the kinetic {exceeds}, "
-                f"where calibrations within {100 * calibration:.2g} % hide {100 * CALIBRATIONS * calibration:.2g} %."
-            )
-        elif best.name == "Coulomb" or kept == ["Coulomb"]:
-            yield f"One level of friction explains it: static friction exceeds the kinetic by {high:.1%} at most."
-        else:
-            falls = "at once" if kept == ["static"] else "with the speed, along a Stribeck curve"
-            yield f"Static friction exceeds the kinetic {exceeds} and falls {falls}."
-    if len(kept) == 1:
-        yield f"Confidence {confidence:.1%}."
-
-
-def _either(names: Sequence[str]) -> str:
-    return " and ".join([", ".join(names[:-1])] * (len(names) > 1) + [names[-1]])

@@ -20,9 +20,6 @@ from stickslip.signals.wavelet import ends, wavelet_map
 if TYPE_CHECKING:
     import xarray as xr
 
-if TYPE_CHECKING:
-    import xarray as xr
-
 Array = NDArray[np.float64]
 
 STEP = 0.25  # of the shortest scale: the columns of a map that are looked at

@@ -162,6 +162,7 @@ class _Builder:
         self.face = [face, _through(face, self.signals)]
         self.face.append(_through(self.face[1], self.signals))
         self.base, self.force = self._driven([m.base for m in motions]), self._driven([m.force for m in motions])
+        self.imposed = self._driven([m.imposed for m in motions]) if motions[0].imposed else None
         damper = _through(self.base, self.signals) * systems.on_base[:, None]
         self.mass, stiffness, damping = (
             part.astype(self.digits) for part in (systems.mass, systems.stiffness, systems.damping)
@@ -251,6 +252,8 @@ class _Builder:
         )
 
     def _accelerated(self, force: Rows) -> Rows:
+        if self.imposed is not None:  # whatever acts on it
+            return _through(_through(self.imposed, self.signals), self.signals)[:, None]
         return np.asarray(force / self.mass if self.inverse is None else self.inverse @ force)
 
     def _resets(self, j: int, rows: list[Rows], out: Array) -> None:
@@ -383,6 +386,8 @@ class _Builder:
             tangents = np.array([contact.tangent for contact in self.contacts])
             least = np.linalg.pinv(tangents) if self.systems.joint else tangents
             opening[:, self.degrees : 2 * self.degrees] = least @ self._faces(range(len(tangents)), 1)
+        if self.imposed is not None:
+            opening[:, 0], opening[:, 1] = self.imposed, _through(self.imposed, self.signals)
         for forms, own, known in zip(self.forms, self.memory, self.known, strict=True):
             opening[:, list(own)] = forms.opening @ known
         return opening

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable
-from contextlib import nullcontext
+from contextlib import ExitStack
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
@@ -154,12 +154,16 @@ def run_curved(
     run = _Run(table, state, mode, total=offset + _lasting(laps, table.motion.period), budget=budget, rtol=rtol)
     status = "complete"
     try:
-        for until, (signals, values) in stops:
-            run.state[signals] = values
-            run.clock[TRY] = min(run.clock[TRY], run.scale)  # at rest steps would grow for ever
-            while run.chunk(until, follow or run.march) == march.FULL:
-                tell(run.share)
-            tell(run.share)
+        with ExitStack() as holding:
+            for until, (signals, values) in stops:
+                run.state[signals] = values
+                run.clock[TRY] = min(run.clock[TRY], run.scale)  # at rest steps would grow for ever
+                outcome = march.FULL
+                while outcome == march.FULL:
+                    if run.heed is None and run.kept:  # the first call may compile for long
+                        run.heed = holding.enter_context(held_back())
+                    outcome = run.chunk(until, follow or run.march)
+                    tell(run.share)
     except KeyboardInterrupt:
         if not run.kept:
             raise
@@ -190,6 +194,8 @@ class _Run:
         self.state, self.big = state.copy(), np.abs(state)
         self.work = Work(taylor.room(count, self.model.order), collocation.room(count, size, table.physical))
         self.kept: list[Steps] = []
+        self.room = room_for(CHUNK, size)
+        self.heed: Callable[[], None] | None = None  # lets a Ctrl-C through that came within a chunk
         self.leapt = 0  # long steps among those kept
 
     @property
@@ -209,16 +215,17 @@ class _Run:
 
     def chunk(self, until: tuple[float, float], follow: March) -> int:
         """March for so many steps at the most, keep them, and say why it ended; refuse what gets nowhere."""
-        steps, before = room_for(CHUNK, len(self.state)), self.clock.copy()
-        with held_back() if self.kept else nullcontext():  # the first call may compile for long
-            outcome, written, leapt, self.mode = follow(
-                self.clock, self.state, self.big, self.mode, until, steps, self.work
-            )
+        steps, before = self.room, self.clock.copy()
+        outcome, written, leapt, self.mode = follow(
+            self.clock, self.state, self.big, self.mode, until, steps, self.work
+        )
         if written:
             steps.leaps[:written][steps.leaps[:written] >= 0] += self.leapt
             self.leapt += leapt
-            columns = (column[:written] for column in steps[:-2])
+            columns = [column[:written].copy() for column in steps[:-2]]
             self.kept.append(Steps._make([*columns, steps.polys[:leapt].copy(), steps.reach[:leapt].copy()]))
+        if self.heed:
+            self.heed()
         laps = self.clock[LAPS] - before[LAPS]
         passed = self.clock[TIME] - before[TIME] + (laps * self.model.period if laps else 0.0)
         if outcome != march.DONE or not np.isfinite(self.state).all():

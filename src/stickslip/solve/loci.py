@@ -16,6 +16,9 @@ from stickslip.solve.tables import Array
 
 PUSHES = (0.01, 0.03, 0.1, 0.3, 0.003)  # of the orbit's size, along the direction that turns over in each period
 LAPS = 64  # periods of the new orbit in which the motion itself goes near it, where it is stable
+KINDS = ("fold", "grazing", "doubling")
+SHARPEST = 1e-9  # of the way of the branch: so near is a change known
+ROUNDS = 60
 
 
 def period_doublings(branch: Branch) -> tuple[int, ...]:
@@ -108,11 +111,6 @@ def doubled(orbit: SteadyState) -> SteadyState:
         "a period doubling sends one off, to one side",
         "take an orbit nearer to the doubling, or one on its other side",
     )
-
-
-KINDS = ("fold", "grazing", "doubling")
-SHARPEST = 1e-9  # of the way of the branch: so near is a change known
-ROUNDS = 60
 
 
 @dataclass(frozen=True, eq=False)

@@ -26,6 +26,10 @@ from stickslip.solve.tables import Array, Tables, systems_of
 from stickslip.solve.trajectory import Trajectory
 
 TERMS = 40  # of a Taylor series over a cell at most
+OUTPUTS = ("x", "v", "a", "friction")
+# Of a parameter, for differences of tables to either side: what is left of the curve and rounding are alike. What is
+# zero may not be less, and is moved to one side, by less.
+STEP, FROM_ZERO = 1e-4, 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -327,12 +331,6 @@ def _polynomial(flow, change, cell, held, row, moved, series, term):
         if small and k > 4:
             return k + 1
     return series.shape[0]
-
-
-OUTPUTS = ("x", "v", "a", "friction")
-# Of a parameter, for differences of tables to either side: what is left of the curve and rounding are alike. What is
-# zero may not be less, and is moved to one side, by less.
-STEP, FROM_ZERO = 1e-4, 1e-3
 
 
 @dataclass(frozen=True, eq=False)

@@ -369,7 +369,8 @@ def kind_of_drive(drive: Drive) -> Any:
     motion = drive.motion()
     if motion.knots is not None or len(motion.tones) > 1:
         return None
-    return tuple(motion.rates), tuple(tone[:2] for tone in motion.tones), math.isfinite(motion.period)
+    own = tuple(motion.rates), tuple(tone[:2] for tone in motion.tones), math.isfinite(motion.period)
+    return (*own, bool(motion.imposed))
 
 
 def _leaps(first: Index, targets: Index, resets: Array) -> Array:

@@ -21,6 +21,20 @@ from stickslip.story.story import Line, Story, Table, logged
 from stickslip.story.words import Caution, interval_of, value_of
 
 CAPTION = "Root-mean-square error against the sampling rate, for each choice of sensors."
+# What leads: of which step, and which of its numbers; the rest stands in the tables.
+LEADING = (
+    ("stick", "contact stiffness"), ("stick", "coupled frequency"), ("free", "natural frequency"),
+    ("free", "damping ratio"), ("free", "lead of a over x"), ("discharge", "discharge time constant"),
+    ("tap", "frequency of the mount of the accelerometer"), ("tap", "frequency of the mount of the load cell"),
+)  # fmt: skip
+OFF_LINE = (
+    "How far each level is off the straight line through all of them: scatter is how well the steps were set, a bow is "
+    "a sensor that bends."
+)
+ANSWER = (
+    "Averaged spectra, and the oscillator fitted line by line without their leakage: where a window is shorter than "
+    "the resonance rings, H1 and H2 part and the coherence falls, and the fit is what to read."
+)
 
 
 def of_record(record: Record, *, form: str = "csv") -> Story:
@@ -57,22 +71,6 @@ def _enough(plan: ExperimentPlan, question: str, error: str) -> str:
     setup = plan.enough(question, error)
     found = f"{', '.join(setup.sensors)} at {setup.fs:g} Hz" if setup else "none of these"
     return f"{question} within {error}: {found}"
-
-
-# What leads: of which step, and which of its numbers; the rest stands in the tables.
-LEADING = (
-    ("stick", "contact stiffness"), ("stick", "coupled frequency"), ("free", "natural frequency"),
-    ("free", "damping ratio"), ("free", "lead of a over x"), ("discharge", "discharge time constant"),
-    ("tap", "frequency of the mount of the accelerometer"), ("tap", "frequency of the mount of the load cell"),
-)  # fmt: skip
-OFF_LINE = (
-    "How far each level is off the straight line through all of them: scatter is how well the steps were set, a bow is "
-    "a sensor that bends."
-)
-ANSWER = (
-    "Averaged spectra, and the oscillator fitted line by line without their leakage: where a window is shorter than "
-    "the resonance rings, H1 and H2 part and the coherence falls, and the fit is what to read."
-)
 
 
 def of_commissioned(done: Commissioned) -> Story:

@@ -19,7 +19,7 @@ from stickslip.estimate import UNKNOWN, doubts_of
 from stickslip.figures.law import law_plates
 from stickslip.law.fit_curve import CurveFit
 from stickslip.law.law import LawFit
-from stickslip.law.which_law import LawComparison
+from stickslip.law.verdict import LawComparison
 from stickslip.laws.export import export_law, toml_table
 from stickslip.laws.formula import quoted
 from stickslip.parameters import unit
@@ -38,6 +38,11 @@ FILES = {
 }  # fmt: skip
 STEADY = 0.05  # of its spread that a base may stray from a straight line: a tone over its half period strays by 0.2
 ALONE = "# a law alone: to simulate it, add [system] with its mass and stiffness, and [drive]"
+DEFINITION = (
+    "Follows: 100 (1 - |y - yhat| / |y - mean y|) %, the fit of system identification: 100 % is the record itself, 0 % "
+    "no better than its mean. Nothing was fitted to it but how the motion begins and each sensor's zero."
+)
+COMPARED = "Coulomb: the same of one level of friction and a viscous damper, both fitted to the record itself."
 
 
 def of_curve(fit: CurveFit, *, record: Records = ()) -> Story:
@@ -195,13 +200,6 @@ def _plain(name: str, values: Mapping[str, Any]) -> str:
         f"{key} = {quoted(value) if isinstance(value, str) else repr(float(value))}" for key, value in values.items()
     ]
     return "\n".join([f"[{name}]", *lines])
-
-
-DEFINITION = (
-    "Follows: 100 (1 - |y - yhat| / |y - mean y|) %, the fit of system identification: 100 % is the record itself, 0 % "
-    "no better than its mean. Nothing was fitted to it but how the motion begins and each sensor's zero."
-)
-COMPARED = "Coulomb: the same of one level of friction and a viscous damper, both fitted to the record itself."
 
 
 def of_predictions(predictions: Predictions) -> Story:

@@ -392,6 +392,8 @@ class Fit:
         By how much each value changes with each sample of x.
     pull : ndarray, shape (values,)
         By how much constants' uncertainties draw each value back to what was stated.
+    normal : ndarray, shape (values, values)
+        Of the least squares, with what is known beforehand.
     root : ndarray, shape (values, values)
         Square root of the values' covariance.
     weight : float
@@ -404,6 +406,7 @@ class Fit:
     jacobian: Array
     gain: Array
     pull: Array
+    normal: Array
     root: Array
     weight: float
     freedom: float

@@ -60,7 +60,7 @@ LEAST = 50  # samples
 SEARCHED = 4000  # samples in which it is searched where a law's valley lies
 HALVINGS = 6  # of a step that leads away, before the descent ends
 LEARNS = 0.5  # of what was left, that a step leaves at most where its slopes are learned from it and not taken anew
-SETTLED = 0.999  # of what is left, from which a further pass gains nothing
+SETTLED = 0.9999  # of what is left, from which a further pass gains nothing
 SENSED = ("x", "z", "v", "a", "load")  # channels that a virtual rig writes
 LAWS = 3  # that are tried beside the simplest
 CLOSE = 6.6  # chi-squared by which one law leads another, one in a hundred by chance
@@ -188,6 +188,8 @@ def _richer(simple: Belief, mapped: Map) -> Belief:
         best = _simplest([law for law in laws if {GIVE, RATE} & law.values.keys()])
     if SPEED in best.values:
         laws += _led_by(_stretched(best), simple.record, mapped)
+    elif GIVE in best.values:
+        laws += _led_by(_falling(best), simple.record, mapped)
     return replace(best, rivals=tuple(law for law in laws if law is not best and _as_near(law, best)))
 
 
@@ -288,18 +290,34 @@ def _parts(simple: Belief) -> list[list[Belief]]:
 
 def _softer(give: Belief) -> list[list[Belief]]:
     """Beginnings of what else may look like a contact that gives way: one with a damping, bristles, or a lag."""
-    record, values, give = give.record, give.values, give.as_stated()
+    record = give.record
     furthest, fastest = (float(np.max(np.abs(record[name]))) for name in "xv")
-    damped = [give.at(**{LOSS: loss}) for loss in LOSSES]
-    slid = give.without(SLOPE).at(**{HELD: float(np.sign(record["v"][0]))})
-    bristles = [
-        slid.at(**{KINETIC: level, EXCESS: excess * level, SPEED: math.log(share * fastest)})
-        for level in (part * values[KINETIC] for part in LEVELS)
-        for excess in EXCESSES[1:4]
+    damped = [give.as_stated().at(**{LOSS: loss}) for loss in LOSSES]
+    bristles = [begun for excess in EXCESSES[1:4] for begun in _bristles(give, excess)]
+    rates = [math.log(rate * fastest / furthest) for rate in RATES]
+    lags = [_slid(give).without(GIVE).at(**{RATE: rate}) for rate in rates]
+    return [damped, bristles, lags]
+
+
+def _falling(give: Belief) -> list[list[Belief]]:
+    """The same as bristles whose friction falls by so much: x hardly tells it, but their stiffness follows from it."""
+    return [[replace(begun, held=EXCESS) for begun in _bristles(give, excess)] for excess in EXCESSES[2:]]
+
+
+def _slid(give: Belief) -> Belief:
+    """The same in a record that begins as it slides."""
+    return give.as_stated().without(SLOPE).at(**{HELD: float(np.sign(give.record["v"][0]))})
+
+
+def _bristles(give: Belief, excess: float) -> list[Belief]:
+    """Beginnings with so much more static friction, that falls at ever higher speeds."""
+    fastest = float(np.max(np.abs(give.record["v"])))
+    levels = [part * give.values[KINETIC] for part in LEVELS]
+    return [
+        _slid(give).at(**{KINETIC: level, EXCESS: excess * level, SPEED: math.log(share * fastest)})
+        for level in levels
         for share in SPEEDS
     ]
-    lags = [slid.without(GIVE).at(**{RATE: math.log(rate * fastest / furthest)}) for rate in RATES]
-    return [damped, bristles, lags]
 
 
 def _stretched(best: Belief) -> list[list[Belief]]:
@@ -364,8 +382,12 @@ def _step(belief: Belief) -> Belief | None:
     fit = belief.fit
     assert fit is not None
     before = _left(belief)
-    step = fit.gain @ belief.residual - fit.pull
-    step /= max(1.0, *(abs(s) / belief.reach(n) for n, s in zip(fit.names, step, strict=True)))
+    reach = np.array([belief.reach(name) for name in fit.names])
+    # Levenberg's and Marquardt's: what x hardly tells is not moved out of its reach, and holds the others back no more
+    scaled = fit.normal * np.outer(reach, reach)
+    towards = scaled @ ((fit.gain @ belief.residual - fit.pull) / reach)
+    step = reach * np.linalg.solve(scaled + belief.noise**2 * np.eye(len(reach)), towards)
+    step /= max(1.0, float(np.max(np.abs(step) / reach)))
     moved = (belief.by(fit.names, step / 2**halving) for halving in range(HALVINGS))
     return next((nearer for nearer in moved if _left(nearer) < before), None)
 
@@ -413,7 +435,8 @@ def _fitted(belief: Belief, names: tuple[str, ...], jacobian: Array) -> Belief:
     inverse /= np.outer(scale, scale)
     pull = inverse @ (prior * [belief.values[n] - middle for n, (middle, _) in zip(names, known, strict=True)])
     root = vectors * np.sqrt(np.maximum(values, 0.0))
-    return replace(belief, fit=Fit(names, jacobian, inverse @ jacobian.T, pull, root, weight, freedom))
+    normal = jacobian.T @ jacobian + np.diag(prior)
+    return replace(belief, fit=Fit(names, jacobian, inverse @ jacobian.T, pull, normal, root, weight, freedom))
 
 
 def _slope_of(belief: Belief, name: str) -> Array:
