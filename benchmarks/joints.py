@@ -23,12 +23,12 @@ import stickslip as ss
 TOLD = ("level", "forward", "back", "load", "viscous", "inertia", "damping")
 
 
-def truths(joint: joints.Joint, carried: float) -> dict[str, float]:
+def truths(joint: joints.Joint, time: np.ndarray) -> dict[str, float]:
     """The true values under the names of the answer."""
     true = joint.truth
     return {
         **{name: true[name] for name in ("forward", "back", "load", "viscous", "inertia")}, "damping": true["kd"],
-        "level": (true["forward"] + true["back"]) / 2 + true["load"] * carried,
+        "level": joint.level(time),
     }  # fmt: skip
 
 
@@ -63,7 +63,7 @@ def main() -> None:
                     print(f"{seed} {joint.servo}: {error}")
                 continue
             spent.append(time.process_time() - begun)
-            true = truths(joint, found.carried)
+            true = truths(joint, found.time)
             for name in TOLD:
                 estimate = getattr(found, name)
                 if estimate is None or not estimate.known or not ss.estimate.stands(estimate.status):

@@ -48,6 +48,12 @@ class Joint:
     record: ss.Record
     kp: tuple[float, float]
 
+    def level(self, time: np.ndarray) -> float:
+        """Mean of both directions' sliding friction [N m] at vanishing speed, under the mean load at some times."""
+        place = self.record["theta"][np.rint(time * self.record.fs).astype(int)]
+        load = np.abs(self.truth["sine"] * np.sin(place) + self.truth["cosine"] * np.cos(place))
+        return (self.truth["forward"] + self.truth["back"]) / 2 + self.truth["load"] * float(load.mean())
+
 
 @numba.njit
 def march(p, reference, slope, steps, count, control):  # type: ignore[no-untyped-def]

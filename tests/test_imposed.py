@@ -184,6 +184,27 @@ def test_a_trapezoid_of_the_base_moves_as_its_closed_form() -> None:
     assert run.state(5.0)["x"] == pytest.approx(known, rel=1e-13)
 
 
+@pytest.mark.parametrize("rod", [None, 0.2, 0.076])
+def test_a_crank_moves_as_its_closed_form(rod: float | None) -> None:
+    radius, frequency, phase = 0.05, 2.0, 0.3
+    drive = ss.drives.Crank(radius, frequency=frequency, rod=rod, phase=phase)
+    slider = ss.Oscillator(mass=1.0, stiffness=1e3, law=ss.laws.Coulomb(1.0), drive=drive)
+    times = np.linspace(0, 1 / frequency, 501)
+    z = ss.simulate(slider, cycles=1).sample(times, ("z",))[0][0]
+    turned = 2 * math.pi * frequency * times + phase
+    expected = radius * np.cos(turned)
+    if rod is not None:
+        reach = np.sqrt(rod**2 - (radius * np.sin(turned)) ** 2)
+        expected = expected + reach - np.mean(reach[:-1])
+    assert z == pytest.approx(expected, abs=1e-8 * radius)
+    assert drive.motion().period == pytest.approx(1 / frequency)
+
+
+def test_a_rod_that_is_too_short_is_refused() -> None:
+    with pytest.raises(ss.errors.ModelError, match="longer rod"):
+        ss.drives.Crank(0.05, frequency=2.0, rod=0.06)
+
+
 @pytest.mark.parametrize(
     ("times", "speeds"),
     [([0.0, 1.0], [0.0]), ([0.1, 1.0], [0.0, 1.0]), ([0.0, 1.0, 1.0], [0, 1, 2]), ([0, 1], [0, math.nan])],

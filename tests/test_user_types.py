@@ -25,7 +25,7 @@ laws: list[ss.Oscillator] = [
         ss.laws.LinearSlope(1.0, slope=-0.1),
         ss.laws.Tabulated([0.0, 0.1], [1.5, 1.0]), ss.laws.StateVariable(kinetic=1.0, rate=100.0),
         ss.laws.InertialContact(kinetic=1.0, stiffness=1e5, mass=0.01), ss.laws.ElastoSlip([1e5, 1e4], [0.5, 0.5]),
-        ss.laws.PositionLoad(kinetic=1.0, gradient=0.5),
+        ss.laws.PositionLoad(kinetic=1.0, gradient=0.5), ss.laws.Geared(0.5, back=0.6, load=2.0, driving=0.2),
     )
 ]
 series = ss.laws.InSeries(ss.laws.LinearSlope(1.0, slope=-1.0), stiffness=1e5, damping=9)
@@ -48,6 +48,7 @@ drives: list[ss.Oscillator] = [
     for drive in (
         ss.drives.Release(), ss.drives.HarmonicBase(1e-3, frequency=2.5), ss.drives.HarmonicForce(1.0, frequency=2.5),
         ss.drives.MultiTone([(1.0, 2.0, 0.0)]), ss.drives.Belt(0.1), ss.drives.Ramp(0.1),
+        ss.drives.Crank(0.05, frequency=2.0, rod=0.2),
         ss.drives.Recorded([0.0, 1.0, 0.0, 1.0], fs=10.0),
         ss.drives.SpeedProfile([0.0, 1.0], [0.0, 0.1]),
         ss.drives.Later(ss.drives.Belt(0.1), 1.0),

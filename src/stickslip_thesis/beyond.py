@@ -137,8 +137,8 @@ def _laws(given: Given) -> Any:
 
 @functools.lru_cache(64)
 def ringing(system: ss.Oscillator) -> float:
-    """Frequency of the transition oscillation [Hz], found in the last four of six cycles of simulated acceleration."""
-    record = ss.simulate(system, cycles=6).record(fs=4000)
+    """Frequency of the transition oscillation [Hz], found in the last two of four cycles of simulated acceleration."""
+    record = ss.simulate(system, cycles=4).record(fs=4000)
     return ss.contact.transition(record.between(2 / system.drive.frequency, record.duration)).frequency.value
 
 

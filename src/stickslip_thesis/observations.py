@@ -10,6 +10,8 @@ import numpy as np
 
 from stickslip_thesis.printed import Given, read
 
+MOST_TOLD = 6  # numbers that are told one by one
+
 
 @dataclass(frozen=True)
 class Observation:
@@ -70,11 +72,14 @@ class Seen:
         Examples
         --------
         >>> Seen(Observation("2", "2.3", (), "what is left is noise", "left", -np.inf, 0.1, ""), (0.0213,)).text
-        'left: 0.021, below 0.1'
+        'left: 0.0213, below 0.1'
         """
         bounds = [("above", self.observation.above), ("below", self.observation.below)]
         wanted = " and ".join(f"{word} {bound:g}" for word, bound in bounds if np.isfinite(bound))
-        return f"{self.observation.measure}: {', '.join(f'{value:.2g}' for value in self.values)}, {wanted}"
+        told = ", ".join(f"{value:.3g}" for value in self.values)
+        if len(self.values) > MOST_TOLD:
+            told = f"{min(self.values):.3g} to {max(self.values):.3g}"
+        return f"{self.observation.measure}: {told}, {wanted}"
 
 
 @functools.cache

@@ -95,8 +95,9 @@ def axis_record(record: Record, *, axis: str | None = None) -> Record:
         )
     chosen = [one for one in axes if axis is None or _fits(one, axis)]
     if len(chosen) != 1:
+        called = ", ".join(one or "(unnamed)" for one in axes)
         raise RecordError(
-            f"axis = {axis!r} fits {len(chosen)} of the axes {', '.join(one or '(unnamed)' for one in axes)}",
+            f"the log has the axes {called}" if axis is None else f"axis = {axis!r} fits {len(chosen)} of {called}",
             "the friction of one axis is asked for at a time",
             nearest(axis or "", axes) if axis else f"name one: --axis {axes[0]}",
         )

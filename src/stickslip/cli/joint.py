@@ -22,9 +22,15 @@ from stickslip.cli.show import show
 @click.option("--torque-constant", metavar="VALUE", help="Torque per current at the joint in N m/A.")
 @click.option("--gravity/--no-gravity", default=None, help="Whether gravity acts on it; of an angle yes unless said.")
 @click.option("--axis", metavar="NAME", help="Which axis of a log of several: a part of its columns' names.")
+@click.option(
+    "--propose", type=click.Path(path_type=Path, dir_okay=False), metavar="FILE",
+    help="Write a motion into FILE that would tell what this log does not, within its range and speed.",
+)  # fmt: skip
 @result_options("LOG-joint")
 @reading_options
-def joint(file: str, output: Path | None, as_json: bool, everything: bool, **options: Any) -> None:
+def joint(
+    file: str, output: Path | None, as_json: bool, everything: bool, propose: Path | None, **options: Any
+) -> None:
     """How much friction is in this joint of a robot, servo or axis?
 
     LOG holds its position with one of: the torque, the motor's current (then --torque-constant), or the controller's
@@ -38,10 +44,13 @@ def joint(file: str, output: Path | None, as_json: bool, everything: bool, **opt
 
     \b
     stickslip joint shoulder.csv --torque-constant "0.87 N m/A"
+    stickslip joint shoulder.csv --kp "17.8 N m/rad" --propose next.csv
     stickslip joint episode.parquet --axis 2 --kp "17.8 N m/rad" --units "observation.state.2=deg"
     """
     names = ("inertia", "kp", "kd", "torque_constant", "gravity", "axis")
     asked = {name: options.pop(name) for name in names}
+    if propose is not None and propose.exists():
+        raise click.BadParameter(f"'{propose}' is there already; name another file", param_hint="--propose")
     rig = rig_of(**options)
     groups = groups_of(file)
     if len(groups) != 1:
@@ -50,6 +59,9 @@ def joint(file: str, output: Path | None, as_json: bool, everything: bool, **opt
     with progress(2) as tell:
         tell(f"reading {file}", 0)
         record = read(groups[0], rig)
+        if propose is not None:
+            log = ss.answers.axis_record(record, axis=asked["axis"])
+            ss.write_record(ss.cycle.telling_motion(log), propose)
         tell("asking", 1)
         found = ss.answers.analyze_joint(record, **asked)
         written = ss.publish(found, folder=folder) if folder else None

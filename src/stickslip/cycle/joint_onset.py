@@ -25,6 +25,7 @@ LEAST = 8  # samples of rest
 EVENTS = 8  # of four to seven one joint in a hundred was told 6 % wrong
 TOLD = 0.05  # of the sliding friction: what is less sure is not told
 MOST = 0.1  # of the sliding friction, by which the torque may rise while the encoder moves by a count
+LEAST_BORNE = 0.5  # of the sliding friction: what moves under less was never at rest
 DEVIATIONS = 6.0  # of an encoder's noise, by which a joint at rest hardly strays
 LAST = 0.2  # of a rest, that tells how the torque rises at its end
 
@@ -103,7 +104,7 @@ def joint_breakaway(record: Record, *, joint: JointFriction) -> JointBreakaway:
     inexact = math.hypot(shared, joint.level.sd / joint.level.value)
     half = (mean.interval[1] - mean.interval[0]) / 2
     sd = math.hypot(half / NORMAL_95, inexact)
-    if not NORMAL_95 * sd <= TOLD * mean.value:
+    if not NORMAL_95 * sd <= TOLD * mean.value or mean.value < 1 - TOLD:  # static friction is not below the sliding one
         raise EstimateError(
             f"{len(ends)} rests give {mean.value:.2f} times the sliding friction, to {NORMAL_95 * sd / mean.value:.0%}",
             f"{QUESTION} is told where it is known to {TOLD:.0%}",
@@ -151,5 +152,5 @@ def _told(pull: Array, place: float, count: float, joint: JointFriction, fs: flo
     before = (6 * count * joint.inertia.value / rate) ** (1 / 3) + 1 / fs
     spread = rate * before + joint.gain * count
     noise = scatter / np.sqrt(len(last)) * student(len(last) - 2)
-    if spread < MOST * slides and noise < MOST * slides:
+    if spread < MOST * slides and noise < MOST * slides and level > LEAST_BORNE * slides:
         yield float((level - spread / 2) / slides), float(spread / slides)

@@ -1,13 +1,14 @@
 from stickslip.drives.kinds import Belt as Belt
-from stickslip.drives.kinds import Dithered as Dithered
+from stickslip.drives.kinds import Crank as Crank
 from stickslip.drives.kinds import HarmonicBase as HarmonicBase
 from stickslip.drives.kinds import HarmonicForce as HarmonicForce
-from stickslip.drives.kinds import Imposed as Imposed
 from stickslip.drives.kinds import MultiTone as MultiTone
 from stickslip.drives.kinds import Ramp as Ramp
 from stickslip.drives.kinds import Recorded as Recorded
 from stickslip.drives.kinds import Release as Release
 from stickslip.drives.kinds import SpeedProfile as SpeedProfile
 from stickslip.drives.later import Later as Later
+from stickslip.drives.on_another import Dithered as Dithered
+from stickslip.drives.on_another import Imposed as Imposed
 
 __all__: list[str]

@@ -19,6 +19,9 @@ Row = Mapping[str, float]
 LARGEST_FREQUENCY = 1e10  # Hz; more is a wrong unit
 LONGEST = 1000  # cycles of a tone in a period; by more, any two numbers nearly have one
 MOST_SAMPLES = 2**20  # of a signal that is given as a function
+CRANKED = 256  # places of a turn from which a crank's cosines come: of the shortest rod the 256th is below 1e-100
+FAINTEST = 1e-10  # of a crank's length: fainter cosines are left out
+SHORTEST_ROD = 1.5  # times the crank: a shorter one nearly stops at its dead centre, and has cosines without end
 SAME = 1e-9  # of a frequency: so near a ratio of whole numbers is one
 
 
@@ -68,7 +71,8 @@ class Drive(Protocol):
         """The drive as signals with linear rates."""
 
 
-def _require(condition: bool, value: str, rule: str, next_step: str, *, of: str = "") -> None:
+def require(condition: bool, value: str, rule: str, next_step: str, *, of: str = "") -> None:
+    """Refuse a value of a drive, with its rule and the next step, where a condition does not hold."""
     if not condition:
         raise ModelError(value, rule, next_step).of(of)
 
@@ -83,8 +87,9 @@ def require_drive(drive: object) -> None:
         ).of("drive")
 
 
-def _check_frequency(frequency: float) -> None:
-    _require(
+def check_frequency(frequency: float) -> None:
+    """Refuse a frequency [Hz] that no drive has."""
+    require(
         0 < finite("frequency", frequency, unit="Hz", signed=True) <= LARGEST_FREQUENCY,
         f"frequency = {frequency} Hz",
         f"a drive repeats between 0 and {LARGEST_FREQUENCY:g} times a second",
@@ -94,7 +99,7 @@ def _check_frequency(frequency: float) -> None:
 
 
 def _check_speed(speed: float, *, rule: str) -> None:
-    _require(speed != 0, "speed = 0 m/s", rule, "give its speed=, or use Release() for a mass at rest", of="speed")
+    require(speed != 0, "speed = 0 m/s", rule, "give its speed=, or use Release() for a mass at rest", of="speed")
 
 
 def _tones(tones: Sequence[tuple[float, float, float]]) -> tuple[Motion, Row]:
@@ -104,7 +109,7 @@ def _tones(tones: Sequence[tuple[float, float, float]]) -> tuple[Motion, Row]:
     turning = []
     row = {}
     for j, (amplitude, frequency, phase) in enumerate(tones):
-        _check_frequency(frequency)
+        check_frequency(frequency)
         finite("amplitude", amplitude, unit="m or N", signed=True)
         finite("phase", phase, unit="rad", signed=True)
         cosine, sine, omega = f"cos{j}", f"sin{j}", 2 * math.pi * frequency
@@ -227,9 +232,9 @@ class MultiTone:
     )
 
     def __post_init__(self) -> None:
-        _require(len(self.tones) > 0, "no tones", "at least one tone is needed", "give (amplitude, frequency, phase)")
+        require(len(self.tones) > 0, "no tones", "at least one tone is needed", "give (amplitude, frequency, phase)")
         object.__setattr__(self, "tones", tuple(map(tuple, self.tones)))
-        _require(
+        require(
             all(len(tone) == 3 for tone in self.tones),
             f"tones = {self.tones}",
             "a tone is its amplitude, frequency [Hz] and phase [rad]",
@@ -244,6 +249,61 @@ class MultiTone:
         if self.on == "base":
             return _moved(motion, base=row, face=row if self.contact == "base" else {})
         return _moved(motion, force=row) if self.on == "force" else _moved(motion, face=row)
+
+
+@parametric
+class Crank:
+    r"""A motor turns a crank whose rod moves the spring's end: strokes that no shaker has (thesis, section 8.2).
+
+    .. math:: z = r \cos\theta + \sqrt{l^2 - r^2 \sin^2\theta} - \bar z, \qquad \theta = 2\pi F t + \varphi
+
+    less its mean, as a sum of cosines up to a ten-thousand-millionth of the crank. Without a rod it is a Scotch yoke,
+    whose motion is one cosine.
+
+    Raises
+    ------
+    ModelError
+        A rod that is too short to pass over the crank evenly.
+
+    Examples
+    --------
+    >>> len(Crank(0.05, frequency=2.0).motion().tones), len(Crank(0.05, frequency=2.0, rod=0.2).motion().tones)
+    (1, 6)
+    """
+
+    label = "Crank, or Scotch yoke"
+
+    radius: float = parameter("m", "length of the crank", positive=True, note="r: half of the stroke")
+    frequency: float = parameter("Hz", "turns in a second", positive=True, note="F")
+    rod: float | None = parameter(
+        "m", "length of the connecting rod", default=None, positive=True, note="l; left out: a Scotch yoke"
+    )
+    phase: float = parameter("rad", "phase", default=0.0, signed=True)
+
+    def __post_init__(self) -> None:
+        require(
+            self.rod is None or self.rod >= SHORTEST_ROD * self.radius,
+            f"rod = {self.rod} m on a crank of {self.radius:g} m",
+            f"a rod is at least {SHORTEST_ROD:g} times as long as its crank",
+            "give a longer rod=, or none for a Scotch yoke",
+            of="rod",
+        )
+        self.motion()
+
+    def tones(self) -> list[tuple[float, float, float]]:
+        """Amplitude [m], frequency [Hz] and phase [rad] of every cosine."""
+        turned = 2 * math.pi * np.arange(CRANKED) / CRANKED
+        z = self.radius * np.cos(turned)
+        if self.rod is not None:
+            z = z + np.sqrt(self.rod**2 - (self.radius * np.sin(turned)) ** 2)
+        cosines = 2 * np.fft.rfft(z).real / CRANKED
+        kept = [k for k in range(1, CRANKED // 2) if abs(cosines[k]) > FAINTEST * self.radius]
+        return [(float(cosines[k]), k * self.frequency, k * self.phase) for k in kept]
+
+    def motion(self) -> Motion:
+        """A turning pair for every cosine."""
+        motion, row = _tones(self.tones())
+        return _moved(motion, base=row)
 
 
 @parametric
@@ -339,27 +399,27 @@ class Recorded:
 
     def __post_init__(self) -> None:
         degrees = {"force": (0, 1, 3), "base": (1, 3), "face": (3,)}[self.on]
-        _require(
+        require(
             self.order in degrees,
             f"order = {self.order} on the {self.on}",
             f"pieces of a {self.on} are of degree {' or '.join(map(str, degrees))}",
             "choose one",
             of="order",
         )
-        _require(
+        require(
             self.order == 3 or self.contact == "ground",
             "linear pieces under a contact on the base",
             "the base's acceleration must be finite there",
             "use order=3",
         )
         values, least = np.array(self.samples, dtype=np.float64), max(self.order, 1) + 1
-        _require(
+        require(
             values.ndim == 1 and len(values) >= least and bool(np.all(np.isfinite(values))),
             f"samples of shape {values.shape}",
             f"at least {least} finite numbers in one row are needed",
             "cut or mend the record",
         )
-        _require(
+        require(
             (self.fs is None) != (self.times is None),
             f"fs = {self.fs}, times = {'None' if self.times is None else 'given'}",
             "samples have one rate or their instants",
@@ -464,14 +524,14 @@ class Recorded:
 def _require_increasing(times: Sequence[float], count: int) -> None:
     """Refuse instants that are not those of so many values, increasing from 0."""
     values = np.asarray(times, dtype=np.float64)
-    _require(
+    require(
         values.shape == (count,) and bool(np.all(np.isfinite(values))),
         f"{values.size} times of {count} values",
         "each value has its instant, a finite number",
         "give as many of one as of the other",
         of="times",
     )
-    _require(
+    require(
         values[0] == 0 and bool(np.all(np.diff(values) > 0)),
         f"times from {values[0]:g} to {values[-1]:g} s",
         "instants increase from 0",
@@ -517,7 +577,7 @@ class SpeedProfile:
         for name in ("times", "speeds"):
             object.__setattr__(self, name, tuple(float(value) for value in getattr(self, name)))
         values = np.array([*self.times, *self.speeds])
-        _require(
+        require(
             len(self.times) == len(self.speeds) >= 2 and bool(np.all(np.isfinite(values))),
             f"{len(self.times)} times and {len(self.speeds)} speeds",
             "both are finite numbers, as many of one as of the other, at least two",
@@ -531,112 +591,6 @@ class SpeedProfile:
         steps = np.diff(times)
         ways = np.cumsum([0.0, *(steps * (speeds[1:] + speeds[:-1]) / 2)])
         return _pieces(times, [ways, speeds, [*(np.diff(speeds) / steps), 0.0]], self.on)
-
-
-@parametric
-class Imposed:
-    r"""The mass itself moves as a drive would move the spring's end: what a contact does under it, and no more.
-
-    The friction of a motion that is known beforehand (thesis, sections 3.3 and 4.5): :math:`x(t)` is imposed, mass,
-    spring and damper play no part, and the law gives :math:`f(t)`. It takes a law of linear modes whose contact gives
-    way; one that holds the mass would hold the motion.
-
-    Raises
-    ------
-    ModelError
-        A drive that moves no base, or one whose velocity jumps.
-
-    Examples
-    --------
-    >>> Imposed(HarmonicBase(1e-3, frequency=2.5)).motion().imposed
-    {'cos0': 0.001}
-    """
-
-    label = "Motion of the mass, imposed"
-
-    drive: Drive = parameter("", "whose motion of the base the mass has")
-
-    def __post_init__(self) -> None:
-        require_drive(self.drive)
-        own = self.drive.motion()
-        _require(
-            bool(own.base) and not own.force and not own.face,
-            f"{type(self.drive).__name__} imposed",
-            "a motion that is imposed is one of a base alone",
-            'give a drive with on="base" and contact="ground", as HarmonicBase(1e-3, frequency=2.5)',
-            of="drive",
-        )
-        rates = {name for name in own.base for name in own.rates.get(name, {})}
-        jumps = own.knots is not None and any(name in own.knotted and not own.rates[name] for name in rates)
-        _require(
-            not jumps,
-            f"{type(self.drive).__name__} of straight pieces, imposed",
-            "a mass has no jumps of its velocity",
-            "use order=3",
-            of="drive",
-        )
-
-    def motion(self) -> Motion:
-        """The drive's signals, its base's displacement as the mass's own."""
-        own = self.drive.motion()
-        return replace(own, base={}, imposed=own.base)
-
-
-@parametric
-class Dithered:
-    r"""Any drive, with a fast small tone along the contact on top: :math:`a \cos(2\pi F t + \varphi)`.
-
-    Examples
-    --------
-    >>> Dithered(HarmonicBase(1e-3, frequency=2.5), amplitude=1e-5, frequency=250.0).motion().period
-    0.4
-    """
-
-    label = "Drive with dither"
-
-    drive: Drive = parameter("", "what moves the system besides")
-    amplitude: float = parameter(
-        "m", "amplitude", signed=True, note="a, of the counter-face or of the spring's end; in N of a force on the mass"
-    )
-    frequency: float = parameter("Hz", "frequency", positive=True, note="F")
-    phase: float = parameter("rad", "phase", default=0.0, signed=True)
-    on: str = parameter(
-        "",
-        "what the tone moves",
-        default="face",
-        choices=("face", "base", "force"),
-        note="the counter-face, the spring's end, or the mass (a force)",
-    )
-
-    def __post_init__(self) -> None:
-        require_drive(self.drive)
-        _require(
-            not isinstance(self.drive, Dithered),
-            "dither on a dithered drive",
-            "one tone is put on top",
-            "leave one out",
-        )
-        self.motion()
-
-    def motion(self) -> Motion:
-        """The drive's signals and a turning pair; it repeats where the drive holds a whole number of its cycles."""
-        own, omega = self.drive.motion(), 2 * math.pi * self.frequency
-        _check_frequency(self.frequency)
-        moved = {part: dict(getattr(own, part)) for part in ("force", "base", "face")}
-        moved[self.on]["dither"] = self.amplitude
-        cycles = own.period * self.frequency
-        whole = math.isfinite(cycles) and abs(cycles - round(cycles)) <= 1e-9 * cycles
-        still = not own.rates and own.knots is None
-        return replace(
-            own,
-            rates={**own.rates, "dither": {"dither'": -omega}, "dither'": {"dither": omega}},
-            start={**own.start, "dither": math.cos(self.phase), "dither'": math.sin(self.phase)},
-            tones=(*own.tones, ("dither", "dither'", omega, self.phase)),
-            period=1 / self.frequency if still else own.period if whole else math.inf,
-            force=moved["force"],
-            base=moved["base"],
-            face=moved["face"],
-        )
 
 
 def _moved(motion: Motion, *, force: Row | None = None, base: Row | None = None, face: Row | None = None) -> Motion:

@@ -41,9 +41,11 @@ def plot_joint(joint: JointFriction, *, ax: Axes | None = None) -> Axes:
     """
     ax, unit = axes_of(ax), joint.level.unit
     ax.plot(joint.speed, joint.friction, ".", color=BLUE, markersize=3, alpha=0.5, label="while it slides")
-    for side in (-1, 1):
+    under_load = joint.load.value * joint.carried if joint.load is not None and joint.load.known else 0.0
+    ways = ((-1, joint.back, joint.viscous_back), (1, joint.forward, joint.viscous_forward))
+    for side, coulomb, viscous in ways:
         speed = np.linspace(0, side * np.abs(joint.speed).max(), 50)
-        friction = side * joint.level.value + joint.viscous.value * speed
+        friction = side * (coulomb.value + under_load) + (viscous or joint.viscous).value * speed
         ax.plot(speed, friction, color=ORANGE, linewidth=1.6, label="under the mean load" if side > 0 else None)
     ax.axhline(0.0, color=INK, linewidth=0.6)
     ax.set(xlabel=f"speed [{'rad/s' if unit == 'N m' else 'm/s'}]", ylabel=f"friction [{unit}]")

@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from stickslip.contact.frequency_transition import Transition
-from stickslip.drives.kinds import Belt, Dithered
+from stickslip.drives.kinds import Belt
+from stickslip.drives.on_another import Dithered
 from stickslip.errors import ModelError, SolveError
 from stickslip.estimate import Doubt, Estimate, Result, Status
 from stickslip.maps.basins import Start

@@ -20,6 +20,7 @@ from stickslip.story.fit import ALONE, FILES
 from stickslip.story.story import Story
 from stickslip.story.words import Caution, cautions, interval_of, number, value_of
 
+RARELY = 0.005  # of the time
 APART = 0.05  # of the level, by which forward and back must differ to be worth a sentence
 
 
@@ -61,7 +62,7 @@ def _headline(findings: Findings) -> Iterator[str]:
     if findings.breakaway is not None:
         ratio = findings.breakaway.ratio
         yield f"It breaks away at {value_of(ratio)} times its sliding friction (95 %: {interval_of(ratio)})."
-    if findings.sticks is not None and stands(findings.sticks.share.status):
+    if findings.sticks is not None and findings.sticks.share.value > RARELY and stands(findings.sticks.share.status):
         yield f"It stands still up to {value_of(findings.sticks.share)} of the time."
 
 

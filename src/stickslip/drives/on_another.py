@@ -1,0 +1,117 @@
+"""A drive on another one: a fast tone on top of it, or its motion imposed on the mass itself."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+from stickslip.drives.kinds import Drive, Motion, check_frequency, require, require_drive
+from stickslip.parameters import parameter, parametric
+
+
+@parametric
+class Imposed:
+    r"""The mass itself moves as a drive would move the spring's end: what a contact does under it, and no more.
+
+    The friction of a motion that is known beforehand (thesis, sections 3.3 and 4.5): :math:`x(t)` is imposed, mass,
+    spring and damper play no part, and the law gives :math:`f(t)`. It takes a law of linear modes whose contact gives
+    way; one that holds the mass would hold the motion.
+
+    Raises
+    ------
+    ModelError
+        A drive that moves no base, or one whose velocity jumps.
+
+    Examples
+    --------
+    >>> from stickslip.drives.kinds import HarmonicBase
+    >>> Imposed(HarmonicBase(1e-3, frequency=2.5)).motion().imposed
+    {'cos0': 0.001}
+    """
+
+    label = "Motion of the mass, imposed"
+
+    drive: Drive = parameter("", "whose motion of the base the mass has")
+
+    def __post_init__(self) -> None:
+        require_drive(self.drive)
+        own = self.drive.motion()
+        require(
+            bool(own.base) and not own.force and not own.face,
+            f"{type(self.drive).__name__} imposed",
+            "a motion that is imposed is one of a base alone",
+            'give a drive with on="base" and contact="ground", as HarmonicBase(1e-3, frequency=2.5)',
+            of="drive",
+        )
+        rates = {name for name in own.base for name in own.rates.get(name, {})}
+        jumps = own.knots is not None and any(name in own.knotted and not own.rates[name] for name in rates)
+        require(
+            not jumps,
+            f"{type(self.drive).__name__} of straight pieces, imposed",
+            "a mass has no jumps of its velocity",
+            "use order=3",
+            of="drive",
+        )
+
+    def motion(self) -> Motion:
+        """The drive's signals, its base's displacement as the mass's own."""
+        own = self.drive.motion()
+        return replace(own, base={}, imposed=own.base)
+
+
+@parametric
+class Dithered:
+    r"""Any drive, with a fast small tone along the contact on top: :math:`a \cos(2\pi F t + \varphi)`.
+
+    Examples
+    --------
+    >>> from stickslip.drives.kinds import HarmonicBase
+    >>> Dithered(HarmonicBase(1e-3, frequency=2.5), amplitude=1e-5, frequency=250.0).motion().period
+    0.4
+    """
+
+    label = "Drive with dither"
+
+    drive: Drive = parameter("", "what moves the system besides")
+    amplitude: float = parameter(
+        "m", "amplitude", signed=True, note="a, of the counter-face or of the spring's end; in N of a force on the mass"
+    )
+    frequency: float = parameter("Hz", "frequency", positive=True, note="F")
+    phase: float = parameter("rad", "phase", default=0.0, signed=True)
+    on: str = parameter(
+        "",
+        "what the tone moves",
+        default="face",
+        choices=("face", "base", "force"),
+        note="the counter-face, the spring's end, or the mass (a force)",
+    )
+
+    def __post_init__(self) -> None:
+        require_drive(self.drive)
+        require(
+            not isinstance(self.drive, Dithered),
+            "dither on a dithered drive",
+            "one tone is put on top",
+            "leave one out",
+        )
+        self.motion()
+
+    def motion(self) -> Motion:
+        """The drive's signals and a turning pair; it repeats where the drive holds a whole number of its cycles."""
+        own, omega = self.drive.motion(), 2 * math.pi * self.frequency
+        check_frequency(self.frequency)
+        moved = {part: dict(getattr(own, part)) for part in ("force", "base", "face")}
+        moved[self.on]["dither"] = self.amplitude
+        cycles = own.period * self.frequency
+        whole = math.isfinite(cycles) and abs(cycles - round(cycles)) <= 1e-9 * cycles
+        still = not own.rates and own.knots is None
+        return replace(
+            own,
+            rates={**own.rates, "dither": {"dither'": -omega}, "dither'": {"dither": omega}},
+            start={**own.start, "dither": math.cos(self.phase), "dither'": math.sin(self.phase)},
+            tones=(*own.tones, ("dither", "dither'", omega, self.phase)),
+            period=1 / self.frequency if still else own.period if whole else math.inf,
+            force=moved["force"],
+            base=moved["base"],
+            face=moved["face"],
+        )
