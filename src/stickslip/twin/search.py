@@ -50,7 +50,7 @@ QUESTION = "the twin of a record"
 # How many starts, cycles and passes: by trial on the rigs of benchmarks/twins.py with Stribeck's curve, constants half
 # a per cent off, and with LuGre's bristles (seeds 621 and 622), of which every one but two was then led to its noise.
 STARTS = 9  # of a grid, that are led over a first cycle: some end in a valley of their own
-KEPT = 4  # of them, the nearest, that are led further
+KEPT = 4  # of them, the nearest, that are led further; one where a value is held: its valley is the same (seed 911)
 SAME = 0.01  # of its size, by which a part may differ between two searches that came to the same end
 FAR = 2.0  # times what the best law leaves of the beginning, beyond which a law is not led over the whole record
 PASSES = 20  # of the descent: in a narrow valley; elsewhere the first two do nearly all of it
@@ -216,7 +216,8 @@ def _nearest_of(starts: list[Belief], record: Record) -> list[Belief]:
     """The nearest to a record's beginning of those that a family's starts lead to, and others as near."""
     first, *longer = (record.rows(0, samples) for samples in _horizons(record))
     starts = sorted((replace(begun, record=first) for begun in starts), key=_left)
-    nearest = sorted((_tried(begun, 1) for begun in starts[:STARTS]), key=_left)[:KEPT]
+    kept = 1 if starts[0].held else KEPT
+    nearest = sorted((_tried(begun, 1) for begun in starts[:STARTS]), key=_left)[:kept]
     best, *others = sorted((_with_slope(_led(begun, [first, *longer])) for begun in nearest), key=_left)
     return [best, *(other for other in others if _as_near(other, best) and not _same(other, best))]
 
