@@ -27,7 +27,8 @@ def truths(joint: joints.Joint, time: np.ndarray) -> dict[str, float]:
     """The true values under the names of the answer."""
     true = joint.truth
     return {
-        **{name: true[name] for name in ("forward", "back", "load", "viscous", "inertia")}, "damping": true["kd"],
+        **{name: true[name] for name in ("forward", "back", "load", "viscous", "inertia")},
+        "damping": true["kd"] - true["kp"] * joints.PERIOD / 2,
         "level": joint.level(time),
     }  # fmt: skip
 

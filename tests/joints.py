@@ -25,6 +25,8 @@ SERVOS = {
     "eRob80:100": (0.989, 4.832, 0.148, 7.395),
 }  # fmt: skip
 
+PERIOD = 1e-3  # s, for which the controller holds its output
+
 
 @dataclass(frozen=True)
 class Joint:
@@ -117,7 +119,7 @@ def drawn(seed: int, *, torque: bool, seconds: float = 30.0, loaded: bool = True
     steps = int(np.ceil(STEPS / fs))
     fine = np.arange(int(seconds * fs) * steps + 1) / (fs * steps)
     reference = _reference(str(chance.choice(["sines", "stairs"])), fine, chance)
-    count = max(1, round(fs * steps / 1000))  # the controller runs at 1 kHz
+    count = max(1, round(fs * steps * PERIOD))
     angle, motor = march(np.array(list(truth.values())), reference, np.gradient(reference, fine), steps, count, fs)
     size = 2 * np.pi / 2 ** int(chance.integers(8, 17))
     written = {"theta": np.round(angle / size) * size, "reference": reference[count // 2 : -1 : steps]}

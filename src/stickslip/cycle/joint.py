@@ -35,7 +35,7 @@ CONFOUNDED, NOISY, LOADED = "confounded", "noisy", "loaded"  # kinds of doubt
 WORDS = {
     "inertia": "inertia", "viscous": "viscous friction", "uneven": "uneven viscous friction",
     "forward": "Coulomb friction forward", "back": "Coulomb friction back", "load": "friction per load",
-    "sine": "gravity, sine part", "cosine": "gravity, cosine part", "damping": "damping of the controller",
+    "sine": "gravity, sine part", "cosine": "gravity, cosine part", "damping": "damping of the control loop",
 }  # fmt: skip
 ADVICE = {
     "inertia": "accelerate harder, by steps or faster swings",
@@ -75,7 +75,8 @@ class JointFriction(Result):
     sine, cosine : Estimate or None
         Gravity's torque [N m] over the sine and the cosine of the angle.
     damping : Estimate or None
-        Of the controller [N m s/rad], where it was neither stated nor in the torque.
+        Of the control loop [N m s/rad], where it was neither stated nor in the torque: a controller that holds its
+        output for a time h damps by kp h / 2 less than its kd says.
     torque : ndarray, shape (n,)
         The motor's torque [N m] at each sample.
     gain : float
