@@ -14,6 +14,7 @@ from stickslip.cli.program import main
 from stickslip.cycle import joint_breakaway, regress_joint
 from stickslip.errors import EstimateError, ModelError, RecordError
 from stickslip.estimate import kinds, stands
+from stickslip.figures.joint import plot_joint
 from stickslip.units import parse_unit
 
 TRUTH = {"inertia": 0.02, "forward": 0.07, "back": 0.05, "load": 0.15, "viscous": 0.03, "sine": 0.5, "cosine": -0.2}
@@ -322,3 +323,11 @@ def test_cells_that_are_not_alike_are_refused_in_a_sentence(tmp_path):
     parquet.write_table(pyarrow.table({"q": [[1.0, 2.0], [1.0]], "timestamp": [0.0, 0.1]}), path)
     with pytest.raises(ss.StickslipError, match=r"ragged\.parquet"):
         ss.read_record(path)
+
+
+def test_the_figure_draws_either_direction_by_its_own_friction() -> None:
+    joint = regress_joint(log(noise=0.005, forward=0.12, back=0.03))
+    _, back, forward, _ = plot_joint(joint).lines
+    share = joint.load.value * joint.carried
+    assert back.get_ydata()[0] == pytest.approx(-joint.back.value - share)
+    assert forward.get_ydata()[0] == pytest.approx(joint.forward.value + share)
