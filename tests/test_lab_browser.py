@@ -184,6 +184,8 @@ def test_a_slider_follows_a_value_in_another_unit(page: Page, lab: Lab) -> None:
 
 
 def test_scenarios_are_named_in_words_beside_their_codes(page: Page) -> None:
+    page.locator("#preset").focus()
+    page.wait_for_selector("#presets option", state="attached", timeout=PATIENCE)
     names = page.eval_on_selector_all("#presets option", "(all) => all.map((each) => each.value)")
     assert "frequency ratio 0.6 (DH-1 b=0.6)" in names
     assert "wet (SQUEAK wet 6.13 N)" in names

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import stickslip as ss
-from stickslip.lab.forms import Answer, boundary, catalog
+from stickslip.lab.forms import Answer, boundary, catalog, presets
 
 Array = NDArray[np.float64]
 GoOn = Callable[[float], None]
@@ -133,7 +133,7 @@ def opened(request: Mapping[str, Any], go_on: GoOn) -> Answer:
 
 ANSWERS: dict[str, Callable[[Mapping[str, Any], GoOn], Answer]] = {
     "catalog": catalog, "boundary": boundary, "run": run, "tell": tell, "wavelet": wavelet, "sound": sound,
-    "preset": preset, "export": export, "open": opened,
+    "preset": preset, "presets": presets, "export": export, "open": opened,
 }  # fmt: skip
 
 

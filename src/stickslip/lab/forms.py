@@ -27,15 +27,21 @@ MORE = ("law", "drive", "contacts")
 
 
 def catalog(request: Mapping[str, Any], go_on: Any) -> Answer:
-    """All that can be chosen: ``{"laws": ..., "drives": ..., "system": ..., "presets": ...}``."""
+    """What the form is made of, and what plays first: ``{"laws": ..., "drives": ..., "system": ..., "first": ...}``."""
     return {
         "laws": {name: _part(make) for name, make in ss.scenarios.LAWS.items()},
         "drives": {name: _part(make) for name, make in ss.scenarios.DRIVES.items()},
         "system": _part(ss.Oscillator),
         "contact": _part(ss.Contact),
-        "presets": _presets(),
-        "first": {"name": FIRST, "state": first_state()},
+        "first": {"name": FIRST, "about": ss.systems.scenario_case(FIRST).about, "state": first_state()},
     }, {}
+
+
+def presets(request: Mapping[str, Any], go_on: Any) -> Answer:
+    """The scenarios, those together that are told alike: what is searched, once somebody searches."""
+    cases = [ss.systems.scenario_case(name) for name in ss.scenarios.names()]
+    alike = itertools.groupby(cases, key=lambda case: (case.about, case.parts))
+    return {"presets": [{"about": about, "names": [case.name for case in group]} for (about, _), group in alike]}, {}
 
 
 def boundary(request: Mapping[str, Any], go_on: Any) -> Answer:
@@ -50,13 +56,6 @@ def first_state() -> dict[str, Any]:
         ss.systems.export_system(ss.systems.scenario_case(FIRST).lasting(cycles=8), format="json")
     )
     return held
-
-
-def _presets() -> list[dict[str, Any]]:
-    """The scenarios, those together that are told alike."""
-    cases = [ss.systems.scenario_case(name) for name in ss.scenarios.names()]
-    alike = itertools.groupby(cases, key=lambda case: (case.about, case.parts))
-    return [{"about": about, "names": [case.name for case in group]} for (about, _), group in alike]
 
 
 def _part(make: Any) -> dict[str, Any]:

@@ -182,7 +182,7 @@ async def _body(request: Request) -> Any:
         raise HTTPException(400, "The request holds no JSON; send an object.") from error
 
 
-@described("All laws, drives and scenarios, with their parameters", answer={"type": "object"})
+@described("All laws and drives with their parameters, and what plays first", answer={"type": "object"})
 async def _catalog(request: Request) -> Response:
     request.app.state.opened.set()
     return await _answer(request, {"want": "catalog"})
@@ -191,6 +191,11 @@ async def _catalog(request: Request) -> Response:
 @described("Den Hartog's line over the frequency ratio", answer={"type": "object", "required": ["boundary"]})
 async def _boundary(request: Request) -> Response:
     return await _answer(request, {"want": "boundary"})
+
+
+@described("The scenarios, and what is said of them", answer={"type": "object", "required": ["presets"]})
+async def _presets(request: Request) -> Response:
+    return await _answer(request, {"want": "presets"})
 
 
 @described("The state of a scenario", answer={"type": "object", "required": ["state"]})
@@ -214,6 +219,7 @@ routes: list[BaseRoute] = [
     WebSocketRoute("/play", _play),
     Route("/catalog", _catalog),
     Route("/boundary", _boundary),
+    Route("/scenarios", _presets),
     Route("/scenarios/{name}", _preset),
     Route("/export", _export, methods=["POST"]),
     Route("/open", _open, methods=["POST"]),

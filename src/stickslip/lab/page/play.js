@@ -42,7 +42,7 @@ export async function start(given) {
     own();
     ask(since, afresh);
   });
-  presets(catalog.presets, shared ? "" : catalog.first.name);
+  presets(shared ? {} : catalog.first);
   use(shared ?? catalog.first.state);
   addEventListener("hashchange", () => { const link = fromLink(); if (link) { own(); use(link); } });
   lab.onTheme(() => { if (run) { build(); drawTraces(); drawViews(); stage.show(run, lab.colours()); } });
@@ -83,10 +83,16 @@ const PICTURED = [
   ["FD-4", "Let go", "M6 6C12 40 18 4 24 14C28 26 32 14 36 17H54"],
   ["SQUEAK wet 6.13 N", "Squeals", "M6 17C8 2 10 32 12 17S16 2 18 17S22 32 24 17S28 2 30 17S34 32 36 17S40 2 42 17S46 32 48 17"],
 ];
-function presets(offered, chosen) {
-  const words = new Map();
-  for (const { about, names } of offered) for (const name of names) words.set(name, about);
-  for (const [name, about] of words) $("presets").append(new Option("", `${plainly(name, about)} (${name})`));
+function presets({ name: chosen = "", about = "A system of your own, or from a link or file." }) {
+  let listed; // the names, promised once somebody searches
+  const list = async () => {
+    const words = new Map();
+    const { presets } = await lab.ask("scenarios").catch(failed) ?? { presets: [] };
+    for (const { about, names } of presets) for (const name of names) words.set(name, about);
+    for (const [name, about] of words) $("presets").append(new Option("", `${plainly(name, about)} (${name})`));
+    return words;
+  };
+  $("preset").addEventListener("focus", () => { listed ??= list(); });
   for (const [name, title, path] of PICTURED) {
     const button = $("pictured").appendChild(document.createElement("button"));
     button.type = "button";
@@ -99,16 +105,16 @@ function presets(offered, chosen) {
     if (!state) return;
     if (short && state.run?.cycles > SHORT) state.run.cycles = SHORT;
     begun = name;
-    $("about").textContent = words.get(name);
+    $("about").textContent = state.about;
     pressed();
     use(state);
   };
   begun = chosen;
-  $("about").textContent = words.get(chosen) ?? "A system of your own, or from a link or file.";
+  $("about").textContent = about;
   pressed();
-  $("preset").addEventListener("change", () => {
+  $("preset").addEventListener("change", async () => {
     const name = /\((.*)\)$/.exec($("preset").value)?.[1] ?? $("preset").value;
-    if (words.has(name)) begin(name);
+    if ((await (listed ??= list())).has(name)) begin(name);
     else if (name) lab.say(`No scenario is called “${name}”; choose one of the list.`, true);
   });
 }
