@@ -382,15 +382,25 @@ def _step(belief: Belief) -> Belief | None:
     """Nearer to the record by its own slopes; None where no part of that step leads nearer."""
     fit = belief.fit
     assert fit is not None
-    before = _left(belief)
-    reach = np.array([belief.reach(name) for name in fit.names])
-    # Levenberg's and Marquardt's: what x hardly tells is not moved out of its reach, and holds the others back no more
-    scaled = fit.normal * np.outer(reach, reach)
-    towards = scaled @ ((fit.gain @ belief.residual - fit.pull) / reach)
-    step = reach * np.linalg.solve(scaled + belief.noise**2 * np.eye(len(reach)), towards)
-    step /= max(1.0, float(np.max(np.abs(step) / reach)))
+    before, step = _left(belief), _towards(belief, fit)
     moved = (belief.by(fit.names, step / 2**halving) for halving in range(HALVINGS))
     return next((nearer for nearer in moved if _left(nearer) < before), None)
+
+
+def _towards(belief: Belief, fit: Fit) -> Array:
+    """Gauss's and Newton's step, damped as Levenberg's and Marquardt's, and within the values' reach."""
+    reach = np.array([belief.reach(name) for name in fit.names])
+    seen = fit.normal * np.outer(reach, reach)
+    pulled = seen @ ((fit.gain @ belief.residual - fit.pull) / reach)
+    damped = seen + belief.noise**2 * np.eye(len(reach))  # what x hardly tells holds the others back no more
+    step, free = np.zeros(len(reach)), np.ones(len(reach), dtype=bool)
+    while True:
+        step[free] = np.linalg.solve(damped[np.ix_(free, free)], pulled[free])
+        out = [belief.pinned(name, towards) for name, towards in zip(fit.names, step, strict=True)]
+        if not (free & out).any():
+            return np.asarray(reach * step / max(1.0, float(np.max(np.abs(step)))))
+        free &= ~np.array(out)  # a value that would leave where it may be stays, and the others go without it
+        step[~free] = 0.0
 
 
 def _learned(before: Belief, moved: Belief) -> Belief:
