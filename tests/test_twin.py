@@ -16,7 +16,8 @@ import stickslip as ss
 from stickslip.answers.on_twins import _yields
 from stickslip.cli.program import main
 from stickslip.estimate import UNTRIED, kinds, stands
-from stickslip.twin.search import believe
+from stickslip.twin.belief import EXCESS, HELD, SLOPE
+from stickslip.twin.search import _left, _linearised, _step, _towards, believe
 from stickslip.twin.trial import ASTRAY
 
 RATIO = "static over sliding friction"
@@ -164,6 +165,19 @@ def test_bristles_are_found_with_their_stiffness() -> None:
     assert isinstance(tried.trial.belief.law, ss.laws.LuGre)
     assert tried.loops.level.value == pytest.approx(0.96, rel=0.01)
     assert tried.presliding.stiffness.value == pytest.approx(8000.0, rel=0.05)
+
+
+def test_a_value_at_its_end_stays_and_the_search_goes_on_without_it() -> None:
+    # a slope that may not fall below zero, and was drawn there, had ended the search with a step that led nowhere
+    rig = stepped.Rig("LuGre", 2.0, 800.0, 1.0, 4e-3, 2.4, kinetic=0.96, static=1.3, speed=8e-3, contact=8000.0)
+    belief = believe(ss.friction_force(stepped.record(rig, np.random.default_rng(11), noise=1e-4), **rig.stated))
+    doubled = {EXCESS: 2 * belief.values[EXCESS], SLOPE: 0.0, HELD: 1.0}
+    far = _linearised(replace(belief.at(**doubled), held=EXCESS))
+    step = dict(zip(far.fit.names, _towards(far, far.fit), strict=True))
+    assert all(step[name] == 0 or not far.pinned(name, step[name]) for name in step)
+    nearer = _step(far)
+    assert nearer is not None
+    assert _left(nearer) < _left(far)
 
 
 def test_friction_that_falls_with_speed_is_found_with_its_static_level() -> None:
