@@ -325,6 +325,12 @@ def test_cells_that_are_not_alike_are_refused_in_a_sentence(tmp_path):
         ss.read_record(path)
 
 
+def test_a_joint_that_never_rests_is_not_told_to_stand_still() -> None:
+    sticks = analyze_joint(log(noise=0.005)).sticks
+    assert not stands(sticks.share.status)
+    assert not stands(sticks.per_cycle.status)
+
+
 def test_the_figure_draws_either_direction_by_its_own_friction() -> None:
     joint = regress_joint(log(noise=0.005, forward=0.12, back=0.03))
     _, back, forward, _ = plot_joint(joint).lines

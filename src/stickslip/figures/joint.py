@@ -26,19 +26,7 @@ def plates_of(joint: JointFriction) -> list[Plate]:
 
 @styled
 def plot_joint(joint: JointFriction, *, ax: Axes | None = None) -> Axes:
-    """Friction over speed while the joint slides, and what is made of it.
-
-    Parameters
-    ----------
-    joint : JointFriction
-        What :func:`~stickslip.cycle.regress_joint` returned.
-    ax : Axes, optional
-        Where to draw.
-
-    Returns
-    -------
-    Axes
-    """
+    """Friction over speed while the joint slides, and what is made of it."""
     ax, unit = axes_of(ax), joint.level.unit
     ax.plot(joint.speed, joint.friction, ".", color=BLUE, markersize=3, alpha=0.5, label="while it slides")
     under_load = joint.load.value * joint.carried if joint.load is not None and joint.load.known else 0.0
@@ -55,19 +43,7 @@ def plot_joint(joint: JointFriction, *, ax: Axes | None = None) -> Axes:
 
 @styled
 def plot_torque(joint: JointFriction, *, ax: Axes | None = None) -> Axes:
-    """The torque while the joint slides, and what is made of it.
-
-    Parameters
-    ----------
-    joint : JointFriction
-        What :func:`~stickslip.cycle.regress_joint` returned.
-    ax : Axes, optional
-        Where to draw.
-
-    Returns
-    -------
-    Axes
-    """
+    """The torque while the joint slides, and what is made of it."""
     ax, what = axes_of(ax), "torque" if joint.level.unit == "N m" else "force"
     ax.plot(joint.time, joint.measured, ".", color=BLUE, markersize=3, label=f"{what}, smoothed")
     ax.plot(joint.time, joint.explained, ".", color=ORANGE, markersize=2, label="explained")
