@@ -47,6 +47,7 @@ def lab() -> Iterator[Lab]:
 @pytest.fixture(scope="module")
 def browser() -> Iterator[Browser]:
     with sync_playwright() as play:
+        expect.set_options(timeout=PATIENCE)
         browser = play.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox", "--disable-gpu"])
         yield browser
         browser.close()
@@ -56,6 +57,7 @@ def browser() -> Iterator[Browser]:
 def page(lab: Lab, browser: Browser) -> Iterator[Page]:
     """The page, opened by the address that the lab prints; no error and no request to elsewhere may come of its use."""
     context = browser.new_context(viewport={"width": 1200, "height": 900}, accept_downloads=True, color_scheme="light")
+    context.set_default_timeout(PATIENCE)
     page = context.new_page()
     wrong: list[str] = []
     page.on("pageerror", lambda error: wrong.append(str(error)))
@@ -181,6 +183,19 @@ def test_a_slider_follows_a_value_in_another_unit(page: Page, lab: Lab) -> None:
     frequency.press("Tab")
     told = page.locator("#drive-frequency ~ input[type=range]")
     expect(told).to_have_attribute("aria-valuetext", "3 Hz", timeout=PATIENCE)
+
+
+def test_a_link_opened_while_the_motion_before_comes_to_rest_is_shown(page: Page, lab: Lab) -> None:
+    opened = link(page, STATE).partition("#")[2]
+    page.evaluate(
+        """(opened) => {
+          const before = location.href;
+          location.hash = opened;
+          history.replaceState(null, "", before);  // as the motion at rest does, before the page hears of the link
+        }""",
+        opened,
+    )
+    page.wait_for_function(SHOWN, arg=printed(STATE))
 
 
 def test_scenarios_are_named_in_words_beside_their_codes(page: Page) -> None:

@@ -44,7 +44,11 @@ export async function start(given) {
   });
   presets(shared ? {} : catalog.first);
   use(shared ?? catalog.first.state);
-  addEventListener("hashchange", () => { const link = fromLink(); if (link) { own(); use(link); } });
+  // The event's own address: by now the address bar may hold again what rested meanwhile.
+  addEventListener("hashchange", ({ newURL }) => {
+    const opened = fromLink(new URL(newURL).hash);
+    if (opened) { own(); use(opened); }
+  });
   lab.onTheme(() => { if (run) { build(); drawTraces(); drawViews(); stage.show(run, lab.colours()); } });
 }
 
@@ -598,10 +602,10 @@ function link() {
   const text = btoa(String.fromCharCode(...new TextEncoder().encode(JSON.stringify(state))));
   return `#${text.replaceAll("+", "-").replaceAll("/", "_").replace(/=+$/, "")}`;
 }
-function fromLink() {
-  if (location.hash.length < 2) return null;
+function fromLink(hash = location.hash) {
+  if (hash.length < 2) return null;
   try {
-    const text = atob(location.hash.slice(1).replaceAll("-", "+").replaceAll("_", "/"));
+    const text = atob(hash.slice(1).replaceAll("-", "+").replaceAll("_", "/"));
     return JSON.parse(new TextDecoder().decode(Uint8Array.from(text, (sign) => sign.charCodeAt(0))));
   } catch {
     lab.say("The link holds no system; the page begins with its first one.", true);
