@@ -26,20 +26,12 @@ NAMES = {
     "current": ("present current", "motor current", "actual current", "joint current", "current"),
 }  # fmt: skip
 OTHERS = {
-    "velocity", "velocities", "accelerations", "vel", "qvel", "speed", "acceleration", "acc", "temperature", "voltage", "pwm", "load", "error",
+    "velocity", "velocities", "vel", "qvel", "speed", "acceleration", "accelerations", "acc", "temperature", "voltage",
+    "pwm", "load", "error",
 }  # fmt: skip
 WANTED = {
-    "goal",
-    "target",
-    "desired",
-    "command",
-    "commands",
-    "commanded",
-    "cmd",
-    "reference",
-    "action",
-    "output",
-}  # of a torque: not measured
+    "goal", "target", "desired", "command", "commands", "commanded", "cmd", "reference", "action", "output",
+}  # fmt: skip  # of a torque: not measured
 SOURCES = {"state", "states", "feedback"}  # who says it, not of which axis
 TURNING = {"theta": "rad", "reference": "rad", "force": "N m", "current": "A"}
 

@@ -106,7 +106,7 @@ def joined(path: Path, streams: Sequence[Stream], notes: Sequence[str] = ()) -> 
 
 
 def _titles(streams: Sequence[Stream]) -> list[list[str]]:
-    """Of each stream its columns' names: of joints as they are called, of others and of what clashes after the topic."""
+    """Of each stream its columns' names: those of joints as they are, others, and what clashes, after the topic."""
     often = Counter(name for stream in streams if stream.named for name in stream.columns)
     titles = iter(
         unique([

@@ -27,20 +27,9 @@ from stickslip.record.record import DETAILS, Record, Step
 
 # Asked in this order whether a file is theirs; each is a module beside this one, imported when it is its turn.
 FORMATS = (
-    "journal",
-    "tdms",
-    "matlab",
-    "hdf5",
-    "parquet",
-    "uff",
-    "audio",
-    "lvm",
-    "mcap",
-    "rosbag",
-    "mdf",
-    "json_table",
-    "text",
-)
+    "journal", "tdms", "matlab", "hdf5", "parquet", "uff", "audio", "lvm", "mcap", "rosbag", "mdf",
+    "json_table", "text",
+)  # fmt: skip
 
 HEAD = 1 << 16  # bytes shown to `recognise`
 Array = NDArray[np.float64]
