@@ -119,18 +119,22 @@ def _sure(
     **context: Any,
 ) -> tuple[Findings | Comparison, Path | None]:
     """The results, tried on twins and written; the quick ones are written first, and stay where that is interrupted."""
-    written = folder and ss.publish(told(found), folder=folder, **context)
     if not twins:
-        return told(found), written
-    try:
-        results = told([_tried(findings, twins, tell) for findings in found])
-        tell("drawing and writing")
+        results = told(found)
         return results, folder and ss.publish(results, folder=folder, **context)
-    except KeyboardInterrupt:
-        if written is None:
-            raise
-        complain(f"interrupted: {written} has the quick answers, not tried on twins.")
-        sys.exit(INTERRUPTED)
+    from concurrent.futures import ThreadPoolExecutor
+
+    with ThreadPoolExecutor(1) as beside:  # drawn here, while other processes look for the twins
+        quick = None if folder is None else beside.submit(ss.publish, told(found), folder=folder, **context)
+        try:
+            results = told([_tried(findings, twins, tell) for findings in found])
+            tell("drawing and writing")
+            return results, None if quick is None else ss.publish(results, folder=quick.result(), **context)
+        except KeyboardInterrupt:
+            if quick is None:
+                raise
+            complain(f"interrupted: {quick.result()} has the quick answers, not tried on twins.")
+            sys.exit(INTERRUPTED)
 
 
 def _tried(findings: Findings, twins: int, tell: Callable[..., None]) -> Findings:
