@@ -13,10 +13,10 @@ from numpy.typing import ArrayLike, NDArray
 from stickslip.drives.kinds import Drive, Release, require_drive
 from stickslip.errors import ModelError
 from stickslip.laws.base import Exit, Law, Mode, Row
+from stickslip.laws.coulomb import LinearSlope
 from stickslip.laws.curved import CurvedLaw, CurvedMode, lifted
 from stickslip.laws.filippov import with_sliding_modes
 from stickslip.laws.guessing import registered
-from stickslip.laws.linear_slope import LinearSlope
 from stickslip.laws.stribeck import Tabulated
 from stickslip.laws.time_delay import TimeDelay
 from stickslip.parameters import changed, finite, parameter, parametric

@@ -15,7 +15,7 @@ from stickslip.settings import nearest
 NAMES = {
     "theta": (
         "present position", "actual position", "measured position", "joint position", "motor position",
-        "observation state", "qpos", "position", "pos", "angle", "theta", "actual q", "joint angle", "q",
+        "observation state", "qpos", "positions", "position", "pos", "angle", "theta", "actual q", "joint angle", "q",
     ),
     "reference": (
         "goal position", "target position", "desired position", "commanded position", "reference position",
@@ -26,18 +26,13 @@ NAMES = {
     "current": ("present current", "motor current", "actual current", "joint current", "current"),
 }  # fmt: skip
 OTHERS = {
-    "velocity", "vel", "qvel", "speed", "acceleration", "acc", "temperature", "voltage", "pwm", "load", "error",
+    "velocity", "velocities", "vel", "qvel", "speed", "acceleration", "accelerations", "acc", "temperature", "voltage",
+    "pwm", "load", "error",
 }  # fmt: skip
 WANTED = {
-    "goal",
-    "target",
-    "desired",
-    "command",
-    "commanded",
-    "cmd",
-    "reference",
-    "action",
-}  # of a torque: not measured
+    "goal", "target", "desired", "command", "commands", "commanded", "cmd", "reference", "action", "output",
+}  # fmt: skip  # of a torque: not measured
+SOURCES = {"state", "states", "feedback"}  # who says it, not of which axis
 TURNING = {"theta": "rad", "reference": "rad", "force": "N m", "current": "A"}
 
 
@@ -127,7 +122,7 @@ def _columns(record: Record) -> Iterator[_Column]:
             continue
         if kind == "theta" and WANTED & set(words):
             kind, others = "reference", [word for word in others if word not in WANTED]
-        yield _Column(name, kind, "_".join(others))
+        yield _Column(name, kind, "_".join(word for word in others if word not in SOURCES))
 
 
 def _fits(name: str, axis: str) -> bool:

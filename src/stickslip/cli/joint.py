@@ -9,9 +9,9 @@ import click
 
 import stickslip as ss
 from stickslip.cli.options import reading_options, result_options
-from stickslip.cli.progress import progress
 from stickslip.cli.records import default_folder, groups_of, read, rig_of
 from stickslip.cli.show import show
+from stickslip.cli.terminal import progress
 
 
 @click.command()

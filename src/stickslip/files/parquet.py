@@ -10,12 +10,11 @@ from typing import Any
 import numpy as np
 
 from stickslip.errors import FormatError
-from stickslip.files.table import Array, Block, Column, Options, Table, optional, reading
+from stickslip.files.table import LISTED, Array, Block, Column, Options, Table, optional, reading
 from stickslip.record.metadata import KEY, parse_metadata
 
 NAME = "Parquet"
 SUFFIXES = (".parquet", ".pq")
-MOST = 256  # numbers in a cell: the joints of a robot; more are a picture
 
 
 def recognise(path: Path, head: bytes) -> bool:
@@ -93,10 +92,10 @@ def _length(file: Any, field: Any, types: Any) -> int:
     if not (types.is_floating(kind.value_type) or types.is_integer(kind.value_type)):
         return 0
     if types.is_fixed_size_list(kind):
-        return int(min(kind.list_size, MOST))
+        return int(min(kind.list_size, LISTED))
     first = next(file.iter_batches(batch_size=1, columns=[field.name], use_threads=False), None)
     cell = None if first is None or not len(first) else first.column(0)[0].as_py()
-    return len(cell) if cell and len(cell) <= MOST else 0
+    return len(cell) if cell and len(cell) <= LISTED else 0
 
 
 def _column(batch: Any, name: str, lists: Mapping[str, tuple[str, int]], origins: dict[str, Any]) -> Array:

@@ -26,7 +26,10 @@ from stickslip.record.metadata import Digests, channels_told, require_columns, r
 from stickslip.record.record import DETAILS, Record, Step
 
 # Asked in this order whether a file is theirs; each is a module beside this one, imported when it is its turn.
-FORMATS = ("journal", "tdms", "matlab", "hdf5", "parquet", "uff", "audio", "lvm", "json_table", "text")
+FORMATS = (
+    "journal", "tdms", "matlab", "hdf5", "parquet", "uff", "audio", "lvm", "mcap", "rosbag", "mdf",
+    "json_table", "text",
+)  # fmt: skip
 
 HEAD = 1 << 16  # bytes shown to `recognise`
 Array = NDArray[np.float64]
@@ -47,8 +50,8 @@ def read_record(
 ) -> Record:
     """Read a file, or several on one clock, as a Record in SI.
 
-    Formats: CSV and other text, MATLAB v5 to v7.3, TDMS, UFF 58, WAV/FLAC/OGG, HDF5, Parquet, LVM, JSON, the journal of
-    `stickslip acquire`. A file
+    Formats: CSV and other text, MATLAB v5 to v7.3, TDMS, UFF 58, WAV/FLAC/OGG, HDF5, Parquet, LVM, JSON, MCAP, bags of
+    ROS 1 and 2, MDF, the journal of `stickslip acquire`. A file
     that write_record wrote, read without arguments, is the same record again, history included.
 
     Parameters

@@ -22,6 +22,7 @@ Block = dict[str, Array]
 FREE = 1 << 24  # cells, 134 MB as numbers: what a file of any size may become
 PER_BYTE = 8  # cells that each byte of a larger file may become; speech in OGG, the tightest of honest files, has 4
 A_COLUMN = 1 << 12  # cells that a column counts as at least: what its name, unit and check-up cost
+LISTED = 256  # numbers in a cell or in a message: the joints of a robot; more are a picture
 
 
 @dataclass(frozen=True)
@@ -189,7 +190,7 @@ def reading(path: Path, kind: str) -> Iterator[None]:
         ) from error
 
 
-def optional(module: str) -> ModuleType:
+def optional(module: str, *, extra: str = "io") -> ModuleType:
     """Import a package that only some formats need, or say how to install it."""
     try:
         return importlib.import_module(module)
@@ -197,5 +198,5 @@ def optional(module: str) -> ModuleType:
         raise FormatError(
             f"the package {module} is not installed",
             "it reads and writes this format",
-            'install it with: pip install ".[io]" in the checkout',
+            f'install it with: pip install ".[{extra}]" in the checkout',
         ) from error

@@ -32,7 +32,7 @@ class InSeries:
 
     Examples
     --------
-    >>> from stickslip.laws.linear_slope import LinearSlope
+    >>> from stickslip.laws.coulomb import LinearSlope
     >>> contact = InSeries(LinearSlope(1.0, slope=-5.0), stiffness=192000, damping=24)
     >>> [(mode.name, mode.kind) for mode in contact.modes()]
     [('back', 'slip'), ('stuck', 'microstick'), ('forward', 'slip')]

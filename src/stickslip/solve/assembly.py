@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 from stickslip.errors import ModelError
 from stickslip.laws.base import Mode
 from stickslip.oscillator import Oscillator
-from stickslip.solve.bound import stilled
 from stickslip.solve.cells import DEGREE, cells_of, derivatives, derive
+from stickslip.solve.operations import stilled
 from stickslip.solve.settling import settled
 from stickslip.solve.tables import (
     Array,

@@ -177,11 +177,14 @@ def _fastest(flow: Array) -> Array:
 
 def eigenvalues(flow: Array) -> NDArray[np.complex128]:
     """Those of one flow, part by part, for the same reason; what rounding leaves of a zero is one."""
-    values = []
-    for part in _parts((flow != 0).tobytes(), len(flow)):
-        own = np.linalg.eigvals(flow[np.ix_(part, part)]).astype(complex)
-        values.append(np.where(np.abs(own) > ROUNDED * np.max(np.abs(own)), own, 0.0))
-    return np.concatenate(values)
+    parts = _parts((flow != 0).tobytes(), len(flow))
+    return np.concatenate([_spectrum(flow[np.ix_(part, part)].tobytes(), len(part)) for part in parts])
+
+
+@lru_cache(maxsize=1024)  # the systems of a fit have most of their parts in common
+def _spectrum(part: bytes, size: int) -> NDArray[np.complex128]:
+    values = np.linalg.eigvals(np.frombuffer(part).reshape(size, size)).astype(complex)
+    return np.where(np.abs(values) > ROUNDED * np.max(np.abs(values)), values, 0.0)
 
 
 @lru_cache(maxsize=256)

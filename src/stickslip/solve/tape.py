@@ -17,8 +17,7 @@ from stickslip.laws.base import Exit, Mode
 from stickslip.laws.curved import Creeping, CurvedMode
 from stickslip.laws.filippov import with_sliding_modes
 from stickslip.oscillator import Oscillator
-from stickslip.solve.bound import Bound, Form, combined, stilled
-from stickslip.solve.operations import Operations, Scaled, flat, guards_of, sums_of
+from stickslip.solve.operations import Bound, Form, Operations, Scaled, combined, flat, guards_of, stilled, sums_of
 from stickslip.solve.series import Nodes
 from stickslip.solve.tables import JointMode, System, by_value, mode_number, numbered, reached
 from stickslip.solve.taylor import Array, Exits, Guards, Sums

@@ -14,8 +14,8 @@ from stickslip.cycle.joint import JointFriction
 from stickslip.errors import ModelError
 from stickslip.estimate import stands
 from stickslip.figures.joint import plates_of
+from stickslip.laws.coulomb import LinearSlope
 from stickslip.laws.export import export_law, urdf_dynamics
-from stickslip.laws.linear_slope import LinearSlope
 from stickslip.story.fit import ALONE, FILES
 from stickslip.story.story import Story
 from stickslip.story.words import Caution, cautions, interval_of, number, value_of
