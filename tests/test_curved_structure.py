@@ -189,7 +189,9 @@ duration = 1.0
 def pressed_by_a_power(power: float) -> ss.Structure:
     """A pad on a belt that couples, whose load grows with a power of its approach."""
     pad = ss.Contact(laws.Coulomb(0.6), [1, 0], normal=[0, 1], stiffness=11.0, preload=5.0, power=power)
-    return ss.Structure(np.eye(2), np.zeros((2, 2)), [[23.25, 3.9], [3.9, 7.75]], contacts=[pad], drive=drives.Belt(0.8))
+    return ss.Structure(
+        np.eye(2), np.zeros((2, 2)), [[23.25, 3.9], [3.9, 7.75]], contacts=[pad], drive=drives.Belt(0.8)
+    )
 
 
 def motion_under_a_power(power: float, start: list[float], end: float) -> tuple[list[float], Array]:

@@ -259,6 +259,15 @@ def test_a_vibration_under_a_power_grows_as_its_eigenvalue_says() -> None:
     assert cycle.growth == pytest.approx(cycle.sliding.growth, rel=1e-3)
 
 
+def test_friction_that_rises_is_not_said_to_fall() -> None:
+    """What damps the slide alone may let two coupled motions grow: the paradox of destabilising damping."""
+    dry = ss.squeak.squeak_rig("dry", 12.0)
+    found = ss.stability(dry, speed=-0.1)
+    assert dry.contacts[0].law.slope > 0
+    assert found.mechanism == "mode coupling and rising friction together"
+    assert found.without_slope < 0 < found.growth
+
+
 def test_a_power_without_a_preload_is_refused() -> None:
     with pytest.raises(ss.errors.ModelError, match="power = 2 without normal"):
         ss.Contact(ss.laws.Coulomb(0.6), [1, 0], preload=5.0, power=2)

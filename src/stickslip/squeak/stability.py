@@ -68,7 +68,8 @@ class Stability:
         Those that grow fastest first.
     mechanism : str
         "stable", or what feeds the growth: "mode coupling", "falling friction", "mode coupling and falling friction
-        together" (neither alone is enough), "mode coupling, and falling friction too" (each alone is enough),
+        together" (neither alone is enough), "mode coupling and rising friction together" (so too, where no friction
+        falls: what damps one motion alone can feed both), "mode coupling, and falling friction too" (each alone is enough),
         "jamming" (the contact draws itself in without oscillating, as a sprag does), or "the structure itself" (it
         grows without any friction: dampers that feed it, springs that buckle).
     growth : float
@@ -163,7 +164,7 @@ def stability(system: System, *, speed: float | None = None) -> Stability:
     return Stability(
         stable=margin(whole) <= ROUNDING,
         modes=modes,
-        mechanism=_mechanism(whole, bare, uncoupled, unsloped, modes),
+        mechanism=_mechanism(whole, bare, uncoupled, unsloped, modes, any(r.slope < 0 for r in rubbing)),
         growth=modes[0].growth,
         without_coupling=modes_of(uncoupled)[0].growth,
         without_slope=modes_of(unsloped)[0].growth,
@@ -215,7 +216,7 @@ def modes_of(matrices: Matrices) -> tuple[SlidingMode, ...]:
 
 
 def _mechanism(
-    whole: Matrices, bare: Matrices, uncoupled: Matrices, unsloped: Matrices, modes: Sequence[SlidingMode]
+    whole: Matrices, bare: Matrices, uncoupled: Matrices, unsloped: Matrices, modes: Sequence[SlidingMode], falls: bool
 ) -> str:
     if margin(whole) <= ROUNDING:
         return "stable"
@@ -227,7 +228,7 @@ def _mechanism(
     if grows_by_slope and grows_by_coupling:
         return "mode coupling, and falling friction too"
     if not grows_by_slope and not grows_by_coupling:
-        return "mode coupling and falling friction together"
+        return f"mode coupling and {'falling' if falls else 'rising'} friction together"
     return "falling friction" if grows_by_slope else "mode coupling"
 
 
