@@ -24,5 +24,7 @@ from stickslip.answers.many import spread as spread
 from stickslip.answers.preparation import mend as mend
 from stickslip.answers.squeaks import Condition as Condition
 from stickslip.answers.squeaks import compare_squeaks as compare_squeaks
+from stickslip.answers.tribometers import analyze_tribometer as analyze_tribometer
+from stickslip.answers.tribometers import compare_tribometers as compare_tribometers
 
 __all__: list[str]

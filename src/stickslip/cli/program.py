@@ -25,6 +25,7 @@ from stickslip.cli.simulate import simulate
 from stickslip.cli.squeak import squeak
 from stickslip.cli.terminal import complain, say
 from stickslip.cli.thesis import thesis
+from stickslip.cli.tribometer import tribometer
 from stickslip.cli.wavelet import wavelet
 from stickslip.cli.words import mended, spoken
 from stickslip.errors import INTERRUPTED, INTERRUPTION
@@ -107,6 +108,7 @@ for _command in (
     stability,
     sweep,
     thesis,
+    tribometer,
     wavelet,
 ):
     main.add_command(_command)

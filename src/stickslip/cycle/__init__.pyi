@@ -18,5 +18,8 @@ from stickslip.cycle.slips import SlipRinging as SlipRinging
 from stickslip.cycle.slips import slip_ringing as slip_ringing
 from stickslip.cycle.sticks import StickEvent as StickEvent
 from stickslip.cycle.sticks import Sticks as Sticks
+from stickslip.cycle.tribometer import Coefficients as Coefficients
+from stickslip.cycle.tribometer import WearIn as WearIn
+from stickslip.cycle.tribometer import friction_coefficients as friction_coefficients
 
 __all__: list[str]

@@ -18,7 +18,7 @@ from stickslip.story.story import Line, Story, logged
 from stickslip.story.words import leading, number
 
 # The file that tells findings which hold a result of this name; friction.py tells all others.
-FAMILIES = {"decay": "decay", "squeaks": "squeak", "joint": "joint"}
+FAMILIES = {"decay": "decay", "squeaks": "squeak", "joint": "joint", "tribometer": "tribometer"}
 
 
 # What an engineer looks for first: these quantities lead the table, those without a value end it.
