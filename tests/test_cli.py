@@ -370,8 +370,8 @@ def test_a_true_process_keeps_the_table_and_the_trouble_apart() -> None:
 
 WATCHED = """
 import sys
-from stickslip.cli import program, progress
-progress.PATIENCE = 0.0
+from stickslip.cli import program, terminal
+terminal.PATIENCE = 0.0
 program.main()
 """
 

@@ -12,7 +12,7 @@ import pytest
 
 import stickslip
 from stickslip import compiled
-from stickslip.cli.progress import compiling
+from stickslip.cli.terminal import compiling
 
 PACKAGE = Path(stickslip.__file__).parent
 ASK = (

@@ -21,7 +21,7 @@ from playwright.sync_api import Browser, Page, sync_playwright
 import stickslip as ss
 from motions import free_decay
 from stickslip.cli.program import main
-from stickslip.story.page import report
+from stickslip.story.folder import report
 from stickslip.story.scope import LEVELS, Panel, Scope
 from stickslip.story.story import Line, Story
 from stickslip.story.words import Caution

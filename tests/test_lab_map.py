@@ -15,7 +15,7 @@ from starlette.testclient import TestClient
 
 import stickslip as ss
 from labs import received
-from stickslip.lab import explored
+from stickslip.lab.drawn import AT_REST, CYCLES, SETTLE
 from stickslip.lab.server import lab_app
 
 HOME, BEARER = "http://127.0.0.1:8723", {"authorization": "Bearer t"}
@@ -57,10 +57,10 @@ def test_the_coarse_map_is_that_of_a_sweep(parts: list[tuple[dict[str, Any], dic
     values = np.concatenate([arrays["values"] for arrays in coarse]).reshape(len(xs), -1)
     system = ss.systems.read_system(UNIT).system
     grid = {"frequency": xs.tolist(), "kinetic": coarse[0]["y"].tolist()}
-    swept = ss.sweep(system, grid, measures=["stops"], cycles=explored.CYCLES, settle=explored.SETTLE, engine="serial")
+    swept = ss.sweep(system, grid, measures=["stops"], cycles=CYCLES, settle=SETTLE, engine="serial")
     moving = swept.status.values == 0
     np.testing.assert_array_equal(values[moving], (swept.normal_stops + swept.abnormal_stops).values[moving])
-    assert np.all(values[:, coarse[0]["y"] > 1] == explored.AT_REST)  # friction above the force
+    assert np.all(values[:, coarse[0]["y"] > 1] == AT_REST)  # friction above the force
 
 
 def test_borders_are_refined_to_where_they_are(parts: list[tuple[dict[str, Any], dict[str, Any]]]) -> None:

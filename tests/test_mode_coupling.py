@@ -12,8 +12,7 @@ from scipy.integrate import solve_ivp
 from stickslip.drives.kinds import Belt, Drive
 from stickslip.laws.base import Law
 from stickslip.laws.compliant import CompliantContact
-from stickslip.laws.coulomb import Coulomb
-from stickslip.laws.linear_slope import LinearSlope
+from stickslip.laws.coulomb import Coulomb, LinearSlope
 from stickslip.laws.stribeck import Tabulated
 from stickslip.solve.assembly import table_of
 from stickslip.solve.simulate import simulate

@@ -21,8 +21,7 @@ from stickslip.answers.questions import analyze
 from stickslip.errors import EstimateError, ModelError, StickslipError
 from stickslip.estimate import Doubt, Estimate, Status
 from stickslip.story import folder as folder_module
-from stickslip.story.folder import publish
-from stickslip.story.page import report
+from stickslip.story.folder import publish, report
 from stickslip.story.story import summary
 from stickslip.story.words import doubts, interval_of, value_of
 

@@ -13,8 +13,7 @@ from stickslip.drives.kinds import Belt, Drive, HarmonicBase, HarmonicForce, Rec
 from stickslip.errors import ModelError
 from stickslip.laws.base import Law
 from stickslip.laws.compliant import CompliantContact, InertialContact
-from stickslip.laws.coulomb import Coulomb
-from stickslip.laws.linear_slope import LinearSlope, PositionLoad
+from stickslip.laws.coulomb import Coulomb, LinearSlope, PositionLoad
 from stickslip.laws.series import ElastoSlip, InSeries
 from stickslip.laws.state_variable import StateVariable
 from stickslip.laws.stribeck import Tabulated

@@ -16,8 +16,7 @@ from click.testing import CliRunner, Result
 
 import stickslip as ss
 from stickslip.cli.program import main
-from stickslip.cli.terminal import aligned
-from stickslip.cli.words import spoken
+from stickslip.cli.terminal import aligned, spoken
 
 CONDITIONS = [("dry", 6.13), ("wet", 6.13), ("dry", 1.23), ("wet", 1.23)]
 SLOPES = {"dry": 2.3, "wet": -0.26}  # s/m, of the rig's laws

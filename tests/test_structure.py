@@ -15,8 +15,7 @@ from stickslip.drives.kinds import Belt, Drive, HarmonicBase, HarmonicForce, Mul
 from stickslip.errors import ModelError
 from stickslip.laws.base import Law
 from stickslip.laws.compliant import CompliantContact, InertialContact
-from stickslip.laws.coulomb import Coulomb
-from stickslip.laws.linear_slope import LinearSlope
+from stickslip.laws.coulomb import Coulomb, LinearSlope
 from stickslip.laws.series import ElastoSlip
 from stickslip.laws.state_variable import StateVariable
 from stickslip.laws.time_delay import TimeDelay

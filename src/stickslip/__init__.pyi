@@ -61,7 +61,7 @@ from stickslip.solve.simulate import simulate as simulate
 from stickslip.squeak.bursts import find_squeaks as find_squeaks
 from stickslip.squeak.stability import stability as stability
 from stickslip.story.folder import publish as publish
-from stickslip.story.page import report as report
+from stickslip.story.folder import report as report
 from stickslip.story.story import summary as summary
 from stickslip.structure import Contact as Contact
 from stickslip.structure import Structure as Structure

@@ -23,8 +23,8 @@ from stickslip.oscillator import Oscillator
 from stickslip.solve.assembly import table_of
 from stickslip.solve.orbit import SteadyState
 from stickslip.solve.periodic import steady_state
+from stickslip.solve.self_excited import steady_sliding
 from stickslip.solve.simulate import simulate
-from stickslip.solve.sliding import steady_sliding
 from stickslip.solve.tables import System
 from stickslip.solve.trajectory import Trajectory
 from stickslip.structure import Contact, Structure

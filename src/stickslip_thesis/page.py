@@ -12,8 +12,7 @@ from typing import Any
 
 from stickslip import __version__
 from stickslip.figures.plate import Plate
-from stickslip.story.folder import check_folder, results_folder, write_figures
-from stickslip.story.page import templates
+from stickslip.story.folder import check_folder, results_folder, templates, write_figures
 from stickslip.workers import processors, workers
 from stickslip_thesis.drawing import caption_of
 from stickslip_thesis.observations import Seen, seen

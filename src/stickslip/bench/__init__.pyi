@@ -14,8 +14,6 @@ from stickslip.bench.device import blocks as blocks
 from stickslip.bench.device import devices as devices
 from stickslip.bench.device import find_device as find_device
 from stickslip.bench.device import in_si as in_si
-from stickslip.bench.discharge import DischargeTest as DischargeTest
-from stickslip.bench.discharge import discharge_test as discharge_test
 from stickslip.bench.free import FreeVibration as FreeVibration
 from stickslip.bench.free import MassAndSpring as MassAndSpring
 from stickslip.bench.free import OntoStick as OntoStick
@@ -38,8 +36,10 @@ from stickslip.bench.response import ModalFit as ModalFit
 from stickslip.bench.response import frequency_response as frequency_response
 from stickslip.bench.response import modal_fit as modal_fit
 from stickslip.bench.rest import AtRest as AtRest
+from stickslip.bench.rest import DischargeTest as DischargeTest
 from stickslip.bench.rest import SensorAtRest as SensorAtRest
 from stickslip.bench.rest import at_rest as at_rest
+from stickslip.bench.rest import discharge_test as discharge_test
 from stickslip.bench.runs import Proposal as Proposal
 from stickslip.bench.runs import Run as Run
 from stickslip.bench.runs import RunList as RunList

@@ -11,10 +11,9 @@ from typing import Any
 from stickslip.balance.impact import ImpactTest
 from stickslip.balance.mounts import ACCELEROMETER, CELL, Resonance
 from stickslip.bench.calibration import Calibration, SpringByWeights
-from stickslip.bench.discharge import DischargeTest
 from stickslip.bench.free import FreeVibration, MassAndSpring, OntoStick, added_mass, best_constants
 from stickslip.bench.response import ModalFit
-from stickslip.bench.rest import AtRest
+from stickslip.bench.rest import AtRest, DischargeTest
 from stickslip.errors import EstimateError
 from stickslip.estimate import Estimate, Result
 from stickslip.files.expression import split_spec

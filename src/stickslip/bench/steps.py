@@ -8,11 +8,10 @@ from typing import Any
 
 from stickslip.balance.impact import impact_test
 from stickslip.bench.calibration import calibrate, spring_by_weights
-from stickslip.bench.discharge import discharge_test
 from stickslip.bench.free import free_vibration, onto_stick
 from stickslip.bench.known import Known
 from stickslip.bench.response import modal_fit
-from stickslip.bench.rest import at_rest
+from stickslip.bench.rest import at_rest, discharge_test
 from stickslip.errors import EstimateError, ModelError, RecordError
 from stickslip.estimate import Estimate, Result
 from stickslip.record.record import Record

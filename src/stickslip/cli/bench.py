@@ -1,25 +1,323 @@
-"""stickslip bench"""
+"""stickslip acquire and devices; commission; bench, the experiment on a simulated one"""
 
 from __future__ import annotations
 
+import importlib.util
+import re
+import time
+from collections.abc import Callable
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import click
 
 import stickslip as ss
-import stickslip.bench as room
-from stickslip.cli.options import all_option, usable
-from stickslip.cli.progress import progress
+import stickslip.bench as bench
+from stickslip.cli.options import all_option, pair, usable
+from stickslip.cli.records import groups_of, read
 from stickslip.cli.show import print_json, show
-from stickslip.cli.terminal import aligned, say
+from stickslip.cli.terminal import aligned, progress, say, say_json, wrapped
+from stickslip.errors import INTERRUPTED
+
+if TYPE_CHECKING:
+    from stickslip import Record
+    from stickslip.bench import BenchStep, Device, SimulatedBench
+    from stickslip.rig import RigSettings
+
+Source = Callable[["BenchStep"], "Record | None"]
 
 
-@click.group()
-def bench() -> None:
+@click.command()
+@click.argument("files", nargs=-1, metavar="[STEP=FILE]...")
+@click.option(
+    "--device", "name", metavar="NAME",
+    help="What measures: a table [devices.NAME] of the configuration, or a kind of device. sim needs no hardware.",
+)  # fmt: skip
+@click.option("--config", type=click.Path(path_type=Path), metavar="RIG.TOML", help="What is known of the rig already.")
+@click.option("--step", "steps", multiple=True, metavar="NAME", help="Only this step. Repeatable.")
+@click.option("--again", multiple=True, metavar="NAME", help="Record this step anew. Repeatable.")
+@click.option("--seed", type=click.IntRange(min=0), default=1, show_default=True, help="Of a simulated rig's noise.")
+@click.option(
+    "--output", type=click.Path(path_type=Path), metavar="DIR",
+    help="Folder of records, rig.toml and report; commission unless given, none where files are named.",
+)  # fmt: skip
+@click.option("--list", "listed", is_flag=True, help="Print the steps, and what to do at each.")
+@click.option("--json", "as_json", is_flag=True, help="Print the results as JSON and nothing else.")
+@all_option
+def commission(
+    files: tuple[str, ...], output: Path | None, as_json: bool, everything: bool, listed: bool, **options: Any
+) -> None:
+    """Commission a rig: find its constants and its sensors, and write rig.toml.
+
+    Each step says what to do, records, and answers; what it finds is used by those after it. Records stay in
+    DIR/records: a second call goes on where the first one ended. At the end DIR holds rig.toml, as analyze and acquire
+    read it, and report/report.html.
+
+    STEP=FILE answers a step from a file that is there, without a device: one step alone, or several.
+
+    \b
+    stickslip commission --device sim
+    stickslip commission --device daq --config rig.toml --step rest --step tap
+    stickslip commission tap=hammer.csv --config rig.toml
+    """
+    chosen = [bench.step_named(name) for name in options["steps"]] or list(bench.STEPS)
+    anew = {bench.step_named(name).name for name in options["again"]}
+    if listed:
+        say("\n".join(aligned(("step", "question", "at the rig"), [[s.name, s.title, s.todo] for s in chosen])))
+        return
+    config: Path | None = options["config"]
+    rig = ss.rig.read_rig(config) if config else ss.rig.rig_settings({})
+    given = dict(_given(file) for file in files)
+    if given and not options["steps"]:
+        chosen = [step for step in bench.STEPS if step.name in given]
+    folder = output or (None if given or as_json else Path("commission"))
+    device = _device(options["name"], rig, config) if options["name"] else None
+    if device is None and not given and not (folder and (folder / "records").is_dir()):
+        raise click.UsageError("nothing measures; name a --device (sim needs no hardware), or STEP=FILE")
+    source, truth = _source(given, device, rig, folder, seed=options["seed"], anew=anew)
+    with progress(len(chosen) + 1) as tell:
+        done = bench.commission(source, rig=rig, steps=chosen, truth=truth, progress=tell)
+        tell("drawing and writing", len(chosen))
+        written = _written(done, folder) if folder else None
+    show(done, written, as_json=as_json, everything=everything)
+    if folder and not as_json:
+        say(f"Settings: {folder / 'rig.toml'}")
+
+
+def _given(text: str) -> tuple[str, Path]:
+    """A step and the file that answers it."""
+    name, file = pair(text, "STEP=FILE")
+    return bench.step_named(name).name, groups_of(file)[0][0]
+
+
+def _device(name: str, rig: RigSettings, config: Path | None) -> Device:
+    return bench.find_device(name, rig.devices, folder=config.parent if config else None)
+
+
+def _source(
+    given: dict[str, Path], device: Device | None, rig: RigSettings, folder: Path | None, *, seed: int, anew: set[str]
+) -> tuple[Source, dict[str, float]]:
+    """What gives the record of a step, and the truth where the rig is simulated."""
+    bench_of = _simulated(device, rig, seed)
+
+    def source(step: BenchStep) -> Record | None:
+        if step.name in given:
+            return read([given[step.name]], rig)
+        kept = _kept(folder, step.name) if folder else None
+        if kept is not None and kept.exists() and step.name not in anew:
+            return ss.read_record(kept)
+        if device is None:
+            return None
+        if kept is not None:
+            kept.parent.mkdir(parents=True, exist_ok=True)
+        if bench_of is not None:
+            record = rig.logged(bench_of.step(step)) if step.fits(bench_of.rig) else None
+            if record is not None and kept is not None:
+                ss.write_record(record, kept, overwrite=True)
+            return record
+        return _asked_at_rig(device, step, kept, rig)
+
+    return source, bench_of.truth if bench_of is not None else {}
+
+
+def _kept(folder: Path, name: str) -> Path:
+    """Where the record of a step is kept."""
+    return folder / "records" / f"{name}.{'h5' if importlib.util.find_spec('h5py') else 'csv'}"
+
+
+def _simulated(device: Device | None, rig: RigSettings, seed: int) -> SimulatedBench | None:
+    """The bench that stands behind a simulated device: it can be weighed, tapped and loaded too."""
+    if not isinstance(device, bench.Sim):
+        return None
+    system: Any = device.system
+    hand = rig.commission or ss.rig.CommissionSettings()
+    return bench.SimulatedBench(system, device.rig, device.fs, seed, hand)
+
+
+def _asked_at_rig(device: Device, step: BenchStep, kept: Path | None, rig: RigSettings) -> Record | None:
+    """The record of a step at a real rig, once its hands are ready."""
+    if any(name not in [one.name for one in device.inputs] for name in step.needs):
+        return None
+    say(f"{step.title}\n  {step.todo}")
+    if not click.confirm(f"  Record {step.seconds:g} s now?", default=True, err=True):
+        return None
+    if kept is None:
+        raise click.UsageError("a device records into files; name --output")
+    if kept.exists():
+        kept.unlink()
+    moved = {"base": bench.sweep_of(device.fs)} if step.drives and device.outputs else {}
+    wanted = bench.Wanted(seconds=step.seconds, drive=moved, log=rig.log)
+    done = bench.acquire(device, output=kept, wanted=wanted)
+    return ss.read_record(done.paths[0])
+
+
+def _written(done: Any, folder: Path) -> Path:
+    """The report, and rig.toml beside it."""
+    folder.mkdir(parents=True, exist_ok=True)
+    report = ss.publish(done, folder=folder / "report")
+    (folder / "rig.toml").write_text(done.known.toml(), encoding="utf-8")
+    return report
+
+
+TRIGGER = re.compile(r"\s*(\w+)\s*([<>])\s*(\S+)\s*")
+
+
+@click.command()
+@click.option(
+    "--device", "names", multiple=True, required=True, metavar="NAME",
+    help="A table [devices.NAME] of the configuration, or a kind of device. Repeatable.",
+)  # fmt: skip
+@click.option("--config", type=click.Path(path_type=Path), metavar="RIG.TOML", help="File of the rig and its devices.")
+@click.option("--seconds", type=click.FloatRange(min=0, min_open=True), help="How long; until Ctrl-C unless given.")
+@click.option(
+    "--trigger", metavar='"CHANNEL>LEVEL"', help='Begin where a reading passes a level, in SI: "load>0.5", "x<-1e-3".'
+)
+@click.option(
+    "--before", type=click.FloatRange(min=0), default=0.0, metavar="S", help="Time before the trigger that is kept."
+)
+@click.option(
+    "--drive", "drives", multiple=True, metavar='"OUTPUT=AMPLITUDE@HZ"',
+    help='Move an output by a tone meanwhile, in SI: "base=0.65e-3@2.5". Repeatable.',
+)  # fmt: skip
+@click.option(
+    "--runs", type=click.Path(path_type=Path), metavar="RUNS.TOML",
+    help="Record every run of a list, as bench next writes it, each with its own tone; --output names their folder.",
+)  # fmt: skip
+@click.option(
+    "--output",
+    required=True,
+    type=click.Path(path_type=Path),
+    metavar="FILE",
+    help="The record: .h5, .csv or .parquet; of --runs a folder.",
+)
+@click.option("--json", "as_json", is_flag=True, help="Print what was recorded as JSON and nothing else.")
+def acquire(names: tuple[str, ...], config: Path | None, output: Path, as_json: bool, **options: Any) -> None:
+    """Record from devices into a file.
+
+    What comes stands on the disk at once, in FILE.journal: it is a record up to the last block, whatever ends the
+    program, and any command reads it. At the end it becomes FILE. Lost and clipped samples are told, and stand in the
+    history beside device, ranges and serial numbers.
+
+    \b
+    stickslip acquire --device sim --seconds 30 --output run.h5
+    stickslip acquire --device daq --config rig.toml --trigger "load>0.5" --before 0.2 --seconds 5 --output hit.h5
+    """
+    settings = ss.rig.read_rig(config) if config else None
+    tables, folder = (settings.devices if settings else {}), config.parent if config else None
+    chosen = [bench.find_device(name, tables, folder=folder) for name in names]
+    log = settings.log if settings else None
+    if options["runs"]:
+        _run_all(chosen, bench.read_runs(options["runs"]), output, log, as_json=as_json)
+        return
+    drive = dict(_driven(text) for text in options["drives"])
+    wanted = bench.Wanted(options["seconds"], _trigger(options["trigger"], options["before"]), drive, log)
+    with progress(100) as tell:
+        done = bench.acquire(chosen, output=output, wanted=wanted, watch=_watch(tell, options["seconds"]))
+    _recorded(done, as_json=as_json)
+    if done.ended == "interrupted" and options["seconds"]:
+        raise SystemExit(INTERRUPTED)
+
+
+def _run_all(devices: Any, runs: bench.RunList, folder: Path, log: Any, *, as_json: bool) -> None:
+    """Every run of a list, each into a file of its name; one that is there already is left out."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for run in runs.run:
+        path = folder / f"{run.name}.h5"
+        if path.exists():
+            say(f"{path} is there already: left out", err=True)
+            continue
+        moved: dict[str, bench.Signal] = {run.on: bench.Tone(run.amplitude, run.frequency)}
+        wanted = bench.Wanted(run.seconds, None, moved, log)
+        with progress(100) as tell:
+            done = bench.acquire(devices, output=path, wanted=wanted, watch=_watch(tell, run.seconds))
+        _recorded(done, as_json=as_json)
+        if done.ended == "interrupted":
+            raise SystemExit(INTERRUPTED)
+
+
+def _watch(tell: Any, seconds: float | None) -> Any:
+    """What shows how far it is, some ten times a second."""
+    due = 0.0
+
+    def watch(device: bench.Device, block: bench.Block) -> None:
+        nonlocal due
+        if time.monotonic() >= due:
+            passed = block.after / device.fs
+            tell(f"recording, {passed:.1f} s", 100 * min(1.0, passed / seconds) if seconds else 0)
+            due = time.monotonic() + 0.1
+
+    return watch
+
+
+def _trigger(text: str | None, before: float) -> bench.Trigger | None:
+    if text is None:
+        if before:
+            raise click.BadParameter("what is kept before a trigger needs one", param_hint="--before")
+        return None
+    found = TRIGGER.fullmatch(text)
+    try:
+        return bench.Trigger(found[1], float(found[3]), found[2] == ">", before)  # type: ignore[index]
+    except (TypeError, ValueError):
+        raise click.BadParameter(f"'{text}' is not CHANNEL>LEVEL or CHANNEL<LEVEL", param_hint="--trigger") from None
+
+
+def _driven(text: str) -> tuple[str, bench.Tone]:
+    name, tone = pair(text, "--drive")
+    amplitude, _, frequency = tone.partition("@")
+    try:
+        return name, bench.Tone(float(amplitude), float(frequency))
+    except ValueError:
+        raise click.BadParameter(f"'{text}' is not OUTPUT=AMPLITUDE@HZ", param_hint="--drive") from None
+
+
+def _recorded(done: bench.Acquired, *, as_json: bool) -> None:
+    if as_json:
+        paths = [str(path) for path in done.paths]
+        say_json({"files": paths, "devices": dict(done.outcomes), "ended": done.ended, "notes": [*done.notes]})
+        return
+    for name, outcome in done.outcomes.items():
+        say("\n".join(wrapped(outcome, f"{name}: ")))
+    for note in done.notes:
+        say("\n".join(wrapped(note)))
+    ended = "" if done.ended == "complete" else f" ({done.ended})"
+    say(f"Written: {', '.join(map(str, done.paths))}{ended}")
+
+
+@click.command()
+@click.option(
+    "--config", type=click.Path(path_type=Path), metavar="RIG.TOML", help="List the devices that it names too."
+)
+@click.option("--json", "as_json", is_flag=True, help="Print the list as JSON and nothing else.")
+def devices(config: Path | None, as_json: bool) -> None:
+    """List what can measure here: kinds of devices, what is plugged in, and which package is missing.
+
+    \b
+    stickslip devices
+    stickslip devices --config rig.toml
+    """
+    kinds = bench.devices()
+    named = ss.rig.read_rig(config).devices if config else {}
+    mine = {name: bench.find_device(name, named, folder=config.parent if config else None) for name in named}
+    if as_json:
+        told = {kind.kind: {"about": kind.about, "there": [*kind.there], "missing": kind.missing} for kind in kinds}
+        named_so = {name: {"kind": one.kind, "model": one.model, "fs": one.fs} for name, one in mine.items()}
+        say_json({"kinds": told, "named": named_so})
+        return
+    for name, one in mine.items():
+        inputs = ", ".join(f"{entry.name} [{entry.unit}]" for entry in one.inputs)
+        outputs = "".join(f"; moves {output.name}" for output in one.outputs)
+        say("\n".join(wrapped(f"{one.model}, {one.fs:g} Hz: {inputs}{outputs}", f"{name:<8} ")))
+    for kind in kinds:
+        there = f"missing: {kind.missing}" if kind.missing else "; ".join(kind.there) or "nothing found"
+        say("\n".join([*wrapped(kind.about, f"{kind.kind:<8} "), *wrapped(there, 9 * " ")]))
+
+
+@click.group("bench")
+def simulated_bench() -> None:
     """The whole experiment on a simulated bench, and what to measure next."""
 
 
-@bench.command()
+@simulated_bench.command()
 @click.option("--fast", is_flag=True, help="As fast as the computer can, and not in the time that a rig would take.")
 @click.option("--seed", type=click.IntRange(min=0), default=1, show_default=True, help="Draws gains, zeros and noise.")
 @click.option(
@@ -38,13 +336,13 @@ def tour(fast: bool, seed: int, output: Path, as_json: bool, everything: bool) -
     report = output / "report"
     usable(click.get_current_context(), None, report)  # type: ignore[arg-type]
     with progress(100) as tell:
-        found = room.tour(output, seed=seed, fast=fast, progress=lambda words, share: tell(words, 100 * share))
+        found = bench.tour(output, seed=seed, fast=fast, progress=lambda words, share: tell(words, 100 * share))
         tell("drawing and writing", 95)
         written = ss.publish(found, folder=report)
     show(found, written, as_json=as_json, everything=everything)
 
 
-@bench.command("next")
+@simulated_bench.command("next")
 @click.argument("laws", nargs=-1, required=True, metavar="LAW LAW...")
 @click.option("--config", type=click.Path(path_type=Path), metavar="RIG.TOML", help="The rig, its shaker, its sensors.")
 @click.option("--count", type=click.IntRange(min=1), default=3, show_default=True, help="How many runs.")
@@ -74,8 +372,8 @@ def following(
     shaker = ss.rig.Shaker.of(rig.shaker if rig else None)
     with progress(1) as tell:
         tell("simulating what the shaker can do", 0)
-        proposals = room.next_runs(left, shaker=shaker, noise=noise, count=count, done=motions)
-    runs = room.run_list(proposals, seconds=seconds)
+        proposals = bench.next_runs(left, shaker=shaker, noise=noise, count=count, done=motions)
+    runs = bench.run_list(proposals, seconds=seconds)
     if output:
         output.write_text(runs.toml(), encoding="utf-8")
     if as_json:

@@ -10,9 +10,9 @@ import click
 
 import stickslip as ss
 from stickslip.cli.options import reading_options, result_options
-from stickslip.cli.progress import progress
 from stickslip.cli.records import answers, default_folder, groups_of, name_left_out, read, rig_of, with_left_out
 from stickslip.cli.show import show
+from stickslip.cli.terminal import progress
 
 if TYPE_CHECKING:
     from stickslip import Record

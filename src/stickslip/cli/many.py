@@ -11,9 +11,9 @@ import click
 
 import stickslip as ss
 from stickslip.cli.options import together
-from stickslip.cli.progress import progress
 from stickslip.cli.records import checksum, names_of, read
 from stickslip.cli.show import show
+from stickslip.cli.terminal import progress
 
 if TYPE_CHECKING:
     from stickslip import Record

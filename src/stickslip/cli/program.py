@@ -7,27 +7,18 @@ from typing import Any
 import click
 
 import stickslip as ss
-from stickslip.cli.acquire import acquire, devices
-from stickslip.cli.analyze import analyze, demo
-from stickslip.cli.bench import bench
-from stickslip.cli.commission import commission
-from stickslip.cli.decay import decay
-from stickslip.cli.exchange import check, convert, datasets
+from stickslip.cli.analyze import analyze, demo, impact
+from stickslip.cli.bench import acquire, commission, devices, simulated_bench
+from stickslip.cli.files import check, convert, datasets, init
 from stickslip.cli.fit import fit, predict
-from stickslip.cli.impact import impact
-from stickslip.cli.init import init
 from stickslip.cli.joint import joint
 from stickslip.cli.lab import lab
-from stickslip.cli.progress import compiling
-from stickslip.cli.regimes import bifurcation, dither, stability, sweep
 from stickslip.cli.rig import rig
-from stickslip.cli.simulate import simulate
-from stickslip.cli.squeak import squeak
-from stickslip.cli.terminal import complain, say
+from stickslip.cli.simulate import bifurcation, dither, simulate, stability, sweep
+from stickslip.cli.terminal import compiling, complain, mended, say, spoken
 from stickslip.cli.thesis import thesis
 from stickslip.cli.tribometer import tribometer
-from stickslip.cli.wavelet import wavelet
-from stickslip.cli.words import mended, spoken
+from stickslip.cli.vibrations import decay, squeak, wavelet
 from stickslip.errors import INTERRUPTED, INTERRUPTION
 
 ARGUMENTS = "stickslip.arguments"  # the key under which the context keeps what was typed
@@ -86,7 +77,7 @@ def main() -> None:
 for _command in (
     acquire,
     analyze,
-    bench,
+    simulated_bench,
     bifurcation,
     check,
     commission,

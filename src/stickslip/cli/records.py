@@ -17,8 +17,7 @@ import click
 
 import stickslip as ss
 from stickslip.cli.options import pair
-from stickslip.cli.terminal import complain
-from stickslip.cli.words import spoken
+from stickslip.cli.terminal import complain, spoken
 from stickslip.printing import printable
 
 if TYPE_CHECKING:

@@ -18,9 +18,9 @@ from stickslip.cli.options import (
     result_options,
     wanted_case,
 )
-from stickslip.cli.progress import progress
 from stickslip.cli.records import folder_after, groups_of, read, rig_of
 from stickslip.cli.show import show
+from stickslip.cli.terminal import progress
 
 if TYPE_CHECKING:
     from stickslip import Record, Rig

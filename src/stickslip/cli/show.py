@@ -7,8 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import stickslip as ss
-from stickslip.cli.terminal import aligned, say, say_json, say_styled, wrapped
-from stickslip.cli.words import spoken
+from stickslip.cli.terminal import aligned, say, say_json, say_styled, spoken, wrapped
 
 if TYPE_CHECKING:
     from stickslip.story import Caution, Line, Story

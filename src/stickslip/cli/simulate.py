@@ -1,19 +1,31 @@
-"""stickslip simulate"""
+"""stickslip simulate, sweep, stability, bifurcation, dither: what a system does, asked of its equations"""
 
 from __future__ import annotations
 
 import itertools
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 import stickslip as ss
-from stickslip.cli.options import case_options, folder_name, form_option, result_options, wanted_case
-from stickslip.cli.progress import progress
-from stickslip.cli.show import show
-from stickslip.cli.terminal import say, say_json, wrapped
+from stickslip.cli.options import (
+    all_option,
+    case_options,
+    changes_option,
+    folder_name,
+    form_option,
+    result_options,
+    usable,
+    wanted_case,
+)
+from stickslip.cli.show import print_json, show
+from stickslip.cli.terminal import progress, say, say_json, wrapped
 from stickslip.errors import INTERRUPTED
+
+if TYPE_CHECKING:
+    from stickslip.systems import Case
 
 LIST_WIDTH = 100
 
@@ -88,3 +100,179 @@ def _list_scenarios(*, as_json: bool, everything: bool) -> None:
             line += name
         say(line)
     say(f'\n{len(scenarios)} scenarios; run one with: stickslip simulate "NAME"')
+
+
+CASE = click.argument("case", metavar="SCENARIO|FILE.toml")
+
+
+@click.command()
+@click.argument("file", type=click.Path(path_type=Path))
+@click.option("--engine", default="threads", show_default=True, metavar="NAME",
+              help="Where it runs: serial, threads, dask, dask://HOST:PORT or cuda.")  # fmt: skip
+@click.option("--store", type=click.Path(path_type=Path), metavar="MAP.ZARR",
+              help="Where what is done is kept, and goes on after an end; FILE.zarr unless given.")  # fmt: skip
+@click.option("--output", type=click.Path(path_type=Path), callback=usable, metavar="DIR",
+              help="Folder for the report and its figures; none unless given.")  # fmt: skip
+@click.option("--json", "as_json", is_flag=True, help="Print the results as JSON and nothing else.")
+@all_option
+def sweep(file: Path, engine: str, store: Path | None, output: Path | None, as_json: bool, everything: bool) -> None:
+    """Map what a system does over a grid of its parameters.
+
+    FILE names the system, the grid and what is asked of each motion; every finished block is kept in the store, and a
+    sweep that was ended goes on there when it is called again.
+
+    \b
+    stickslip sweep grid.toml --engine threads --store map.zarr --output maps
+    """
+    asked = ss.maps.read_sweep(file)
+    place = store if store is not None else file.with_suffix(".zarr")
+    found = ss.sweep(
+        asked.case.system,
+        asked.grid,
+        measures=asked.measures,
+        cycles=asked.cycles,
+        settle=asked.settle,
+        start=asked.case.start,
+        engine=engine,
+        store=place,
+    )
+    story, whole = ss.summary(found), found.attrs["status"] == "complete"
+    written = ss.publish(found, folder=output, system=asked.case.system) if output is not None else None
+    if as_json:
+        print_json({**story.data(), "store": str(place)})
+        raise SystemExit(0 if whole else INTERRUPTED)
+    show(found, written, as_json=False, everything=everything)
+    say(f"Map: {place}")
+    if not whole:
+        say("Call again to go on.")
+        raise SystemExit(INTERRUPTED)
+
+
+@click.command()
+@CASE
+@click.option(
+    "--speed", metavar="VALUE", help="Speed of the counter-face in m/s, or with its unit; the belt's unless given."
+)
+@changes_option
+@result_options("NAME-stability")
+def stability(
+    case: str, output: Path | None, as_json: bool, everything: bool, speed: str | None, changes: tuple[str, ...]
+) -> None:
+    """Does steady sliding last, or does it squeal, and what feeds the vibration?
+
+    SCENARIO or FILE.toml is what stickslip simulate takes: a mass or a structure on a belt, or at the speed given. Told
+    are the modes of small vibrations about steady sliding, and whether mode coupling or a friction that falls with
+    speed feeds the one that grows.
+
+    \b
+    stickslip stability MC-1
+    stickslip stability "SQUEAK wet 6.13 N" --speed "20 mm/s"
+    """
+    wanted = _case(case, changes)
+    fast = None if speed is None else _number(speed, "m/s", "--speed")
+    _answer(wanted, "stability", lambda: ss.stability(wanted.system, speed=fast), output, as_json, everything)
+
+
+@click.command()
+@CASE
+@click.argument("parameter")
+@click.option("--from", "low", required=True, metavar="VALUE", help="Least value, in SI or with its unit.")
+@click.option("--to", "high", required=True, metavar="VALUE", help="Largest value.")
+@click.option("--steps", type=click.IntRange(min=2), default=25, show_default=True, help="Number of values.")
+@click.option(
+    "--transient",
+    type=click.IntRange(min=1),
+    default=64,
+    show_default=True,
+    help="Periods before a motion counts as settled.",
+)
+@click.option("--branches", is_flag=True, help="Continue periodic orbits too, the unstable ones between.")
+@changes_option
+@result_options("NAME-bifurcation")
+def bifurcation(
+    case: str, parameter: str, output: Path | None, as_json: bool, everything: bool, **options: Any
+) -> None:
+    """How does the motion change with a PARAMETER, and which motions exist side by side?
+
+    The motion is followed upwards and downwards; where both differ there is hysteresis. Changes of the kind of motion
+    (number of stops, period, rest) are found by bisection.
+
+    \b
+    stickslip bifurcation slider.toml amplitude --from "0.4 mm" --to "1 mm"
+    stickslip bifurcation "DH-3 b=0.5 r=0.8" law.kinetic --from 0.2 --to 0.8 --steps 13
+    """
+    wanted = _case(case, options["changes"])
+    low, high = (wanted.number(parameter, options.pop(key)) for key in ("low", "high"))
+    last = options["steps"] - 1
+    values = [low + (high - low) * place / last for place in range(last + 1)]
+    chosen = {key: options[key] for key in ("transient", "branches")}
+    _answer(
+        wanted, "bifurcation", lambda: ss.bifurcation(wanted.system, parameter, values=values, **chosen),
+        output, as_json, everything,
+    )  # fmt: skip
+
+
+@click.command()
+@CASE
+@click.option(
+    "--frequency",
+    "frequencies",
+    multiple=True,
+    metavar="HZ",
+    help="Of the dither; a fast one unless given. Repeatable.",
+)
+@click.option("--on", type=click.Choice(["face", "base", "force"]), default="face", show_default=True,
+              help="What the dither moves: the counter-face, the spring's end, or the mass by a force.")  # fmt: skip
+@click.option(
+    "--cycles",
+    type=click.IntRange(min=1),
+    default=40,
+    show_default=True,
+    help="Length of a run in periods of the slow motion.",
+)
+@click.option("--precision", type=click.FloatRange(min=0, max=1, min_open=True), default=0.02, show_default=True,
+              help="Relative width left of the amplitude's range.")  # fmt: skip
+@changes_option
+@result_options("NAME-dither")
+def dither(case: str, output: Path | None, as_json: bool, everything: bool, **options: Any) -> None:
+    """Which is the smallest fast vibration along the contact that removes stick-slip?
+
+    Amplitudes are tried by exact simulation, from small to large, until no stick outlasts a period of the dither.
+
+    \b
+    stickslip dither slider.toml --frequency 200
+    stickslip dither slider.toml --on force
+    """
+    wanted = _case(case, options["changes"])
+    system = wanted.system
+    if not isinstance(system, ss.Oscillator):
+        raise click.BadParameter("dither is found for a single mass; give an oscillator", param_hint="CASE")
+    tones = [_number(frequency, "Hz", "--frequency") for frequency in options["frequencies"]] or None
+    chosen = {key: options[key] for key in ("on", "cycles", "precision")}
+    _answer(
+        wanted, "dither", lambda: ss.dither(system, frequency=tones, start=wanted.start or None, **chosen),
+        output, as_json, everything,
+    )  # fmt: skip
+
+
+def _case(name: str, changes: Sequence[str]) -> Case:
+    return wanted_case(name, duration=None, cycles=None, changes=changes)
+
+
+def _number(text: str, si: str, option: str) -> float:
+    """A number in SI, or with its unit."""
+    try:
+        return float(ss.Estimate.stated(option.lstrip("-"), text, si))
+    except ss.StickslipError as error:
+        raise click.BadParameter(f"{error.value}; {error.rule}", param_hint=option) from error
+
+
+def _answer(
+    case: Case, what: str, ask: Callable[[], Any], output: Path | None, as_json: bool, everything: bool
+) -> None:
+    folder = output or (None if as_json else folder_name(case, what))
+    with progress(1) as tell:
+        tell(f"{what} of {case.name}", 0)
+        found = ask()
+        written = ss.publish(found, folder=folder) if folder else None
+    show(found, written, as_json=as_json, everything=everything)

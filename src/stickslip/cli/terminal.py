@@ -1,17 +1,26 @@
-"""The one door to the terminal: nothing that a file holds is obeyed there, as an escape sequence or as markup."""
+"""The one door to the terminal: nothing that a file holds is obeyed there, as an escape sequence or as markup.
+
+Also how the command line says what a sentence says to a Python user, and a bar for work that lasts.
+"""
 
 from __future__ import annotations
 
+import contextlib
 import itertools
 import json
+import logging
+import re
+import shlex
 import shutil
 import sys
 import textwrap
-from collections.abc import Iterable, Mapping, Sequence
+import threading
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 import click
 
+from stickslip.errors import MISSTATED, TOO_SHORT, StickslipError
 from stickslip.printing import printable
 
 WIDEST = 110  # columns: longer lines are hard to read
@@ -66,3 +75,121 @@ def _width() -> int:
 def _shown(text: object, *, err: bool = False) -> str:
     stream = sys.stderr if err else sys.stdout
     return printable(str(text), encoding=getattr(stream, "encoding", None) or "utf-8")
+
+
+PATIENCE = 2.0  # seconds of silence before a progress bar is shown
+
+
+class _Spoken(logging.Handler):
+    """What the package has to say of itself, on the error stream."""
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """One line."""
+        complain(record.getMessage())
+
+
+@contextlib.contextmanager
+def compiling() -> Iterator[None]:
+    """Says to who watches that kernels are compiled, as it begins, and how long it took."""
+    log, spoken = logging.getLogger("stickslip"), _Spoken(logging.INFO)
+    if sys.stderr.isatty():
+        log.addHandler(spoken)
+        log.setLevel(logging.INFO)
+    try:
+        yield
+    finally:
+        kernels = sys.modules.get("stickslip.compiled")  # not imported for this: a command without kernels starts light
+        if kernels is not None and kernels.compilation.seconds >= 1:
+            log.info("compiled in %.0f s; the next run finds it", kernels.compilation.seconds)
+        log.removeHandler(spoken)
+
+
+@contextlib.contextmanager
+def progress(steps: int) -> Iterator[Callable[..., None]]:
+    """What is being done, on the error stream, for work that lasts; silent where nobody watches."""
+    if not sys.stderr.isatty():
+        yield lambda words, done=None: None
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+
+    words = TextColumn("{task.description}", markup=False)  # a file may be called "[/x].csv"
+    columns = (SpinnerColumn(), words, BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
+    bar = Progress(*columns, console=Console(stderr=True), transient=True)
+    task = bar.add_task("", total=steps)
+    patience = threading.Timer(PATIENCE, bar.start)
+    patience.daemon = True
+    patience.start()
+    if PATIENCE <= 0:
+        patience.join()
+    try:
+        yield lambda words, done=None: bar.update(task, completed=done, description=printable(words), refresh=True)
+    finally:
+        patience.cancel()
+        bar.stop()
+
+
+REPAIRS = {
+    "repair_clock": "clock",
+    "fill_gaps": "gaps",
+    "fill_missing": "missing",
+    "remove_spikes": "spikes",
+    "restore_clipped": "clipping",
+    "remove_drift": "drift",
+}  # a function's name, and what --repair calls it
+_SPOKEN = (
+    (r"\b(the command line|the run) sets (\w+)", r"\1 sets --\2"),
+    (r"\brecord\.check\(\)", "stickslip check"),
+    (r"\brecord\.rows\(\)", "--rows"),
+    (r"\brecord\.between\([^)]*\)", "--rows"),
+    (r", or trust='samples'[^;.]*", ""),
+    (r"\bask friction_loops\(record\)", "ask stickslip analyze"),
+    (r", or ask (?:extreme|fit)_decay\(record\)[^;.]*", ""),
+    (r', or choose form="plain"[^;.]*', ""),
+    (r" \(see choose_motion\)", ""),
+    (r"; use log_decrement or fit_decay instead", ""),
+    (r'\brestoring="pendulum"', "--restoring pendulum"),
+    (r"\brecord\.rows\((\d+), (\d+)\)", r"--rows \1:\2"),
+    (r'\bchannel="(\w+)"', r"--channel \1"),
+    (r'\bchannels=\{"(\w+)": "([^"]*)"\}', r'--channels "\1=\2"'),
+    (r'\btime="([^"]*)"', r'--time "\1"'),
+    (r'\bfriction_force\(record, \.\.\., method="(\w+)"\)', r"--method \1"),
+    (
+        r"\b(channels|channel|frequencies|normal|rows|units|fs|time|delimiter|decimal|method|damper|contact|mass|stiffness|lever|calibration)=(?=\W|$)",
+        r"--\1",
+    ),
+)
+# Of each kind of error the options without which the command may succeed.
+CAUSES = {MISSTATED: ("--delimiter", "--decimal"), TOO_SHORT: ("--rows",)}
+
+
+def spoken(words: object) -> str:
+    """A sentence with the options of the command line for what it says of Python."""
+
+    def repair(call: re.Match[str]) -> str:
+        word = REPAIRS.get(call[1])
+        return call[0] if word is None else f"--repair {word}" + (f":{call[2]}" if call[2] else "")
+
+    text = re.sub(r"\bfill_gaps\(record\) and fill_missing\(record\)", "--repair gaps,missing", str(words))
+    text = re.sub(r'\b(\w+)\(record(?:, "(\w+)")?\)', repair, text)
+    for said, option in _SPOKEN:
+        text = re.sub(said, option, text)
+    return text
+
+
+def mended(arguments: Sequence[str], error: StickslipError) -> Iterator[str]:
+    """Two lines with the command that mends an error, where leaving an option out may do it."""
+    kept = list(_without(arguments, CAUSES.get(error.kind, ())))
+    if len(kept) < len(arguments):
+        yield "To mend it:"
+        yield shlex.join(["stickslip", *kept])
+
+
+def _without(arguments: Sequence[str], options: Sequence[str]) -> Iterator[str]:
+    """The words but these options and their values."""
+    words = iter(arguments)
+    for word in words:
+        if word in options:
+            next(words, None)
+        elif word.partition("=")[0] not in options:
+            yield word

@@ -9,8 +9,7 @@ from typing import Any
 import click
 
 from stickslip.cli.options import result_options
-from stickslip.cli.progress import progress
-from stickslip.cli.terminal import aligned, say, say_json, wrapped
+from stickslip.cli.terminal import aligned, progress, say, say_json, wrapped
 
 _ROW = ("place", "quantity", "verdict", "why")
 

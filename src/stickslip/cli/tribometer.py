@@ -9,7 +9,6 @@ import click
 
 import stickslip as ss
 from stickslip.cli.options import normal_option, reading_options, result_options
-from stickslip.cli.progress import progress
 from stickslip.cli.records import (
     answers,
     default_folder,
@@ -20,6 +19,7 @@ from stickslip.cli.records import (
     with_left_out,
 )
 from stickslip.cli.show import show
+from stickslip.cli.terminal import progress
 
 if TYPE_CHECKING:
     from stickslip import Record

@@ -7,8 +7,8 @@ from stickslip.drives.kinds import Ramp as Ramp
 from stickslip.drives.kinds import Recorded as Recorded
 from stickslip.drives.kinds import Release as Release
 from stickslip.drives.kinds import SpeedProfile as SpeedProfile
-from stickslip.drives.later import Later as Later
 from stickslip.drives.on_another import Dithered as Dithered
 from stickslip.drives.on_another import Imposed as Imposed
+from stickslip.drives.on_another import Later as Later
 
 __all__: list[str]

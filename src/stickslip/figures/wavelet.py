@@ -147,7 +147,7 @@ def plot_stick(findings: TimeFrequency) -> Figure:
     return figure
 
 
-def plates_of(findings: TimeFrequency) -> list[Plate]:
+def plates_of_map(findings: TimeFrequency) -> list[Plate]:
     """The figures of a channel over time and frequency."""
     reached = findings.record.start + findings.record.duration >= float(findings.wavelets.time.max())
     record = findings.record if reached else None  # one that came in parts is there no more

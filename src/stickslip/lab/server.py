@@ -22,7 +22,7 @@ from starlette.staticfiles import StaticFiles
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
 import stickslip as ss
-from stickslip.lab import data, live, maps, play
+from stickslip.lab import data, live, play
 from stickslip.lab.openapi import described, document
 from stickslip.lab.security import Guard
 from stickslip.lab.workers import Workers
@@ -70,7 +70,6 @@ def lab_app(*, token: str, port: int, place: live.Place | None = None) -> Starle
 def _routes() -> list[BaseRoute]:
     return [
         *play.routes,
-        *maps.routes,
         *data.routes,
         *live.routes,
         Route("/openapi.json", _openapi),

@@ -14,14 +14,14 @@ from contextlib import contextmanager, nullcontext
 from typing import Any, BinaryIO
 
 import stickslip as ss
-from stickslip.lab import drawn, explored, forms
+from stickslip.lab import drawn, forms
 from stickslip.lab.frames import frame
 from stickslip.lab.task import bound
 from stickslip.lab.workers import ANSWER, HEAD
 
 MEMORY = 4 * 2**30  # bytes of data
 PATIENCE = 30.0  # s of one run
-ANSWERS = {**drawn.ANSWERS, **explored.ANSWERS}
+ANSWERS = {**drawn.ANSWERS, **drawn.MAPS}
 
 
 class Overtaken(BaseException):
@@ -73,7 +73,7 @@ def answered(request: dict[str, Any], patience: Patience) -> bytes:
     reply = {"id": request.get("id"), "want": request.get("want")}
     patience.begin()
     try:
-        with patience.interrupting() if request["want"] in explored.ANSWERS else nullcontext():
+        with patience.interrupting() if request["want"] in drawn.MAPS else nullcontext():
             header, arrays = ANSWERS[request["want"]](request, patience)
         return frame({**reply, "kind": request["want"], **header}, arrays)
     except Overtaken:

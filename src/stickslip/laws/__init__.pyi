@@ -1,12 +1,14 @@
 from stickslip.laws.compliant import CompliantContact as CompliantContact
 from stickslip.laws.compliant import InertialContact as InertialContact
 from stickslip.laws.coulomb import Coulomb as Coulomb
+from stickslip.laws.coulomb import LinearSlope as LinearSlope
+from stickslip.laws.coulomb import PositionLoad as PositionLoad
 from stickslip.laws.export import export_law as export_law
 from stickslip.laws.geared import Geared as Geared
-from stickslip.laws.linear_slope import LinearSlope as LinearSlope
-from stickslip.laws.linear_slope import PositionLoad as PositionLoad
 from stickslip.laws.lugre import Dahl as Dahl
 from stickslip.laws.lugre import LuGre as LuGre
+from stickslip.laws.pairs import Pair as Pair
+from stickslip.laws.pairs import pair as pair
 from stickslip.laws.rough import RoughSurface as RoughSurface
 from stickslip.laws.series import ElastoSlip as ElastoSlip
 from stickslip.laws.series import InSeries as InSeries

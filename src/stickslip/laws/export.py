@@ -11,11 +11,10 @@ from xml.sax.saxutils import quoteattr
 from stickslip.errors import ModelError
 from stickslip.laws.base import Law
 from stickslip.laws.c_code import c_code, modes_of, python_code
-from stickslip.laws.coulomb import Coulomb
+from stickslip.laws.coulomb import Coulomb, LinearSlope
 from stickslip.laws.curved import CurvedLaw, lifted
 from stickslip.laws.formula import one_line, quoted, remark, written
 from stickslip.laws.guessing import registered
-from stickslip.laws.linear_slope import LinearSlope
 from stickslip.laws.lugre import LuGre
 from stickslip.laws.rough import RoughSurface
 from stickslip.laws.stribeck import FrictionCurve, Tabulated

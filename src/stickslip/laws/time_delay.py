@@ -58,7 +58,7 @@ class TimeDelay(Rigid):
 
     Examples
     --------
-    >>> from stickslip.laws.linear_slope import LinearSlope
+    >>> from stickslip.laws.coulomb import LinearSlope
     >>> law = TimeDelay(LinearSlope(1.0, slope=2.0), lag=1e-3)
     >>> law.rates()[2].friction.at(delayed_speed=0.1)
     1.2

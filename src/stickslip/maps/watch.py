@@ -34,9 +34,9 @@ from stickslip.solve.cells import Linear
 from stickslip.solve.glide import Clock, Model, Past, Pieces
 from stickslip.solve.kernel import DONE, FULL, advance, begin, follow, march, set_tones
 from stickslip.solve.phasors import Phasors
+from stickslip.solve.poincare import carry_tangents
 from stickslip.solve.refusal import Budget
 from stickslip.solve.tables import Array
-from stickslip.solve.tangent import carry_tangents
 
 TIRELESS = np.int64(2**62)  # cells: a march of many motions is not interrupted (a plain 2**62 is a type of its own)
 LAP = 64  # pieces remembered of a motion, a power of two; a lap of the drive with more has no fast path

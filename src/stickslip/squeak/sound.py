@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from stickslip.drives.kinds import HarmonicBase
 from stickslip.errors import ModelError, RecordError
-from stickslip.laws.linear_slope import LinearSlope
+from stickslip.laws.coulomb import LinearSlope
 from stickslip.parameters import finite
 from stickslip.record.channels import Channel, described
 from stickslip.record.record import Record, Step

@@ -1,4 +1,7 @@
-"""Findings told: what stands on every page of a record, around what its own family of answers says."""
+"""Findings told: what stands on every page of a record, around what its own family of answers says.
+
+Plain estimates are told with the record that they were found in.
+"""
 
 from __future__ import annotations
 
@@ -10,12 +13,15 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.answers.findings import Comparison, Findings
+from stickslip.answers.findings import Comparison, Findings, record_name
+from stickslip.balance.impact import ImpactTest
+from stickslip.errors import EstimateError
 from stickslip.estimate import Estimate
 from stickslip.files.write import require_form, write_record
+from stickslip.record.record import Record
 from stickslip.story.scope import of_findings as scope_of
-from stickslip.story.story import Line, Story, logged
-from stickslip.story.words import leading, number
+from stickslip.story.story import Line, Story, Table, logged
+from stickslip.story.words import leading, number, value_of
 
 # The file that tells findings which hold a result of this name; friction.py tells all others.
 FAMILIES = {"decay": "decay", "squeaks": "squeak", "joint": "joint", "tribometer": "tribometer"}
@@ -23,7 +29,7 @@ FAMILIES = {"decay": "decay", "squeaks": "squeak", "joint": "joint", "tribometer
 
 # What an engineer looks for first: these quantities lead the table, those without a value end it.
 FIRST = (
-    "sliding friction", "Coulomb friction", "viscous friction", "inertia", "friction coefficient",
+    "coefficient of friction, plateau", "coefficient of friction, static", "sliding friction", "Coulomb friction", "viscous friction", "inertia", "friction coefficient",
     "static over sliding friction", "stuck share of the time", "stops per cycle", "slope of friction against speed",
     "presliding stiffness", "contact stiffness", "forcing frequency", "sliding friction forward",
     "sliding friction back", "damping ratio", "damping ratio, whichever motion", "dry friction displacement",
@@ -114,3 +120,49 @@ def plain(value: Any) -> Any:
     if isinstance(value, float):
         return value if math.isfinite(value) else None
     return value if value is None or isinstance(value, (bool, int, str)) else str(value)
+
+
+def of_one(estimate: Estimate, *, record: Record | None = None) -> Story:
+    """An estimate by itself."""
+    return of_several([estimate], record=record)
+
+
+def of_tap(test: ImpactTest, *, record: Record | None = None) -> Story:
+    """What rings after a tap, and whose resonance each is."""
+    named = [f"{resonance.name} at {value_of(resonance.frequency)}" for resonance in test.resonances]
+    many = f"{len(named)} resonance{'s' * (len(named) > 1)} ring{'s' * (len(named) == 1)} after the tap"
+    lines = [
+        Line.of(number, name=f"{quantity}, {resonance.name}")
+        for resonance in test.resonances
+        for quantity, number in (("frequency", resonance.frequency), ("damping ratio", resonance.damping))
+    ]
+    rows = [(resonance.name, ", ".join(resonance.channels), resonance.evidence) for resonance in test.resonances]
+    told: dict[str, Any] = {
+        "headline": [f"{many}: {'; '.join(named)}."], "lines": lines, "data": test.to_dict,
+        "cautions": [] if test.status == "ok" else [test.status],
+        "tables": [Table("Why each is called so", ("resonance", "seen by", "evidence"), rows, folded=True)],
+    }  # fmt: skip
+    return Story("Tap", **told) if record is None else Story.of_record(record_name(record), record, **told)
+
+
+def of_several(estimates: Sequence[Estimate], *, record: Record | None = None) -> Story:
+    """Estimates, and the faults of their record."""
+    strangers = [type(item).__name__ for item in estimates if not isinstance(item, Estimate)]
+    if strangers or not estimates:
+        raise EstimateError(
+            f"a report of {', '.join(strangers) or 'nothing'}",
+            "a report is made of Findings, a Comparison, or Estimates",
+            "pass analyze(record), compare(findings) or a list of estimates",
+        )
+    lines = [Line.of(estimate) for estimate in estimates]
+
+    def data() -> dict[str, object]:
+        return {"estimates": [estimate.to_dict() for estimate in estimates]}
+
+    if record is None:
+        return Story("Estimates", lines=lines, data=data)
+    faults = record.check()
+    return Story.of_record(
+        record_name(record), record, headline=leading(faults), lines=lines, faults=[str(fault) for fault in faults],
+        data=data,
+    )  # fmt: skip

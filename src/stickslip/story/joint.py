@@ -15,8 +15,8 @@ from stickslip.cycle.joint_logs import JointLogs
 from stickslip.errors import ModelError
 from stickslip.estimate import stands
 from stickslip.figures.joint import plates_of, plates_together
+from stickslip.laws.coulomb import LinearSlope
 from stickslip.laws.export import export_law, urdf_dynamics
-from stickslip.laws.linear_slope import LinearSlope
 from stickslip.story.fit import ALONE, FILES
 from stickslip.story.story import Story, Table
 from stickslip.story.words import Caution, cautions, interval_of, number, value_of

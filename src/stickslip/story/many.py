@@ -12,7 +12,7 @@ import numpy as np
 from stickslip.answers.many import Batch, Row
 from stickslip.errors import ModelError, RecordError
 from stickslip.estimate import Estimate
-from stickslip.figures.many import plates_of
+from stickslip.figures.friction import plates_of_batch
 from stickslip.story.findings import plain
 from stickslip.story.story import Line, Story, Table
 from stickslip.story.words import Caution, interval_of, value_of
@@ -38,7 +38,7 @@ def of_batch(batch: Batch) -> Story:
     table = Table("Records", ("record", *leading, *(["remark"] if remarked else [])), rows)
     return Story(
         f"{len(batch.rows)} records", list(_headline(batch, leading)), lines=[Line.of(e) for e in batch.estimates],
-        notes=batch.notes, tables=[table], draw=lambda: plates_of(batch), data=lambda: _data(batch),
+        notes=batch.notes, tables=[table], draw=lambda: plates_of_batch(batch), data=lambda: _data(batch),
         write=lambda folder: write_table(batch, folder / TABLE),
     )  # fmt: skip
 

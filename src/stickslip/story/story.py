@@ -24,16 +24,16 @@ if TYPE_CHECKING:
 # Of each kind of result the function that tells it, in a file of this room, which is imported when it is needed.
 TELLERS = {
     "Findings": "findings.of_findings", "Comparison": "findings.of_comparison",
-    "TimeFrequency": "frequencies.of_map",
+    "TimeFrequency": "friction.of_map",
     "LawComparison": "fit.of_laws", "LawFit": "fit.of_law", "CurveFit": "fit.of_curve",
     "Predictions": "fit.of_predictions", "Batch": "many.of_batch",
     "Outcome": "simulation.of_outcome", "Trajectory": "simulation.of_run",
     "Record": "bench.of_record", "ExperimentPlan": "bench.of_plan",
     "Bifurcation": "maps.of_bifurcation", "Basins": "maps.of_basins", "Boundary": "maps.of_boundary",
     "Dither": "maps.of_dither", "Stability": "maps.of_stability",
-    "ImpactTest": "estimates.of_tap", "Dataset": "maps.of_map",
-    "Commissioned": "bench.of_commissioned", "Tour": "tour.of_tour",
-    "Estimate": "estimates.of_one", "list": "estimates.of_several", "tuple": "estimates.of_several",
+    "ImpactTest": "findings.of_tap", "Dataset": "maps.of_map",
+    "Commissioned": "bench.of_commissioned", "Tour": "bench.of_tour",
+    "Estimate": "findings.of_one", "list": "findings.of_several", "tuple": "findings.of_several",
 }  # fmt: skip
 
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from stickslip.errors import StickslipError
 from stickslip.law.drive import DriveFrom
 from stickslip.laws.compliant import CompliantContact
-from stickslip.laws.linear_slope import LinearSlope
+from stickslip.laws.coulomb import LinearSlope
 from stickslip.laws.lugre import LuGre
 from stickslip.laws.state_variable import StateVariable
 from stickslip.laws.stribeck import Stribeck

@@ -13,7 +13,7 @@ from stickslip.balance.motion import is_measured
 from stickslip.drives.kinds import HarmonicBase
 from stickslip.errors import EstimateError, StickslipError
 from stickslip.law.drive import DriveFrom, measured_drive
-from stickslip.laws.linear_slope import LinearSlope
+from stickslip.laws.coulomb import LinearSlope
 from stickslip.oscillator import Oscillator
 from stickslip.record.flaws import saturated
 from stickslip.record.record import Record
