@@ -29,7 +29,8 @@ FAMILIES = {"decay": "decay", "squeaks": "squeak", "joint": "joint", "tribometer
 
 # What an engineer looks for first: these quantities lead the table, those without a value end it.
 FIRST = (
-    "coefficient of friction, plateau", "coefficient of friction, static", "sliding friction", "Coulomb friction", "viscous friction", "inertia", "friction coefficient",
+    "coefficient of friction, plateau", "coefficient of friction, static",
+    "sliding friction", "Coulomb friction", "viscous friction", "inertia", "friction coefficient",
     "static over sliding friction", "stuck share of the time", "stops per cycle", "slope of friction against speed",
     "presliding stiffness", "contact stiffness", "forcing frequency", "sliding friction forward",
     "sliding friction back", "damping ratio", "damping ratio, whichever motion", "dry friction displacement",
