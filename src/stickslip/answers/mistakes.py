@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 
+from stickslip.consistent.checks import MILLISECONDS, Slip
 from stickslip.consistent.contradictions import Consistency
-from stickslip.consistent.slips import MILLISECONDS, Slip
 from stickslip.cycle.loops import Loops
 from stickslip.record.record import Record
 from stickslip.rig.settings import RigSettings

@@ -25,8 +25,8 @@ from stickslip.balance.balance import ALONE, Balance, pulled_slider
 from stickslip.balance.force import FUSIONS, friction_force
 from stickslip.balance.likely_contact import STRAYING
 from stickslip.balance.motion import is_measured, slid_on
+from stickslip.consistent.checks import Slip
 from stickslip.consistent.contradictions import consistency
-from stickslip.consistent.slips import Slip
 from stickslip.contact.cause import lag_or_compliance
 from stickslip.contact.contact import contact_damping, contact_stiffness
 from stickslip.contact.sliding_onset import coupled_frequency, transition_speed

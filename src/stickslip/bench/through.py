@@ -8,10 +8,10 @@ from pathlib import Path
 
 import numpy as np
 
-from stickslip.answers.comparison import compare
 from stickslip.answers.decays import analyze_decay
 from stickslip.answers.findings import Comparison, Findings
 from stickslip.answers.fits import fit_records
+from stickslip.answers.many import compare
 from stickslip.answers.questions import analyze
 from stickslip.answers.squeaks import analyze_squeaks, compare_squeaks
 from stickslip.bench.recording import Wanted, acquire

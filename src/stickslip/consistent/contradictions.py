@@ -18,10 +18,14 @@ from stickslip.balance.motion import is_measured, require_change, stretches
 from stickslip.consistent.checks import (
     FAILS,
     HOLDS,
+    ONE_SLIP,
     UNTOLD,
     Check,
+    Slip,
     compared,
     judged,
+    mixups,
+    slip_check,
     untold,
 )
 from stickslip.consistent.forced_checks import (
@@ -36,7 +40,6 @@ from stickslip.consistent.forced_checks import (
     zero_off,
 )
 from stickslip.consistent.sliding_balance import Stated, stated_checks, what_fails
-from stickslip.consistent.slips import ONE_SLIP, Slip, mixups, slip_check
 from stickslip.errors import EstimateError
 from stickslip.estimate import Constant, Result, plain
 from stickslip.record.check import find_clipping

@@ -17,8 +17,7 @@ from stickslip.maps.crowd import Watch, crowds, on_cpu, watched
 from stickslip.maps.measures import AT_REST, EVENTS, FAILED, LOG, MOVING, NO_SYSTEM, ORDERS, own_name
 from stickslip.maps.plan import Arrays, Plan
 from stickslip.maps.watch import repeats
-from stickslip.solve.exponents import lyapunov
-from stickslip.solve.poincare import derivative, lap, tables
+from stickslip.solve.poincare import derivative, lap, lyapunov, tables
 from stickslip.solve.simulate import simulate
 from stickslip.solve.tables import Array, System, Tables
 from stickslip.solve.trajectory import Event, Trajectory

@@ -23,8 +23,7 @@ from stickslip.maps.measures import EVENTS, FAILED, REPEATS, Measure, Variable, 
 from stickslip.maps.plan import BLOCK, Arrays, Keep, Plan, assemble, blank, chunked, required
 from stickslip.maps.store import Store
 from stickslip.oscillator import Oscillator
-from stickslip.solve.exponents import BATCHES
-from stickslip.solve.poincare import tables
+from stickslip.solve.poincare import BATCHES, tables
 from stickslip.solve.refusal import Endless
 from stickslip.solve.simulate import opening, simulate
 from stickslip.solve.tables import System

@@ -15,9 +15,20 @@ from itertools import pairwise
 import numpy as np
 
 from stickslip.errors import ModelError, SolveError
-from stickslip.solve.exponents import growth
 from stickslip.solve.orbit import SteadyState, alike
-from stickslip.solve.poincare import CLOSED, Table, beat, beats, carried_on, closes, derivative, extent, lap, tables
+from stickslip.solve.poincare import (
+    CLOSED,
+    Table,
+    beat,
+    beats,
+    carried_on,
+    closes,
+    derivative,
+    extent,
+    growth,
+    lap,
+    tables,
+)
 from stickslip.solve.self_excited import self_excited
 from stickslip.solve.simulate import opening
 from stickslip.solve.tables import Array, System

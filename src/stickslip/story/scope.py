@@ -12,7 +12,7 @@ import numpy as np
 
 from stickslip.answers.findings import Findings
 from stickslip.balance.motion import is_measured
-from stickslip.consistent.slips import Slip
+from stickslip.consistent.checks import Slip
 from stickslip.errors import StickslipError
 from stickslip.figures.contact import across
 from stickslip.figures.style import Array, envelope, prefixed, spelled
