@@ -118,12 +118,12 @@ def _line(design: NDArray[np.float64], levels: NDArray[np.float64], sds: NDArray
     """Coefficients by least squares; each varies as the scatter about the line says, or as `sds` do if that is more."""
     free = len(levels) - design.shape[1]
     inverse = np.linalg.pinv(design)
-    found = inverse @ levels
-    scatter = np.sqrt(np.sum((levels - design @ found) ** 2) / free * np.sum(inverse**2, axis=1))
+    line = inverse @ levels
+    scatter = np.sqrt(np.sum((levels - design @ line) ** 2) / free * np.sum(inverse**2, axis=1))
     # a record of one cycle has no sd of its own: the scatter alone speaks for it
     own = np.sqrt(inverse**2 @ np.where(np.isfinite(sds), sds, 0.0) ** 2)
     sd = np.maximum(scatter, own * NORMAL_95 / student(free))
-    return [{"value": v, "sd": s, "quantile": student(free)} for v, s in zip(found, sd, strict=True)]
+    return [{"value": v, "sd": s, "quantile": student(free)} for v, s in zip(line, sd, strict=True)]
 
 
 Task = TypeVar("Task")
@@ -170,17 +170,17 @@ class Row:
         return not self.refusal and not self.same_as
 
     @classmethod
-    def of_dict(cls, told: Mapping[str, Any]) -> Row:
+    def of_dict(cls, data: Mapping[str, Any]) -> Row:
         """A row from plain data."""
-        level = told["level"]
+        level = data["level"]
         return cls(**{
-            **told, "estimates": tuple(_estimate(estimate) for estimate in told["estimates"]),
-            "level": None if level is None else _estimate(level), "picture": tuple(told["picture"]),
+            **data, "estimates": tuple(_estimate(estimate) for estimate in data["estimates"]),
+            "level": None if level is None else _estimate(level), "picture": tuple(data["picture"]),
         })  # fmt: skip
 
 
-def _estimate(told: Mapping[str, Any]) -> Estimate:
-    return Estimate(**{**told, "interval": tuple(told["interval"]), "checks": tuple(told["checks"])})
+def _estimate(data: Mapping[str, Any]) -> Estimate:
+    return Estimate(**{**data, "interval": tuple(data["interval"]), "checks": tuple(data["checks"])})
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -212,8 +212,8 @@ class Batch(Result):
         """With the coefficient of friction over the records whose normal load is known."""
         loaded = [row for row in rows if row.counts and row.normal is not None]
         together, more = against_load(loaded) if len(loaded) > 1 else ({}, ())
-        found = {name: each for name, each in together.items() if each is not None}
-        return cls(question, tuple(rows), axes, found, (*more, *notes))
+        known = {name: estimate for name, estimate in together.items() if estimate is not None}
+        return cls(question, tuple(rows), axes, known, (*more, *notes))
 
     @property
     def estimates(self) -> tuple[Estimate, ...]:
@@ -343,15 +343,15 @@ def _cells(row: Row, names: Sequence[str]) -> Iterator[tuple[str, Any]]:
         ("sha256", row.key),
     )
     yield "normal load [N]", row.normal
-    found = {estimate.name: estimate for estimate in row.estimates}
+    estimates = {estimate.name: estimate for estimate in row.estimates}
     for name in names:
-        each = found.get(name)
-        unit = "" if each is None or each.unit == "1" else f" [{each.unit}]"
-        if each is not None:
-            yield f"{name}{unit}", each.value
-            yield f"{name}, low{unit}", each.interval[0]
-            yield f"{name}, high{unit}", each.interval[1]
-            yield f"{name}, status", each.status
+        estimate = estimates.get(name)
+        unit = "" if estimate is None or estimate.unit == "1" else f" [{estimate.unit}]"
+        if estimate is not None:
+            yield f"{name}{unit}", estimate.value
+            yield f"{name}, low{unit}", estimate.interval[0]
+            yield f"{name}, high{unit}", estimate.interval[1]
+            yield f"{name}, status", estimate.status
 
 
 class Kept:

@@ -50,7 +50,7 @@ def _late(record: Record, rig: RigSettings, loops: Loops | None) -> Slip | None:
     """Milliseconds taken for seconds, of a delay that lasts longer than a cycle, or much of the record."""
     period = 1 / loops.frequency.value if loops is not None else LATEST * record.duration
     stated = {name: channel.delay for name, channel in record.channels.items()}
-    stated |= {name: told.delay for name, told in rig.sensors.items() if "delay" in told.model_fields_set}
+    stated |= {name: sensor.delay for name, sensor in rig.sensors.items() if "delay" in sensor.model_fields_set}
     far = {name: late for name, late in stated.items() if abs(late) > max(period, SHORTEST_DELAY)}
     if not far:
         return None

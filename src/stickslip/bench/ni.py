@@ -62,8 +62,8 @@ class Unit:
     def model(self) -> str:
         """Product and serial number, where the unit can be asked."""
         try:
-            found = vendors("nidaqmx").system.Device(self.device)
-            return f"{found.product_type}, serial {found.serial_num:X}"
+            unit = vendors("nidaqmx").system.Device(self.device)
+            return f"{unit.product_type}, serial {unit.serial_num:X}"
         except Exception as error:  # noqa: BLE001  the driver raises its own, and an unit may not be there yet
             return f"{self.device} ({str(error).partition(chr(10))[0]})"
 

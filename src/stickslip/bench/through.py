@@ -194,9 +194,9 @@ def _acquired(device: Sim, path: Path, seconds: float, rig: RigSettings) -> None
 def _laws(driven: Sequence[Record], rig: RigSettings) -> LawComparison:
     """Which law, by a part of the sticking run and of one that slides."""
     parts = [record.between(SETTLE, SETTLE + OF_LAWS) for record in [driven[k] for k in OF]]
-    found, _ = fit_records(parts, rig=rig, laws=LAWS)
-    assert isinstance(found, LawComparison)
-    return found
+    comparison, _ = fit_records(parts, rig=rig, laws=LAWS)
+    assert isinstance(comparison, LawComparison)
+    return comparison
 
 
 def _next(laws: LawComparison, rig: RigSettings) -> tuple[Proposal, ...]:

@@ -254,9 +254,9 @@ def _trigger(text: str | None, before: float) -> bench.Trigger | None:
         if before:
             raise click.BadParameter("what is kept before a trigger needs one", param_hint="--before")
         return None
-    found = TRIGGER.fullmatch(text)
+    match = TRIGGER.fullmatch(text)
     try:
-        return bench.Trigger(found[1], float(found[3]), found[2] == ">", before)  # type: ignore[index]
+        return bench.Trigger(match[1], float(match[3]), match[2] == ">", before)  # type: ignore[index]
     except (TypeError, ValueError):
         raise click.BadParameter(f"'{text}' is not CHANNEL>LEVEL or CHANNEL<LEVEL", param_hint="--trigger") from None
 
@@ -299,9 +299,9 @@ def devices(config: Path | None, as_json: bool) -> None:
     named = ss.rig.read_rig(config).devices if config else {}
     mine = {name: bench.find_device(name, named, folder=config.parent if config else None) for name in named}
     if as_json:
-        told = {kind.kind: {"about": kind.about, "there": [*kind.there], "missing": kind.missing} for kind in kinds}
+        about = {kind.kind: {"about": kind.about, "there": [*kind.there], "missing": kind.missing} for kind in kinds}
         named_so = {name: {"kind": one.kind, "model": one.model, "fs": one.fs} for name, one in mine.items()}
-        say_json({"kinds": told, "named": named_so})
+        say_json({"kinds": about, "named": named_so})
         return
     for name, one in mine.items():
         inputs = ", ".join(f"{entry.name} [{entry.unit}]" for entry in one.inputs)
@@ -336,10 +336,10 @@ def tour(fast: bool, seed: int, output: Path, as_json: bool, everything: bool) -
     report = output / "report"
     usable(click.get_current_context(), None, report)  # type: ignore[arg-type]
     with progress(100) as tell:
-        found = bench.tour(output, seed=seed, fast=fast, progress=lambda words, share: tell(words, 100 * share))
+        done = bench.tour(output, seed=seed, fast=fast, progress=lambda words, share: tell(words, 100 * share))
         tell("drawing and writing", 95)
-        written = ss.publish(found, folder=report)
-    show(found, written, as_json=as_json, everything=everything)
+        written = ss.publish(done, folder=report)
+    show(done, written, as_json=as_json, everything=everything)
 
 
 @simulated_bench.command("next")

@@ -139,9 +139,12 @@ def predict(
         return ss.answers.predict(record, oscillator, rig=rig, plain=plain)
 
     with progress(2 * len(groups) + 1) as tell:
-        found, refused = answers(groups, rig, ask, tell)
-        parts, notes = [part for each in found for part in each.parts], [f"Left out: {error}" for error in refused]
-        results = replace(found[0], parts=tuple(parts), notes=tuple(notes))
+        predictions, refused = answers(groups, rig, ask, tell)
+        parts, notes = (
+            [part for prediction in predictions for part in prediction.parts],
+            [f"Left out: {error}" for error in refused],
+        )
+        results = replace(predictions[0], parts=tuple(parts), notes=tuple(notes))
         tell("drawing and writing", 2 * len(groups))
         written = ss.publish(results, folder=folder) if folder else None
     name_left_out(refused)

@@ -145,10 +145,10 @@ def answered(task: Task) -> Row:
     name = " + ".join(task.names)
     try:
         record = read(task.files, task.rig, task.names)
-        found = ASK[task.question](record, task.rig, **task.options)
+        findings = ASK[task.question](record, task.rig, **task.options)
         return ss.answers.Row(
-            name, task.key, ss.summary(found).answer, found.quoted, found.level, found.normal,
-            picture=PICTURES[task.question](found),
+            name, task.key, ss.summary(findings).answer, findings.quoted, findings.level, findings.normal,
+            picture=PICTURES[task.question](findings),
         )  # fmt: skip
     except ss.errors.ModelError:
         raise
@@ -157,13 +157,13 @@ def answered(task: Task) -> Row:
 
 
 def _analyzed(record: Record, rig: RigSettings, *, method: str, twins: int) -> Any:
-    found = ss.analyze(record, rig=rig, method=method)
-    if not twins or found.contradiction:
-        return found
+    findings = ss.analyze(record, rig=rig, method=method)
+    if not twins or findings.contradiction:
+        return findings
     try:
-        return ss.tried(found, twins=twins)
+        return ss.tried(findings, twins=twins)
     except ss.errors.EstimateError as error:
-        return replace(found, notes=(*found.notes, f"Twins: {error}"))
+        return replace(findings, notes=(*findings.notes, f"Twins: {error}"))
 
 
 def _decayed(record: Record, rig: RigSettings, **asked: Any) -> Any:
@@ -180,22 +180,22 @@ ASK: dict[str, Callable[..., Any]] = {"analyze": _analyzed, "decay": _decayed, "
 Picture = tuple[list[float], list[float]]
 
 
-def _loop(found: Any) -> Picture:
+def _loop(findings: Any) -> Picture:
     """Friction over the displacement, for some cycles of the middle."""
-    record = found.record
+    record = findings.record
     if "friction" not in record or "x" not in record:
-        return _trace(found)
+        return _trace(findings)
     count = len(record)
-    if found.loops is not None:
-        count = min(count, round(SHOWN * record.fs / found.loops.frequency.value))
+    if findings.loops is not None:
+        count = min(count, round(SHOWN * record.fs / findings.loops.frequency.value))
     first = (len(record) - count) // 2
     return _thinned(record["x"][first : first + count], record["friction"][first : first + count])
 
 
-def _trace(found: Any) -> Picture:
+def _trace(findings: Any) -> Picture:
     """The channel that was asked over the time."""
-    record = found.record
-    channel = found.settings.get("channel") or next(iter(record))
+    record = findings.record
+    channel = findings.settings.get("channel") or next(iter(record))
     return _thinned(record.time, record[channel if channel in record else next(iter(record))])
 
 

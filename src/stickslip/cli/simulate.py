@@ -126,7 +126,7 @@ def sweep(file: Path, engine: str, store: Path | None, output: Path | None, as_j
     """
     asked = ss.maps.read_sweep(file)
     place = store if store is not None else file.with_suffix(".zarr")
-    found = ss.sweep(
+    atlas = ss.sweep(
         asked.case.system,
         asked.grid,
         measures=asked.measures,
@@ -136,12 +136,12 @@ def sweep(file: Path, engine: str, store: Path | None, output: Path | None, as_j
         engine=engine,
         store=place,
     )
-    story, whole = ss.summary(found), found.attrs["status"] == "complete"
-    written = ss.publish(found, folder=output, system=asked.case.system) if output is not None else None
+    story, whole = ss.summary(atlas), atlas.attrs["status"] == "complete"
+    written = ss.publish(atlas, folder=output, system=asked.case.system) if output is not None else None
     if as_json:
         print_json({**story.data(), "store": str(place)})
         raise SystemExit(0 if whole else INTERRUPTED)
-    show(found, written, as_json=False, everything=everything)
+    show(atlas, written, as_json=False, everything=everything)
     say(f"Map: {place}")
     if not whole:
         say("Call again to go on.")
@@ -273,6 +273,6 @@ def _answer(
     folder = output or (None if as_json else folder_name(case, what))
     with progress(1) as tell:
         tell(f"{what} of {case.name}", 0)
-        found = ask()
-        written = ss.publish(found, folder=folder) if folder else None
-    show(found, written, as_json=as_json, everything=everything)
+        answer = ask()
+        written = ss.publish(answer, folder=folder) if folder else None
+    show(answer, written, as_json=as_json, everything=everything)

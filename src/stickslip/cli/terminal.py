@@ -38,9 +38,9 @@ def complain(sentence: object) -> None:
     say(f"stickslip: {' '.join(str(sentence).split())}", err=True)
 
 
-def say_json(told: Mapping[str, Any]) -> None:
+def say_json(results: Mapping[str, Any]) -> None:
     """Results for a machine; what can not be printed is spelled out, which leaves it JSON of the same value."""
-    say(json.dumps(told, indent=2, ensure_ascii=False, allow_nan=False))
+    say(json.dumps(results, indent=2, ensure_ascii=False, allow_nan=False))
 
 
 def say_styled(line: str, **style: Any) -> None:

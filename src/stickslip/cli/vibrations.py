@@ -78,7 +78,7 @@ def decay(files: tuple[str, ...], output: Path | None, as_json: bool, everything
     places, shown = Places.of(options), {"as_json": as_json, "everything": everything}
     asked = {key: options.pop(key) for key in ("method", "channel", "restoring", "mass", "stiffness")}
     rig = rig_of(**options)
-    if any(each.partition(":")[0] == "drift" for each in rig.repair):
+    if any(repair.partition(":")[0] == "drift" for repair in rig.repair):
         raise ss.errors.ModelError(
             "--repair drift of a free decay",
             "a drift is told from a steady oscillation, and would take what friction does for drift",
@@ -91,9 +91,9 @@ def decay(files: tuple[str, ...], output: Path | None, as_json: bool, everything
         answer_many("decay", groups, rig, asked, places, folder=folder, output=output, **shown)
         return
     with progress(2 * len(groups) + 1) as tell:
-        found, refused = answers(groups, rig, lambda record: ss.analyze_decay(record, **asked), tell)
+        findings, refused = answers(groups, rig, lambda record: ss.analyze_decay(record, **asked), tell)
         tell("drawing and writing", 2 * len(groups))
-        results = with_left_out(ss.answers.compare_decays(found) if len(found) > 1 else found[0], refused)
+        results = with_left_out(ss.answers.compare_decays(findings) if len(findings) > 1 else findings[0], refused)
         written = ss.publish(results, folder=folder) if output or not as_json else None
     name_left_out(refused)
     show(results, written, **shown)
@@ -156,8 +156,8 @@ def squeak(
         return replace(findings, normal=next((load for load in loads if load is not None), findings.normal))
 
     with progress(2 * len(groups) + 1) as tell:
-        found, refused = answers(groups, rig, ask, tell)
-        results = with_left_out(ss.answers.compare_squeaks(found) if len(found) > 1 else found[0], refused)
+        findings, refused = answers(groups, rig, ask, tell)
+        results = with_left_out(ss.answers.compare_squeaks(findings) if len(findings) > 1 else findings[0], refused)
         tell("drawing and writing", 2 * len(groups))
         written = ss.publish(results, folder=folder) if output or not as_json else None
     name_left_out(refused)

@@ -215,7 +215,7 @@ def drift(blocks: Blocks, n: int, p: Array) -> tuple[float, Array, float]:
         return float(cost), float(squares)
 
     corners = np.geomspace(0.1 * tones[1], 2 * tones[-1], CORNERS)
-    costs = [judged(each)[0] for each in corners]
+    costs = [judged(place)[0] for place in corners]
     best = int(np.argmin(costs))
     if 0 < best < CORNERS - 1:  # a parabola through three costs
         below, here, above = costs[best - 1 : best + 2]

@@ -205,7 +205,7 @@ def _test(law: Law | CurvedLaw, modes: Modes, memory: list[str]) -> str:
             values |= moved
             force = HOLD if mode.friction is None else at(mode.friction, values)
             state = [values[name] for name in (*INPUTS, *memory)] + [force]
-            rows.append(f"    {{ {_token(mode.name)}, {', '.join(repr(float(each)) for each in state)} }}")
+            rows.append(f"    {{ {_token(mode.name)}, {', '.join(repr(float(value)) for value in state)} }}")
     inputs = len(INPUTS)
     return "\n".join([
         "#ifdef FRICTION_TEST", "#include <stdio.h>",
@@ -281,8 +281,8 @@ def _python_rates(modes: Modes, names: Mapping[str, str]) -> list[str]:
     lines, named = ["    def rates(self, x, v, OTHERS):"], {**names, "f": "hold", "df": "hold_rate"}
     for mode in modes:
         if mode.rates:
-            told = ", ".join(f"{name!r}: {written(form, names=named)}" for name, form in mode.rates.items())
-            lines += [f"        if self.mode == {mode.name!r}:", f"            return {{{told}}}"]
+            rates = ", ".join(f"{name!r}: {written(form, names=named)}" for name, form in mode.rates.items())
+            lines += [f"        if self.mode == {mode.name!r}:", f"            return {{{rates}}}"]
     return [*lines, "        return {}", ""]
 
 

@@ -129,7 +129,7 @@ def guesses(seen: Observed) -> list[CompliantContact]:
         # a number that is zero is not fitted: a loss that the friction does not show is begun small
         damping = max(damping, LIGHT * math.sqrt(float(k) * seen.mass))
         tried.append((seen.left(modelled), CompliantContact(seen.level, stiffness=float(k), damping=damping)))
-    return [min(tried, key=lambda each: each[0])[1]]
+    return [min(tried, key=lambda attempt: attempt[0])[1]]
 
 
 def _from_coulomb(simpler: Mapping[str, Searched]) -> list[CompliantContact]:

@@ -229,8 +229,8 @@ class ElastoSlip:
         finite("width", width, unit="m", positive=True)
         if elements < 1:
             raise ModelError(f"elements = {elements}", "at least one", "raise elements=")
-        each = stiffness / elements
-        return cls([each] * elements, [each * width * (j + 0.5) / elements for j in range(elements)])
+        share = stiffness / elements
+        return cls([share] * elements, [share * width * (j + 0.5) / elements for j in range(elements)])
 
     @property
     def memory(self) -> Mapping[str, Row]:

@@ -139,8 +139,8 @@ def _short(record: Record) -> list[Fault]:
 def _cut(record: Record) -> list[Fault]:
     """What the files that were read were found to lack."""
     last = len(record) - 1
-    told = [file for step in record.history for file in step.arguments.get("files", ()) if file.get("cut")]
-    return [Fault("cut", None, ((last, last),), f"'{file['name']}': {file['cut']}.") for file in told]
+    files = [file for step in record.history for file in step.arguments.get("files", ()) if file.get("cut")]
+    return [Fault("cut", None, ((last, last),), f"'{file['name']}': {file['cut']}.") for file in files]
 
 
 # ---- the clock
@@ -221,7 +221,7 @@ def _pairs(first: NDArray[np.intp], width: int = 1) -> Runs:
 
 def _unstated(record: Record) -> list[Fault]:
     """The clock and the channels whose unit nobody stated, with what they span in the one that was taken."""
-    finite = {name: record[name][np.isfinite(record[name])] for name, each in record.channels.items() if each.assumed}
+    finite = {name: record[name][np.isfinite(record[name])] for name, entry in record.channels.items() if entry.assumed}
     spans = {
         name: (record.channels[name].unit, float(np.ptp(values))) for name, values in finite.items() if len(values)
     }
@@ -348,8 +348,8 @@ def find_clipping(record: Record, name: str) -> Fault | None:
     Unlike the check-up, this also asks of a friction that was measured.
     """
     if name != COMPUTED:
-        found = (fault for fault in record.check() if fault.kind == "clipped" and fault.channel == name)
-        return next(found, None)
+        clipped = (fault for fault in record.check() if fault.kind == "clipped" and fault.channel == name)
+        return next(clipped, None)
     values = record[name]
     spikes = flaws.spikes(values)
     if spikes:

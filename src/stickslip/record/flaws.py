@@ -104,10 +104,10 @@ def spikes(values: Array) -> Runs:
     agree with each other. Where more than one sample in sixty stands off (each disturbs three such differences), they
     count as what the channel does, and none is found: such a channel has no spikes but a fault of its cable.
     """
-    found = np.zeros(len(values), dtype=bool)
+    flags = np.zeros(len(values), dtype=bool)
     for width in (1, 2):
-        found |= _spikes(values, width)
-    return runs_of(found)
+        flags |= _spikes(values, width)
+    return runs_of(flags)
 
 
 def _spikes(values: Array, width: int, reach: int = 10) -> Mask:
@@ -146,7 +146,7 @@ def frozen(values: Array, shortest: int = 5) -> Runs:
     if not candidates:
         return ()
     step = quantum(values)
-    found = [run for run in candidates if _is_frozen(values, still, run, step, span)]
+    runs = [run for run in candidates if _is_frozen(values, still, run, step, span)]
     levels = np.array([abs(values[first]) for first, _ in candidates])
     lengths = np.array([last - first + 1 for first, last in candidates])
     near = max(0.5 * step, EXACT * span)
@@ -155,7 +155,7 @@ def frozen(values: Array, shortest: int = 5) -> Runs:
         alike = (np.abs(levels - abs(values[run[0]])) <= near) & (lengths >= 0.5 * (run[1] - run[0] + 1))
         return int(np.sum(alike)) > 1
 
-    return tuple(run for run in found if not recurs(run))
+    return tuple(run for run in runs if not recurs(run))
 
 
 def _is_frozen(values: Array, still: Mask, run: tuple[int, int], step: float, span: float) -> bool:

@@ -174,8 +174,8 @@ def _filtered(record: Record, channels: Iterable[str] | None, edges: list[float]
     most = len(record) - 1
     settle = min(most, int(SETTLES * record.fs / edges[0]))
     through: dict[str, Array] = {n: sosfiltfilt(sections, record[n], padlen=settle) for n in names}
-    told = Step(step.action, {**step.arguments, "channels": names}, step.outcome)
-    return record.with_samples({**record.samples, **through}, told, filtered=True)
+    described = Step(step.action, {**step.arguments, "channels": names}, step.outcome)
+    return record.with_samples({**record.samples, **through}, described, filtered=True)
 
 
 @dataclass(frozen=True, eq=False, repr=False)

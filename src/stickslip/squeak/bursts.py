@@ -116,7 +116,7 @@ def find_squeaks(
     motion = ForcedMotion.of(record)
     unit = record.channels[name].unit
     listener = _Listener(record, name, hearing, motion, clipped_rows(record, name))
-    bursts = _of_one_contact(sorted((listener.burst(part) for part in hearing.spans), key=lambda each: each.start))
+    bursts = _of_one_contact(sorted((listener.burst(part) for part in hearing.spans), key=lambda burst: burst.start))
     cautions = tuple(listener.cautions(unit))
     notes = (*cautions, *listener.notes(unit))
     heard = (
@@ -139,7 +139,7 @@ class ForcedMotion:
     def of(cls, record: Record) -> ForcedMotion:
         from scipy.signal import butter, hilbert, sosfiltfilt
 
-        name = next((each for each in ("x", "v") if each in record and np.ptp(record[each]) > 0), None)
+        name = next((channel for channel in ("x", "v") if channel in record and np.ptp(record[channel]) > 0), None)
         if name is None or not np.all(np.isfinite(record[name])):
             return cls()
         values = record[name] - record[name].mean()
@@ -344,28 +344,28 @@ class _Listener:
 
     def _status(self, part: Span, spoilt: bool) -> str:
         ends = self._cut(part)
-        told = [f"cut by the {' and '.join(ends)} of the record: it may last longer"] if ends else []
-        told += ["clipped: its level and harmonics can not be told"] if spoilt else []
-        return Status(*told)
+        doubts = [f"cut by the {' and '.join(ends)} of the record: it may last longer"] if ends else []
+        doubts += ["clipped: its level and harmonics can not be told"] if spoilt else []
+        return Status(*doubts)
 
     def cautions(self, unit: str) -> list[str]:
         """What every level and every burst rests on."""
-        told = []
+        cautions = []
         if unit == "1":
-            told.append(
+            cautions.append(
                 f"Channel {self.name} is not calibrated: its levels are relative to 1, and no sound pressure level is "
                 f'told; state its sensitivity when reading, as in channels={{"sound": "{self.name} * 2.5 [Pa]"}}.'
             )
-        return [*told, *self._unheard(unit)]
+        return [*cautions, *self._unheard(unit)]
 
     def notes(self, unit: str) -> list[str]:
         """What could not be told, beside the cautions."""
-        told = []
+        notes = []
         if unit not in ("1", *REFERENCES):
-            told.append(f"Levels of channel {self.name} are re 1 {unit}: it is neither a sound nor a vibration.")
+            notes.append(f"Levels of channel {self.name} are re 1 {unit}: it is neither a sound nor a vibration.")
         if self.motion.velocity is None:
-            told.append("No forced motion is recorded beside it: phase and sliding speed can not be told.")
-        return told
+            notes.append("No forced motion is recorded beside it: phase and sliding speed can not be told.")
+        return notes
 
     def _unheard(self, unit: str) -> list[str]:
         """Which channels of a stereo file were not listened to; nothing where another than the first was chosen."""
@@ -404,7 +404,7 @@ def _unlike_a_contact(bursts: list[Squeak], claimed: list[Squeak]) -> str:
     intervals, and what goes on may be a drive, a whistle or a kettle.
     """
     clear = [burst for burst in bursts if burst.kind != "noise" and burst.tonality > CLEAR]
-    tones = [each for each in clear if each in claimed or each.duration * each.frequency > LASTS]
+    tones = [burst for burst in clear if burst in claimed or burst.duration * burst.frequency > LASTS]
     if not tones:
         return f"less than {CLEAR:.0%} of its power is in its tones"
     pitch = float(np.median([tone.frequency for tone in tones]))

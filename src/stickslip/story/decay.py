@@ -33,7 +33,7 @@ def of_findings(findings: Findings) -> Story:
     """One record."""
     decay, chosen = findings.decay, findings.settings
     beside = [replace(comparison, status="for comparison") for comparison in decay.comparisons]
-    motions = () if decay.motion is None else [told[1:] for told in decay.motion.candidates]
+    motions = () if decay.motion is None else [candidate[1:] for candidate in decay.motion.candidates]
     units = rig_units(chosen["channel"])
     settings = {"methods": METHODS[chosen["method"]], "channel": chosen["channel"], "spring": chosen["restoring"]}
     stated = {key: number(value, 0.0, units[key]) for key, value in chosen.items() if key in units}
@@ -77,9 +77,13 @@ def _by_other_ways(estimates: list[Estimate]) -> Iterator[Table]:
 def of_comparison(comparison: Comparison) -> Story:
     """Several records together."""
     own = [
-        Line.of(number, each.true_value(number), name=f"{number.name}, {each.name}")
-        for each in comparison.findings
-        for number in (each.decay.best.damping_ratio, each.decay.best.dry_displacement, each.decay.best.frequency)
+        Line.of(number, finding.true_value(number), name=f"{number.name}, {finding.name}")
+        for finding in comparison.findings
+        for number in (
+            finding.decay.best.damping_ratio,
+            finding.decay.best.dry_displacement,
+            finding.decay.best.frequency,
+        )
     ]
     joint = comparison.joint
     half_cycles = None if joint is None else joint.half_cycles
@@ -182,7 +186,7 @@ def _dying(decay: Decay) -> str:
         model = decay.best.model
         return f"The motion dies away by {model if 'friction' in model else f'{model} friction'}: {shown}."
     if viscous:
-        widest = max((dry, *decay.whichever[1:]), key=lambda each: each.interval[1])
+        widest = max((dry, *decay.whichever[1:]), key=lambda estimate: estimate.interval[1])
         return f"The motion dies away by viscous friction: {_told(ratio)}. {_hidden(widest, 'dry friction')}"
     if rubs:
         return f"The motion dies away by dry friction: {_told(dry)}. {_hidden(ratio, 'viscous friction')}"
@@ -253,7 +257,7 @@ def _left_over(decay: Decay) -> Iterator[str]:
     fit = decay.waveform
     if fit is None or LEFT_OVER not in kinds(fit.status):
         return
-    time, left = max(zip(fit.time, fit.residual, strict=True), key=lambda each: float(np.std(each[1])))
+    time, left = max(zip(fit.time, fit.residual, strict=True), key=lambda pair: float(np.std(pair[1])))
     power = np.abs(np.fft.rfft((left - left.mean()) * np.hanning(len(left)))) ** 2
     frequency = np.fft.rfftfreq(len(left), float(time[1] - time[0]))
     own, total = fit.frequency.value, float(power.sum())
@@ -336,9 +340,9 @@ def _together(comparison: Comparison) -> Iterator[str]:
     if either is not None:
         yield f"Whichever motion it was, the dry friction displacement is {_reach(either)}."
     if static is not None:
-        waveforms = [each.decay.waveform for each in comparison.findings]
+        waveforms = [finding.decay.waveform for finding in comparison.findings]
         alone = [waveform.static_displacement for waveform in waveforms if waveform is not None]
-        least = min(alone, key=lambda each: each.interval[1] - each.interval[0])
+        least = min(alone, key=lambda estimate: estimate.interval[1] - estimate.interval[0])
         yield (
             f"The static friction displacement lies within {_reach(static).removeprefix('within ')}; the surest record "
             f"alone leaves {interval_of(least)}."

@@ -57,7 +57,10 @@ def of_findings(findings: Findings, *, form: str = "") -> Story:
     return replace(
         own,
         headline=_headed(findings, own.headline),
-        lines=[*(Line.of(each, findings.true_value(each)) for each in sorted(findings.quoted, key=_place)), *own.lines],
+        lines=[
+            *(Line.of(estimate, findings.true_value(estimate)) for estimate in sorted(findings.quoted, key=_place)),
+            *own.lines,
+        ],
         faults=[str(fault) for fault in findings.faults],
         notes=[*findings.notes, *own.notes],
         settings={**own.settings, **load, **length},
@@ -68,21 +71,21 @@ def of_findings(findings: Findings, *, form: str = "") -> Story:
     )
 
 
-def _headed(findings: Findings, told: Sequence[str]) -> list[str]:
+def _headed(findings: Findings, sentences: Sequence[str]) -> list[str]:
     """What is wrong with units before the answer; behind it where that names the mistake."""
     named = 1 if findings.contradiction else 0
-    return [*told[:named], *leading(findings.faults), *told[named:]]
+    return [*sentences[:named], *leading(findings.faults), *sentences[named:]]
 
 
 def of_comparison(comparison: Comparison) -> Story:
     """Several records side by side."""
     own: Story = _family(comparison.findings[0]).of_comparison(comparison)
-    parts = [of_findings(each) for each in comparison.findings]
+    parts = [of_findings(finding) for finding in comparison.findings]
     estimates = comparison.estimates
 
     def data() -> dict[str, Any]:
-        told = {**own.data(), "estimates": [estimate.to_dict() for estimate in estimates], "notes": comparison.notes}
-        return {"comparison": plain(told), "records": [part.data() for part in parts]}
+        numbers = {**own.data(), "estimates": [estimate.to_dict() for estimate in estimates], "notes": comparison.notes}
+        return {"comparison": plain(numbers), "records": [part.data() for part in parts]}
 
     return replace(own, lines=[*map(Line.of, estimates), *own.lines], notes=comparison.notes, parts=parts, data=data)
 
@@ -93,7 +96,7 @@ def _family(findings: Findings) -> Any:
 
 
 def _data(findings: Findings, own: Story) -> dict[str, Any]:
-    told = {
+    data = {
         "name": findings.name,
         "faults": [str(fault) for fault in findings.faults],
         "settings": findings.settings,
@@ -104,7 +107,7 @@ def _data(findings: Findings, own: Story) -> dict[str, Any]:
         "notes": findings.notes,
         "history": [step.to_dict() for step in findings.record.history],
     }
-    return {key: plain(value) for key, value in told.items()}
+    return {key: plain(value) for key, value in data.items()}
 
 
 def plain(value: Any) -> Any:
@@ -137,12 +140,12 @@ def of_tap(test: ImpactTest, *, record: Record | None = None) -> Story:
         for quantity, number in (("frequency", resonance.frequency), ("damping ratio", resonance.damping))
     ]
     rows = [(resonance.name, ", ".join(resonance.channels), resonance.evidence) for resonance in test.resonances]
-    told: dict[str, Any] = {
+    content: dict[str, Any] = {
         "headline": [f"{many}: {'; '.join(named)}."], "lines": lines, "data": test.to_dict,
         "cautions": [] if test.status == "ok" else [test.status],
         "tables": [Table("Why each is called so", ("resonance", "seen by", "evidence"), rows, folded=True)],
     }  # fmt: skip
-    return Story("Tap", **told) if record is None else Story.of_record(record_name(record), record, **told)
+    return Story("Tap", **content) if record is None else Story.of_record(record_name(record), record, **content)
 
 
 def of_several(estimates: Sequence[Estimate], *, record: Record | None = None) -> Story:

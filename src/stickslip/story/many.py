@@ -72,10 +72,10 @@ def _several(rows: Sequence[Row], are: str, is_one: str, word: Any) -> str:
 
 
 def _cell(row: Row, name: str) -> str:
-    found = next((estimate for estimate in row.estimates if estimate.name == name), None)
-    if found is None or not found.known:
+    estimate = next((estimate for estimate in row.estimates if estimate.name == name), None)
+    if estimate is None or not estimate.known:
         return "-"
-    return f"{value_of(found)} ({interval_of(found)})"
+    return f"{value_of(estimate)} ({interval_of(estimate)})"
 
 
 def _remark(row: Row) -> str:

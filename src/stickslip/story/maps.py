@@ -44,13 +44,13 @@ def of_map(atlas: Any, *, system: System | None = None) -> Story:
 
 def _measures(atlas: Any) -> dict[str, dict[str, Any]]:
     """Of each variable its least and most value, at how many points it is known, and its unit."""
-    found = {}
+    ranges = {}
     for name, column in atlas.data_vars.items():
         values = abs(column) if column.dtype.kind == "c" else column
         known = int(values.notnull().sum())
         least, most = (float(values.min()), float(values.max())) if known else (None, None)
-        found[str(name)] = {"least": least, "most": most, "known": known, "unit": column.attrs.get("units", "1")}
-    return found
+        ranges[str(name)] = {"least": least, "most": most, "known": known, "unit": column.attrs.get("units", "1")}
+    return ranges
 
 
 def _plates(atlas: Any, system: System | None) -> tuple[Plate, ...]:
@@ -119,7 +119,7 @@ def of_bifurcation(diagram: Bifurcation) -> Story:
         data=lambda: {
             "parameter": diagram.parameter, "values": diagram.values.tolist(),
             "coexisting": diagram.coexisting.tolist(),
-            "regimes": {name: [each.regime for each in way] for name, way in ways},
+            "regimes": {name: [motion.regime for motion in way] for name, way in ways},
             "changes": [vars(change) for change in diagram.changes],
         },
     )  # fmt: skip
@@ -147,14 +147,16 @@ def of_stability(stability: Stability) -> Story:
     ]
     tone = f"at {stability.frequency:.5g} Hz"
     if stability.stable:
-        told = f"Steady sliding is stable: the slowest vibration, {tone}, dies away by {abs(stability.growth):.4g} 1/s."
+        answer = (
+            f"Steady sliding is stable: the slowest vibration, {tone}, dies away by {abs(stability.growth):.4g} 1/s."
+        )
     else:
         growth = f"{stability.growth:.4g} 1/s"
-        told = f"Steady sliding is unstable by {stability.mechanism}: a vibration {tone} grows by {growth}."
+        answer = f"Steady sliding is unstable by {stability.mechanism}: a vibration {tone} grows by {growth}."
     keys = ("stable", "mechanism", "growth", "without_coupling", "without_slope", "place", "loads", "status")
     modes = [{key: getattr(mode, key) for key in ("frequency", "growth", "damping_ratio")} for mode in stability.modes]
     return Story(
-        "Stability of steady sliding", [told], [] if stability.status == "ok" else [stability.status],
+        "Stability of steady sliding", [answer], [] if stability.status == "ok" else [stability.status],
         tables=[Table("Modes", ("frequency", "growth", "damping ratio"), rows)],
         data=lambda: plain({**{key: getattr(stability, key) for key in keys}, "modes": modes}),
     )  # fmt: skip
@@ -196,5 +198,5 @@ def of_dither(dither: Dither) -> Story:
     )  # fmt: skip
 
 
-def _story(title: str, name: str, draw: Callable[[], Any], caption: str, **told: Any) -> Story:
-    return Story(title, draw=lambda: [plate(name, draw, title, caption)], **told)
+def _story(title: str, name: str, draw: Callable[[], Any], caption: str, **content: Any) -> Story:
+    return Story(title, draw=lambda: [plate(name, draw, title, caption)], **content)

@@ -188,10 +188,10 @@ def _panels(record: Record, twin: Record | None) -> Iterator[Panel]:
 
 def _explained(panel: Panel, findings: Findings) -> Panel:
     """The force that a regression explains, over what was measured of it."""
-    found, time = findings.regression, findings.record.time
-    if panel.name != found.signal:
+    regression, time = findings.regression, findings.record.time
+    if panel.name != regression.signal:
         return panel
-    over = np.interp(time, found.time, found.explained, left=np.nan, right=np.nan)
+    over = np.interp(time, regression.time, regression.explained, left=np.nan, right=np.nan)
     return replace(panel, lines={**panel.lines, "model": over})
 
 
@@ -245,16 +245,18 @@ def corrected(findings: Findings, slip: Slip, question: str = "analyze", options
     """The command that asks again, without a slip of the hand; empty where none can."""
     record, settings = findings.record, dict(findings.settings)
     read = dict(_read(record))
-    told = dict(read.get("channels") or _sources(record))
-    if not told.keys() >= {*slip.zeros, *(of for of, _ in slip.cure.values())}:
+    channels = dict(read.get("channels") or _sources(record))
+    if not channels.keys() >= {*slip.zeros, *(of for of, _ in slip.cure.values())}:
         return ""
     # of two that were exchanged each keeps its unit
-    cured = {name: times(told[of], by, unit=split_spec(told[name]).unit) for name, (of, by) in slip.cure.items()}
-    cured |= {name: shifted(told[name], off, name) for name, off in slip.zeros.items()}
+    cured = {
+        name: times(channels[of], by, unit=split_spec(channels[name]).unit) for name, (of, by) in slip.cure.items()
+    }
+    cured |= {name: shifted(channels[name], off, name) for name, off in slip.zeros.items()}
     if not all(cured.values()):
         return ""
     if cured:
-        read["channels"] = {**told, **cured}
+        read["channels"] = {**channels, **cured}
     if slip.clock != 1:
         read |= {"fs": record.fs / slip.clock, "time": None}
     settings |= {name: by * settings[name] for name, by in slip.constants.items() if name in settings}
@@ -320,11 +322,11 @@ def _asked(record: Record, question: str, options: Sequence[str], read: Mapping[
         "+".join(f"{file['folder']}/{file['name']}" if "folder" in file else file["name"] for file in read["files"]),
     ]
     for option in READING:
-        told = read.get(option)
-        if isinstance(told, Mapping):
-            words += [word for name, value in told.items() for word in (f"--{option}", f"{name}={value}")]
-        elif told is not None:
-            words += [f"--{option}", f"{told:.12g}" if isinstance(told, float) else str(told)]
+        stated = read.get(option)
+        if isinstance(stated, Mapping):
+            words += [word for name, value in stated.items() for word in (f"--{option}", f"{name}={value}")]
+        elif stated is not None:
+            words += [f"--{option}", f"{stated:.12g}" if isinstance(stated, float) else str(stated)]
     repairs = [step.repair for step in record.history if step.repair]
     words += ["--repair", ",".join(dict.fromkeys(repairs))] if repairs else []
     return [*words, *options]
