@@ -136,9 +136,7 @@ def checked(
             step = f"add {path[0]} = {value if 'dict' in str(kind) else 'VALUE'}"
             raise ModelError(f"{where} has no {key}", f"{key} is needed", step) from error
         raise ModelError(
-            f"{where} sets {key} = {_shown(first['input'])}",
-            _said(first["msg"]),
-            f"correct {key}",
+            f"{where} sets {key} = {_shown(first['input'])}", _said(first["msg"]), f"correct {key}"
         ) from error
 
 

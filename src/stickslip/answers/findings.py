@@ -23,9 +23,7 @@ WHOLES = {
     "delay": "sensor delay",
     "comparison": "comparison of the forces",
 }
-BY_FORCE = (
-    "loops", "breakaway", "stiffness", "contact_damping", "transition", "coupled", "cause", "presliding",
-)  # fmt: skip
+BY_FORCE = ("loops", "breakaway", "stiffness", "contact_damping", "transition", "coupled", "cause", "presliding")
 DRIVEN = "forcing frequency"  # no matter of friction
 NOT_TRIED = Doubt("not tried on twins: rigs that never stick, that slide at one level or on a rigid contact may seem "
                   "to do so as well", UNTRIED)  # fmt: skip

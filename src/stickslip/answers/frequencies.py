@@ -168,8 +168,9 @@ def time_frequency(
     name = chosen_channel(first, channel)
     options: dict[str, Any] = {
         "frequencies": parse_range(frequencies, "Hz") if isinstance(frequencies, str) else frequencies,
-        "wavelet_frequency": wavelet_frequency, "normalisation": normalisation,
-    }  # fmt: skip
+        "wavelet_frequency": wavelet_frequency,
+        "normalisation": normalisation,
+    }
     if second is None and len(first) <= LONG:
         begin, long = first, []
         wavelets = wavelet_map(first, name, **options)

@@ -20,14 +20,7 @@ from stickslip.record.flaws import constant
 from stickslip.record.record import Record, Step
 from stickslip.rig.settings import RigSettings, rig_settings
 from stickslip.signals.interpolate import without_delays
-from stickslip.signals.repair import (
-    fill_gaps,
-    fill_missing,
-    remove_drift,
-    remove_spikes,
-    repair_clock,
-    restore_clipped,
-)
+from stickslip.signals.repair import fill_gaps, fill_missing, remove_drift, remove_spikes, repair_clock, restore_clipped
 
 MOTION = ("x", "v", "theta")
 USED = ("x", "z", "v", "a", "theta", "friction", "load", "force")  # channels that a question may take

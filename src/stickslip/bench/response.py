@@ -272,9 +272,10 @@ def modal_fit(
     """
     if channels[0] not in INPUTS or damper not in ("ground", "base"):
         raise EstimateError(
-            f"input {channels[0]}, damper {damper}", "the input is z or force, the damper ends on ground or base",
+            f"input {channels[0]}, damper {damper}",
+            "the input is z or force, the damper ends on ground or base",
             "name them as channels= and damper=",
-        )  # fmt: skip
+        )
     record.require_clean(*channels, question=MODAL, samples=200)
     record = without_delays(record, *channels, question=MODAL)
     lines = _Lines.of(record, channels, damper)

@@ -298,9 +298,10 @@ def _fitted(time: Array, blocks: Array, before: Rows, after: Rows, at: float, un
     noise = max(float(np.std(np.diff(y[~behind]))) / math.sqrt(2), 1e-12 * abs(high - zero))
     if abs(high - zero) < LOUD * noise:
         raise EstimateError(
-            f"a step of {high - zero:.3g} {unit} in noise of {noise:.2g} {unit}", f"{DISCHARGE} needs a step {LOUD:g} "
-            "times as high as the noise", "put a heavier weight on",
-        )  # fmt: skip
+            f"a step of {high - zero:.3g} {unit} in noise of {noise:.2g} {unit}",
+            f"{DISCHARGE} needs a step {LOUD:g} times as high as the noise",
+            "put a heavier weight on",
+        )
     span = float(t[behind][-1] - t[behind][0])
     begin = np.array(
         [zero, high - zero, max(1e-3 / span, math.log(abs(high - zero) / max(noise, abs(y[-1] - zero))) / span)]

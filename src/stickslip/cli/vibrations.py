@@ -34,16 +34,8 @@ if TYPE_CHECKING:
 
 @click.command()
 @click.argument("files", nargs=-1, required=True, metavar="FILES...")
-@click.option(
-    "--mass",
-    metavar="VALUE",
-    help="Oscillating mass in kg, for the friction force; of an angle in kg m^2.",
-)
-@click.option(
-    "--stiffness",
-    metavar="VALUE",
-    help="Spring in N/m, for the friction force; of an angle in N m/rad.",
-)
+@click.option("--mass", metavar="VALUE", help="Oscillating mass in kg, for the friction force; of an angle in kg m^2.")
+@click.option("--stiffness", metavar="VALUE", help="Spring in N/m, for the friction force; of an angle in N m/rad.")
 @click.option(
     "--method",
     type=click.Choice(["all", "waveform", "thesis"]),
@@ -107,11 +99,7 @@ def decay(files: tuple[str, ...], output: Path | None, as_json: bool, everything
 @click.option("--frequencies", metavar="LOW:HIGH", help="What is listened to in Hz; from 50 Hz up unless given.")
 @contact_option
 @normal_option
-@click.option(
-    "--lever",
-    metavar="VALUE",
-    help="Distance of the friction from the axis of torsion in m, for its work.",
-)
+@click.option("--lever", metavar="VALUE", help="Distance of the friction from the axis of torsion in m, for its work.")
 @many_options
 @result_options("FILE-squeak")
 @reading_options
@@ -170,11 +158,7 @@ def squeak(
 @click.option("--frequencies", metavar="LOW:HIGH", help="Range of the map in Hz; what the record allows unless given.")
 @click.option("--wavelet-frequency", type=float, default=4.5, show_default=True, help="How long a wavelet is.")
 @click.option("--normalisation", type=click.Choice(["energy", "amplitude"]), default="energy", show_default=True)
-@click.option(
-    "--mass",
-    metavar="VALUE",
-    help="Oscillating mass in kg, or with its unit, for the contact's stiffness.",
-)
+@click.option("--mass", metavar="VALUE", help="Oscillating mass in kg, or with its unit, for the contact's stiffness.")
 @click.option("--stiffness", metavar="VALUE", help="Spring in N/m, or with its unit, for the same.")
 @result_options("FILE-wavelet")
 @reading_options

@@ -287,10 +287,11 @@ async def ask(request: Request) -> Response:
     files = [[data.uploads.get(key) for key in record] for record in asked.records]
     names = {upload.path.name: upload.label for record in files for upload in record}
     question = {
-        "question": asked.question, "reading": asked.reading.model_dump(exclude_defaults=True),
+        "question": asked.question,
+        "reading": asked.reading.model_dump(exclude_defaults=True),
         "options": asked.options,
         "records": [[str(upload.path) for upload in record] for record in files],
-    }  # fmt: skip
+    }
     return JSONResponse({"id": data.jobs.start(question, names=names).key}, status_code=202)
 
 

@@ -200,13 +200,7 @@ def lab_app(*, token: str, port: int, place: live.Place | None = None) -> Starle
 
 
 def _routes() -> list[BaseRoute]:
-    return [
-        *play.routes,
-        *data.routes,
-        *live.routes,
-        Route("/openapi.json", _openapi),
-        Route("/alive", _alive),
-    ]
+    return [*play.routes, *data.routes, *live.routes, Route("/openapi.json", _openapi), Route("/alive", _alive)]
 
 
 @asynccontextmanager

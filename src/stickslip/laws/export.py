@@ -294,5 +294,6 @@ FORMATS: dict[str, Callable[[Law | CurvedLaw], str]] = {
     "modelica": _modelica, "simulink": _simulink,
 }  # fmt: skip
 TURNING: dict[str, Callable[[Law | CurvedLaw], str]] = {
-    "mujoco": lambda law: _mujoco(law, "hinge"), "modelica": lambda law: _modelica(law, turning=True),
-}  # fmt: skip
+    "mujoco": lambda law: _mujoco(law, "hinge"),
+    "modelica": lambda law: _modelica(law, turning=True),
+}

@@ -241,11 +241,7 @@ STUDENT = 2.064  # two-sided 95 % quantile at 24 degrees of freedom
 
 
 def lyapunov(
-    system: System,
-    *,
-    cycles: int = 5000,
-    transient: int = 100,
-    start: Mapping[str, float | str] | None = None,
+    system: System, *, cycles: int = 5000, transient: int = 100, start: Mapping[str, float | str] | None = None
 ) -> Estimate:
     """Does the motion forget its beginning, or does it part from its neighbours (chaos)?
 

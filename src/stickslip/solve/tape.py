@@ -410,10 +410,11 @@ class _Builder:
         quantities = [
             [
                 one.moving.scaled(self.told(self.contacts[c], exit_.quantity, one.known[c]))
-                for i, c, exit_ in leaving if i == j
+                for i, c, exit_ in leaving
+                if i == j
             ]
             for j, one in enumerate(made)
-        ]  # fmt: skip
+        ]
         shown = [self.shown(one, own) for one, own in zip(made, parts, strict=True)]
         rate = tuple(np.array([[r[c] for r in one.entries] for one in made], dtype=d) for c, d in enumerate(DTYPES))
         exits = self.exits(joints, parts, leaving, quantities)

@@ -81,9 +81,10 @@ def _story(fit: Fit, record: Records, headline: list[str], **content: Any) -> St
         first = records[0]
         content = {"channels": list(first.channels.values()), "history": first.history, **content}
         content["settings"] = {
-            "records": str(len(records)), "sampling rate": f"{first.fs:g} Hz",
+            "records": str(len(records)),
+            "sampling rate": f"{first.fs:g} Hz",
             "length": ", ".join(f"{record.duration:g} s" for record in records),
-        }  # fmt: skip
+        }
     title = record_name(records[0]) if len(records) == 1 else f"{len(records)} records" if records else "Fit"
     return Story(
         title, [*units, *headline], cautions, lines=list(map(Line.of, fit.estimates)),

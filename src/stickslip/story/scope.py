@@ -222,9 +222,7 @@ def of_run(record: Record, period: float, view: tuple[float, float], constants: 
         moved = Panel("displacement", record.channels["x"].unit, {"measured": record["x"] - base})
     cycles = np.arange(view[0], min(view[1], record.start + record.duration - period), period)
     asked = _beside(file, [*_stated(constants)])
-    return Scope(
-        record.start, record.fs, list(_panels(record, None)), "", moved, cycles, period, asked, view=view,
-    )  # fmt: skip
+    return Scope(record.start, record.fs, list(_panels(record, None)), "", moved, cycles, period, asked, view=view)
 
 
 def _beside(file: str, options: Sequence[str]) -> str:

@@ -54,13 +54,14 @@ def _data(findings: Findings) -> dict[str, Any]:
         "squeaks": {key: value for key, value in heard.items() if key not in ("notes", "history")},
         "beside": {
             squeaks.channel: {
-                "kind": squeaks.kind, "reference": squeaks.reference,
+                "kind": squeaks.kind,
+                "reference": squeaks.reference,
                 "bursts": [burst.to_dict() for burst in squeaks.bursts],
             }
             for squeaks in findings.beside
         },
         **{name: None if part is None else part.to_dict() for name, part in parts.items()},
-    }  # fmt: skip
+    }
 
 
 def _together(comparison: Comparison) -> dict[str, Any]:
