@@ -76,11 +76,11 @@ class Compilation(event.Listener):  # type: ignore[misc]  # numba tells no types
         return made
 
 
-def _say(words: str) -> None:
+def _say(sentence: str) -> None:
     """To who sits before a prompt of Python; else to who listens to the log of the package."""
     if hasattr(sys, "ps1"):
-        print(f"stickslip: {words}", file=sys.stderr)
-    logging.getLogger(__package__).info(words)
+        print(f"stickslip: {sentence}", file=sys.stderr)
+    logging.getLogger(__package__).info(sentence)
 
 
 compilation = Compilation()

@@ -177,8 +177,8 @@ def line_of(path: Sequence[str], lines: Sequence[str]) -> str:
     for depth, key in enumerate(path):
         if key.isdigit():
             continue
-        words = [part for part in path[: depth + 1] if not part.isdigit()]
-        dotted = r"\s*\.\s*".join(rf"""["']?{re.escape(part)}["']?""" for part in words)
+        keys = [part for part in path[: depth + 1] if not part.isdigit()]
+        dotted = r"\s*\.\s*".join(rf"""["']?{re.escape(part)}["']?""" for part in keys)
         alone = rf"""["']?{re.escape(key)}["']?"""
         pattern = re.compile(rf"^\s*(\[\[?\s*)?(?:{dotted}|{alone})\s*[\]=.]")
         places = [n for n in range(first, last) if pattern.match(lines[n])]

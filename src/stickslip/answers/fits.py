@@ -152,8 +152,8 @@ def _oscillator(rig: RigSettings, system: object) -> Oscillator:
 
 def with_stated(system: Oscillator, rig: RigSettings) -> Oscillator:
     """The oscillator with what the settings state of it in front."""
-    words = ("mass", "stiffness", "damping", "damper", "contact")
-    stated = {name: getattr(rig, name) for name in words if name in rig.model_fields_set}
+    names = ("mass", "stiffness", "damping", "damper", "contact")
+    stated = {name: getattr(rig, name) for name in names if name in rig.model_fields_set}
     stated = {n: float(v) if n in RIG_UNITS else v for n, v in stated.items() if v is not None}
     if "contact" in stated and not hasattr(system.drive, "contact"):
         if stated.pop("contact") == "base" and not isinstance(system.drive, Release):

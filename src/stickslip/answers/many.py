@@ -87,7 +87,7 @@ def against_load(findings: Sequence[Slid]) -> tuple[dict[str, Estimate | None], 
             f for f in findings if f.level is not None and f.level.unit != "N"
         ],
     }
-    notes = [words.format(", ".join(f.name for f in those)) for words, those in left_out.items() if those]
+    notes = [note.format(", ".join(f.name for f in those)) for note, those in left_out.items() if those]
     results: dict[str, Estimate | None] = dict.fromkeys(("coefficient", "slope", "offset"))
     if len(known) < 2:
         return results, tuple(notes)

@@ -56,8 +56,8 @@ def _late(record: Record, rig: RigSettings, loops: Loops | None) -> Slip | None:
         return None
     late = next(iter(far.values()))
     cycles = f" ({abs(late) / period:.3g} cycles of the motion)" if loops is not None else ""
-    words = f"the delay of {' and '.join(far)}, {late:.4g} s{cycles}, is in ms, not in s"
-    return Slip(words, delays={name: MILLISECONDS * late for name, late in far.items()})
+    mistake = f"the delay of {' and '.join(far)}, {late:.4g} s{cycles}, is in ms, not in s"
+    return Slip(mistake, delays={name: MILLISECONDS * late for name, late in far.items()})
 
 
 def missing(record: Record, rig: RigSettings) -> tuple[str, ...]:
@@ -89,8 +89,8 @@ def mistakes_of_decay(
         The likeliest first.
     """
     if channel == "theta" and swing > HALF_TURN:
-        words = f"theta, which swings {swing:.3g} rad to each side, is in degrees, not in rad"
-        return (Slip(words, {channel: (channel, math.pi / 180)}),)
+        mistake = f"theta, which swings {swing:.3g} rad to each side, is in degrees, not in rad"
+        return (Slip(mistake, {channel: (channel, math.pi / 180)}),)
     return tuple(_of_frequency(frequency, mass, stiffness))
 
 

@@ -283,8 +283,8 @@ def _doubt(record: Record, given: Record, rig: RigSettings, *, aligned: bool) ->
     ]
     if not unknown:
         return None
-    words = f"{' and '.join(unknown)} {'is' if len(unknown) == 1 else 'are'} not stated"
-    return Doubt(f"{words}: it may be wrong by some per cent, which the interval leaves out", UNSTATED, lesser=True)
+    omission = f"{' and '.join(unknown)} {'is' if len(unknown) == 1 else 'are'} not stated"
+    return Doubt(f"{omission}: it may be wrong by some per cent, which the interval leaves out", UNSTATED, lesser=True)
 
 
 def _tell_unused(rig: RigSettings, asked: Asked) -> None:

@@ -281,7 +281,7 @@ def _verdicts(conditions: Sequence[Condition]) -> list[str]:
     quiet, untold = _answering(conditions, "does not squeak"), _answering(conditions, "can not be told")
     creaking = _answering(conditions, "creaks")
     if not loud and not untold:
-        return ["No condition squeaks.", *(f"{words}." for words in _say(creaking, "creaks", "creak"))]
+        return ["No condition squeaks.", *(f"{sentence}." for sentence in _say(creaking, "creaks", "creak"))]
     heard = [
         *_say(_answering(conditions, "squeaks"), "squeaks", "squeak"),
         *_say(_answering(conditions, "squeals"), "squeals", "squeal"),
@@ -289,7 +289,7 @@ def _verdicts(conditions: Sequence[Condition]) -> list[str]:
         *_say(quiet, "does not squeak", "do not squeak"),
     ]
     verdicts = [f"{'; '.join(heard)}."] if heard else []
-    verdicts += [f"Whether {words} can not be told." for words in _say(untold, "squeaks", "squeak")]
+    verdicts += [f"Whether {sentence} can not be told." for sentence in _say(untold, "squeaks", "squeak")]
     falling = [condition for condition in quiet if condition.trend == "falls"]
     if loud and falling:
         too = " too" if all(condition.trend == "falls" for condition in loud) else ""
@@ -298,7 +298,9 @@ def _verdicts(conditions: Sequence[Condition]) -> list[str]:
             "alone is not enough."
         )
     rising = [condition for condition in loud if condition.trend == "rises"]
-    return verdicts + [f"{words} though friction rises with speed." for words in _say(rising, "squeaks", "squeak")]
+    return verdicts + [
+        f"{sentence} though friction rises with speed." for sentence in _say(rising, "squeaks", "squeak")
+    ]
 
 
 def _answering(conditions: Sequence[Condition], answer: str) -> list[Condition]:

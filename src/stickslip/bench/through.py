@@ -134,7 +134,7 @@ def tour(folder: str | Path, *, seed: int = 1, fast: bool = False, progress: Tel
     FormatError
         The folder can not be written.
     """
-    folder, tell = Path(folder), progress or (lambda words, share: None)
+    folder, tell = Path(folder), progress or (lambda stage, share: None)
     records = folder / "records"
     records.mkdir(parents=True, exist_ok=True)
     bench = SimulatedBench(thesis_oscillator(), hidden_rig(seed), FS, seed)
@@ -145,7 +145,7 @@ def tour(folder: str | Path, *, seed: int = 1, fast: bool = False, progress: Tel
         rig=noted,
         steps=STEPS,
         truth=bench.truth,
-        progress=lambda words, n: tell(f"commissioning: {words}", 0.02 * n),
+        progress=lambda stage, n: tell(f"commissioning: {stage}", 0.02 * n),
     )
     (folder / "rig.toml").write_text(done.known.toml(), encoding="utf-8")
     rig = read_rig(folder / "rig.toml")

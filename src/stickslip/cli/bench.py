@@ -336,7 +336,7 @@ def tour(fast: bool, seed: int, output: Path, as_json: bool, everything: bool) -
     report = output / "report"
     usable(click.get_current_context(), None, report)  # type: ignore[arg-type]
     with progress(100) as tell:
-        done = bench.tour(output, seed=seed, fast=fast, progress=lambda words, share: tell(words, 100 * share))
+        done = bench.tour(output, seed=seed, fast=fast, progress=lambda stage, share: tell(stage, 100 * share))
         tell("drawing and writing", 95)
         written = ss.publish(done, folder=report)
     show(done, written, as_json=as_json, everything=everything)

@@ -145,8 +145,8 @@ def _show(files: Sequence[Path], record: Record, guesses: Sequence[Guess]) -> No
         f"{guess.column}: taken for {guess.channel} by its unit alone." for guess in guesses if "alone" in guess.why
     ]
     faults = [spoken(fault) for fault in record.check() if fault.kind != "unit"]
-    for words in (*suspicious, *faults):
-        for line in wrapped(words, "! "):
+    for sentence in (*suspicious, *faults):
+        for line in wrapped(sentence, "! "):
             say(line)
 
 
@@ -184,14 +184,16 @@ def _constants(options: Mapping[str, Any], record: Record, guesses: Sequence[Gue
     """Mass, spring, damper and what the mass slides on, where no option states them; nothing of what is not known."""
     say()
     constants: dict[str, str] = {}
-    for name, words in CONSTANTS.items():
+    for name, question in CONSTANTS.items():
         if options[name] is None:
-            answer = click.prompt(f"{words}; Enter if not known", default="", show_default=False, value_proc=_a(name))
+            answer = click.prompt(
+                f"{question}; Enter if not known", default="", show_default=False, value_proc=_a(name)
+            )
             constants |= {name: answer} if answer else {}
     if any(guess.channel == "z" for guess in guesses):
-        for name, words in (("contact", "What does the mass slide on"), ("damper", "What does the damper end on")):
+        for name, question in (("contact", "What does the mass slide on"), ("damper", "What does the damper end on")):
             if options[name] is None:
-                constants[name] = click.prompt(words, type=click.Choice(["ground", "base"]), default="ground")
+                constants[name] = click.prompt(question, type=click.Choice(["ground", "base"]), default="ground")
     return constants
 
 
@@ -251,8 +253,8 @@ def _after(groups: Sequence[Sequence[Path]], rig: RigSettings, output: Path) -> 
             read(group, rig.model_copy(update={"rows": f"0:{LOOKED_AT}", "repair": ()}))
         except ss.StickslipError as error:
             complain(f"{' + '.join(map(str, group))} is not like the first: {spoken(error)}")
-    for words in _wrong(groups[0], rig):
-        yield from wrapped(words, "! ")
+    for sentence in _wrong(groups[0], rig):
+        yield from wrapped(sentence, "! ")
     config = "" if output == Path(RIG_FILE) else f" --config {output}"
     yield f"Next: stickslip analyze {'+'.join(map(str, groups[0]))}{config}"
 

@@ -74,14 +74,14 @@ def fit(
     _require_one_question(groups, curve, asked=laws is not None or system is not None)
     folder = output or (None if as_json else default_folder(groups, "fit"))
     names = laws.split(",") if laws is not None else None
-    words = f"{len(names) if names else 'six'} laws"
+    count = f"{len(names) if names else 'six'} laws"
     with progress(3) as tell:
         tell("reading", 0)
         records = [read(group, rig) for group in groups]
         tell("fitting", 1)
         result, records = ss.answers.fit_records(
             records, rig=rig, curve=curve, laws=names, system=_oscillator(system), calibration=calibration,
-            progress=lambda share: tell(f"fitting and comparing {words}, {share:.0%}", 1 + share),
+            progress=lambda share: tell(f"fitting and comparing {count}, {share:.0%}", 1 + share),
         )  # fmt: skip
         tell("drawing and writing", 2)
         written = ss.publish(result, folder=folder, record=records) if folder else None

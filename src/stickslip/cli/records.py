@@ -279,8 +279,8 @@ def answers(
     )
 
 
-def _say(tell: Callable[[str, float], None], what: str, done: float, words: str) -> None:
-    tell(f"{what}, {words}", done)
+def _say(tell: Callable[[str, float], None], what: str, done: float, state: str) -> None:
+    tell(f"{what}, {state}", done)
 
 
 def with_left_out(results: Findings | Comparison, refused: Sequence[ss.StickslipError]) -> Findings | Comparison:

@@ -58,9 +58,9 @@ def _print_short(story: Story) -> None:
     cautions: list[Caution] = []
     lines.append("")
     for caution in story.concerned(rows):
-        words = _caution(story, caution)
-        if len(lines) + len(words) <= MOST_LINES - END:
-            lines += words
+        caution_lines = _caution(story, caution)
+        if len(lines) + len(caution_lines) <= MOST_LINES - END:
+            lines += caution_lines
             cautions.append(caution)
     _print(story.title, lines)
     more = {

@@ -291,10 +291,10 @@ def _answer(
     starts, first = [ring_down.first for ring_down in ring_downs], ring_downs[0]
     begins, far = beginning(first.held if first.order == 0 else float(motion.values[5]) > -1 / first.fs)
 
-    def estimate(index: int, words: str, unit: str, factor: float = 1.0, offset: float = 0.0) -> Estimate:
+    def estimate(index: int, label: str, unit: str, factor: float = 1.0, offset: float = 0.0) -> Estimate:
         low, high = (float(factor * end + offset) for end in motion.ends[index])
         value, spread = float(factor * motion.values[index] + offset), float(factor * motion.spread[index])
-        return Estimate(words, value, (low, high), spread, unit, method, status, checks)
+        return Estimate(label, value, (low, high), spread, unit, method, status, checks)
 
     damping, dry = estimate(1, "damping ratio", "1"), estimate(2, "dry friction displacement", length)
     spring = spring_of(known, float(motion.values[0]))
@@ -332,12 +332,12 @@ def _left_out(ring_downs: list[RingDown]) -> list[str]:
     """What of the releases is not fitted, in words."""
     cut = any(CLIPPED in ring_down.marks or not ring_down.sound.all() for ring_down in ring_downs)
     lost = any(LOST in ring_down.marks for ring_down in ring_downs)
-    return [words for words, applies in ((CLIPPED, cut), (LOST, lost)) if applies]
+    return [doubt for doubt, applies in ((CLIPPED, cut), (LOST, lost)) if applies]
 
 
 def _seen_beside(choices: list[Choice]) -> list[str]:
     """Of the first release that shows another motion than viscous and dry friction, which one, in words."""
-    return [words for choice in choices if (words := choice.seen_beside("both", "static"))][:1]
+    return [doubt for choice in choices if (doubt := choice.seen_beside("both", "static"))][:1]
 
 
 def _misfit(releases: list[Release], fitted: list[Array]) -> tuple[Doubt, ...]:
@@ -351,8 +351,8 @@ def _misfit(releases: list[Release], fitted: list[Array]) -> tuple[Doubt, ...]:
             worst = max(worst, math.sqrt(float(left @ left) / release.blocks.freedom) / floor)
     if worst <= UNLIKE:
         return ()
-    words = f"the residual is {worst:.2g} times the noise: drift, or another motion (see choose_motion)"
-    return (Doubt(words, LEFT_OVER),)
+    doubt = f"the residual is {worst:.2g} times the noise: drift, or another motion (see choose_motion)"
+    return (Doubt(doubt, LEFT_OVER),)
 
 
 def _static(releases: list[Release], motion: _Motion, unit: str) -> Estimate:

@@ -239,8 +239,8 @@ def _unstated(record: Record) -> list[Fault]:
     return [*_clock_unstated(record), Fault("unit", channel, ((0, len(record) - 1),), message)]
 
 
-def _listed(words: list[str]) -> str:
-    return " and ".join(filter(None, (", ".join(words[:-1]), words[-1])))
+def _listed(parts: list[str]) -> str:
+    return " and ".join(filter(None, (", ".join(parts[:-1]), parts[-1])))
 
 
 def _clock_unstated(record: Record) -> list[Fault]:

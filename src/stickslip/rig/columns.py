@@ -116,8 +116,8 @@ def _by_itself(channel: Channel, taken: set[str]) -> tuple[str, str]:
 
 
 def _by_word(channel: Channel, taken: set[str]) -> tuple[str, str]:
-    for name, words in WORDS:
-        if name not in taken and _fits(channel, name) and re.search(words, channel.name.lower().strip("_")):
+    for name, pattern in WORDS:
+        if name not in taken and _fits(channel, name) and re.search(pattern, channel.name.lower().strip("_")):
             return name, "its name"
     return "", ""
 

@@ -70,9 +70,9 @@ def keep_band(
         )
     kind = "bandpass" if len(edges) == 2 else "highpass" if high is None else "lowpass"
     between = " to ".join(f"{edge:g}" for edge in edges)
-    words = {"bandpass": f"kept {between} Hz", "highpass": f"kept above {low:g} Hz" if low else "",
+    outcome = {"bandpass": f"kept {between} Hz", "highpass": f"kept above {low:g} Hz" if low else "",
              "lowpass": f"kept below {high:g} Hz" if high else ""}[kind]  # fmt: skip
-    return _filtered(record, channels, edges, kind, Step("keep_band", {"low": low, "high": high}, words))
+    return _filtered(record, channels, edges, kind, Step("keep_band", {"low": low, "high": high}, outcome))
 
 
 def remove_mode(
@@ -115,8 +115,8 @@ def remove_mode(
             "its band lies between 0 and half the sampling rate",
             "correct the frequency [Hz] or width=",
         )
-    words = f"taken out {edges[0]:g} to {edges[1]:g} Hz"
-    step = Step("remove_mode", {"frequency": frequency, "width": width}, words)
+    outcome = f"taken out {edges[0]:g} to {edges[1]:g} Hz"
+    step = Step("remove_mode", {"frequency": frequency, "width": width}, outcome)
     return _filtered(record, channels, edges, "bandstop", step)
 
 

@@ -164,11 +164,11 @@ def limit_cycles(
     try:
         threshold = critical_value(at(ends[0]), at, between=ends)
     except ModelError:
-        words = f"steady sliding is {'' if up[0].sliding.stable else 'un'}stable at every value"
+        status = f"steady sliding is {'' if up[0].sliding.stable else 'un'}stable at every value"
         if beside:
-            words += f"; a vibration lasts beside it from {beside[0]:.4g} to {beside[-1]:.4g}"
+            status += f"; a vibration lasts beside it from {beside[0]:.4g} to {beside[-1]:.4g}"
         both = (beside[0], beside[-1]) if beside else None
-        return CycleBranches(places, up, down, None, UNTOLD, math.nan, both, words, between)
+        return CycleBranches(places, up, down, None, UNTOLD, math.nan, both, status, between)
     return CycleBranches(places, up, down, threshold, *_called(at, threshold, beside, width), between)
 
 
@@ -211,11 +211,11 @@ def _called(
     begins = _begins(exponent, beyond[0])
     both = sorted([*beside, *(value for value, one in zip(before, back, strict=True) if _lasts_beside(one))])
     if both:
-        words = f"{begins}; a vibration lasts beside stable sliding from {both[0]:.4g} to {both[-1]:.4g}"
-        return "subcritical", exponent, (both[0], both[-1]), words
+        status = f"{begins}; a vibration lasts beside stable sliding from {both[0]:.4g} to {both[-1]:.4g}"
+        return "subcritical", exponent, (both[0], both[-1]), status
     if back[0].status == "steady sliding" and all(one.vibrates for one in beyond):
-        words = f"{begins}; on the way back it has died away {abs(before[0] - threshold.value):.2g} past the threshold"
-        return "supercritical", exponent, None, words
+        status = f"{begins}; on the way back it has died away {abs(before[0] - threshold.value):.2g} past the threshold"
+        return "supercritical", exponent, None, status
     return UNTOLD, exponent, None, f"{beyond[0].status} beyond the threshold, {back[0].status} before it"
 
 

@@ -290,36 +290,36 @@ class _Listener:
     def _swinging(self, part: Span, kind: str) -> tuple[str, str, str]:
         """Of a tone while the contact slides: whether the friction force swings with it as it must to feed it."""
         share = self._modulation(part)
-        words = f"the friction force swings by {100 * share:.0f} % of its level at {part.line:.0f} Hz as it slides"
+        evidence = f"the friction force swings by {100 * share:.0f} % of its level at {part.line:.0f} Hz as it slides"
         if share >= FED:
-            return kind, "shown", words
+            return kind, "shown", evidence
         if share <= FREE:
-            return "tonal", "no", f"{words}: too little to feed it"
+            return "tonal", "no", f"{evidence}: too little to feed it"
         between = f"more than beneath a free ringing, {FREE:.0%}, and less than beneath a squeak, {FED:.0%}"
-        return "tonal", "not told", f"{words}: {between}; near the threshold it can not be told"
+        return "tonal", "not told", f"{evidence}: {between}; near the threshold it can not be told"
 
     def _broad(self, part: Span, *, slides: bool) -> tuple[str, str, str]:
         rate = part.rate
         if not math.isnan(rate) and self.name in TANGENTIAL and self._at_reversals(rate):
             return "noise", "no", f"its {rate:.3g} jumps in a second are the reversals of the motion"
         if not math.isnan(rate) and (slides or (rate < VOICED and part.wander > WANDERS)):
-            words = (
+            evidence = (
                 f"pulses follow each other at intervals that change slowly, {rate:.3g} in a second, as in stick-slip"
             )
-            return "creak", "shown" if slides else "likely", words
+            return "creak", "shown" if slides else "likely", evidence
         if slides:
             return "scrape", "shown", "broad band while the contact slides"
         if self.hearing.partials(part) > PARTIALS:
             return "tonal", "not told", "several partials that do not glide, as those of a bell"
         if not math.isnan(rate):
-            words = f"of sound alone: {rate:.3g} pulses in a second"
+            evidence = f"of sound alone: {rate:.3g} pulses in a second"
             if rate >= VOICED:
-                return "scrape", "not told", f"{words}, as a voice has from {VOICED:g} on"
-            return "scrape", "not told", f"{words} keep their rate, as those of a machine or a clock do"
+                return "scrape", "not told", f"{evidence}, as a voice has from {VOICED:g} on"
+            return "scrape", "not told", f"{evidence} keep their rate, as those of a machine or a clock do"
         if part.throughout:
             return "noise", "not told", "broad band from end to end: what makes it can not be told"
-        words = "broad band, and it begins and ends; of sound alone it can not be told whether anything rubs"
-        return "scrape", "not told", words
+        evidence = "broad band, and it begins and ends; of sound alone it can not be told whether anything rubs"
+        return "scrape", "not told", evidence
 
     def _at_reversals(self, rate: float) -> bool:
         """Whether pulses come once or twice in a forcing cycle, as the jumps of dry friction do."""
@@ -390,9 +390,9 @@ def _of_one_contact(bursts: list[Squeak]) -> list[Squeak]:
     why = _unlike_a_contact(bursts, alone) if alone else ""
     if not why:
         return bursts
-    words = f"of sound alone: {why}"
+    evidence = f"of sound alone: {why}"
     return [
-        replace(burst, kind="tonal", friction="not told", evidence=words) if burst in alone else burst
+        replace(burst, kind="tonal", friction="not told", evidence=evidence) if burst in alone else burst
         for burst in bursts
     ]
 

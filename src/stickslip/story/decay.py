@@ -105,7 +105,7 @@ def _data(decay: Decay) -> dict[str, Any]:
             {**{key: getattr(ring_down, key) for key in keys}, "extremes": len(ring_down.turns)}
             for ring_down in decay.releases.ring_downs
         ],
-        "motions": [{"name": name, "words": words, "verdict": verdict} for name, words, verdict in tried],
+        "motions": [{"name": name, "words": label, "verdict": verdict} for name, label, verdict in tried],
         "viscous_residual": decay.viscous_residual,
         "comparisons": [estimate.to_dict() for estimate in decay.comparisons],
         "decrements": None if decay.thesis is None else _decrements(decay.thesis),
@@ -174,8 +174,8 @@ def _dying(decay: Decay) -> str:
     shown = _both(ratio, dry)
     curved = decay.best is decay.thesis and not decay.releases.ring_downs[0].isochronous
     if decay.motion is not None and decay.best is decay.motion:
-        words = decay.motion.choice.chosen.fitted.motion.words
-        return f"The motion dies away by {words}: {_listed([_told(term) for term in decay.motion.terms])}."
+        forces = decay.motion.choice.chosen.fitted.motion.words
+        return f"The motion dies away by {forces}: {_listed([_told(term) for term in decay.motion.terms])}."
     if decay.denied and decay.whichever:
         ratio, dry = decay.whichever
         reach = f"the damping ratio is {_reach(ratio)} and the dry friction displacement {_reach(dry)}"
@@ -231,11 +231,11 @@ def _chosen(decay: Decay) -> Iterator[str]:
 def _reach(estimate: Estimate) -> str:
     """The interval; the value where it is narrower than the digits shown."""
     low, high = estimate.interval
-    words = interval_of(estimate)
-    if words == WITHIN_DIGIT:
+    interval = interval_of(estimate)
+    if interval == WITHIN_DIGIT:
         return value_of(estimate)
     two_sided = -math.inf < low < high < math.inf and not estimate.is_bound
-    return f"within {words}" if two_sided else words
+    return f"within {interval}" if two_sided else interval
 
 
 def _both(ratio: Estimate, dry: Estimate) -> str:
@@ -246,10 +246,10 @@ def _told(estimate: Estimate) -> str:
     return f"a {estimate.name} of {value_of(estimate)} (95 %: {interval_of(estimate)})"
 
 
-def _hidden(estimate: Estimate, words: str) -> str:
+def _hidden(estimate: Estimate, kind: str) -> str:
     """What is not told from zero, and up to how much of it would not be."""
     least = value_of(estimate, max(0.0, estimate.interval[1]))
-    return f"That there is {words} too can not be told: less than {least} of it would not be seen."
+    return f"That there is {kind} too can not be told: less than {least} of it would not be seen."
 
 
 def _left_over(decay: Decay) -> Iterator[str]:

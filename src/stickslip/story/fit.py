@@ -75,7 +75,7 @@ def of_laws(comparison: LawComparison, *, record: Records = ()) -> Story:
 def _story(fit: Fit, record: Records, headline: list[str], **content: Any) -> Story:
     """What all fits tell of their parameters and of the records that they were made to."""
     records = [record] if isinstance(record, Record) else list(record)
-    units = list(dict.fromkeys(words for record in records for words in leading(record.check())))
+    units = list(dict.fromkeys(caution for record in records for caution in leading(record.check())))
     cautions = [*map(Caution, (doubt.words for doubt in doubts_of(fit.status))), *doubts(fit.estimates)]
     if records:
         first = records[0]

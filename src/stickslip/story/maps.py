@@ -62,8 +62,10 @@ def _plates(atlas: Any, system: System | None) -> tuple[Plate, ...]:
 def _counts(atlas: Any) -> dict[str, int]:
     """How many motions ended in what."""
     status = atlas["status"]
-    codes, words = status.attrs.get("flag_values", ()), status.attrs.get("flag_meanings", "").split()
-    return {word.replace("_", " "): int(np.sum(status.values == code)) for code, word in zip(codes, words, strict=True)}
+    codes, meanings = status.attrs.get("flag_values", ()), status.attrs.get("flag_meanings", "").split()
+    return {
+        word.replace("_", " "): int(np.sum(status.values == code)) for code, word in zip(codes, meanings, strict=True)
+    }
 
 
 def _headline(atlas: Any) -> list[str]:

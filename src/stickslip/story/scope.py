@@ -235,8 +235,8 @@ def command_of(record: Record, question: str, *options: str) -> tuple[str, int]:
 
     Empty of a record that came from no file, or from several that were read one by one.
     """
-    words = _asked(record, question, options)
-    return (f"{shlex.join(words)} {ROWS}", _read(record).get("rows", (0,))[0] or 0) if words else ("", 0)
+    command = _asked(record, question, options)
+    return (f"{shlex.join(command)} {ROWS}", _read(record).get("rows", (0,))[0] or 0) if command else ("", 0)
 
 
 def corrected(findings: Findings, slip: Slip, question: str = "analyze", options: Sequence[str] = ()) -> str:
@@ -284,11 +284,11 @@ def completed(findings: Findings, question: str = "analyze", options: Sequence[s
 def _again(
     findings: Findings, question: str, read: Mapping[str, Any], settings: Mapping[str, Any], options: Sequence[str]
 ) -> str:
-    words = _asked(findings.record, question, (*_stated(settings), *_loaded(findings), *options), read)
+    command = _asked(findings.record, question, (*_stated(settings), *_loaded(findings), *options), read)
     rows = read.get("rows")
-    if words and rows:
-        words += ["--rows", ":".join("" if row is None else str(row) for row in rows)]
-    return shlex.join(words)
+    if command and rows:
+        command += ["--rows", ":".join("" if row is None else str(row) for row in rows)]
+    return shlex.join(command)
 
 
 def _loaded(findings: Findings) -> Iterator[str]:
@@ -314,7 +314,7 @@ def _asked(record: Record, question: str, options: Sequence[str], read: Mapping[
     read = _read(record) if read is None else read
     if not read.get("files"):
         return []
-    words = [
+    command = [
         "stickslip",
         question,
         "+".join(f"{file['folder']}/{file['name']}" if "folder" in file else file["name"] for file in read["files"]),
@@ -322,12 +322,12 @@ def _asked(record: Record, question: str, options: Sequence[str], read: Mapping[
     for option in READING:
         stated = read.get(option)
         if isinstance(stated, Mapping):
-            words += [word for name, value in stated.items() for word in (f"--{option}", f"{name}={value}")]
+            command += [word for name, value in stated.items() for word in (f"--{option}", f"{name}={value}")]
         elif stated is not None:
-            words += [f"--{option}", f"{stated:.12g}" if isinstance(stated, float) else str(stated)]
+            command += [f"--{option}", f"{stated:.12g}" if isinstance(stated, float) else str(stated)]
     repairs = [step.repair for step in record.history if step.repair]
-    words += ["--repair", ",".join(dict.fromkeys(repairs))] if repairs else []
-    return [*words, *options]
+    command += ["--repair", ",".join(dict.fromkeys(repairs))] if repairs else []
+    return [*command, *options]
 
 
 def _stated(constants: Mapping[str, Any]) -> Iterator[str]:

@@ -303,15 +303,15 @@ def _values(run: Trajectory) -> dict[str, tuple[float, str]]:
     }
     for j in range(len(run.labels("x"))):
         x, v = sampled(run, (("x", j), ("v", j)), times)
-        words, speed, units = *_ways(run, j), (run.units("x")[j], run.units("v")[j])
-        values[f"{words}, from"] = (float(x.min()), units[0])
-        values[f"{words}, to"] = (float(x.max()), units[0])
+        path, speed, units = *_ways(run, j), (run.units("x")[j], run.units("v")[j])
+        values[f"{path}, from"] = (float(x.min()), units[0])
+        values[f"{path}, to"] = (float(x.max()), units[0])
         values[f"largest {speed}"] = (float(np.abs(v).max()), units[1])
     for c in range(contacts_of(run)):
         if pressed(run, c):
             (load,) = sampled(run, (("load", c),), times)
-            words = numbered_words(run, "normal load", "load", c)
-            values[f"{words}, from"], values[f"{words}, to"] = (float(load.min()), "N"), (float(load.max()), "N")
+            label = numbered_words(run, "normal load", "load", c)
+            values[f"{label}, from"], values[f"{label}, to"] = (float(load.min()), "N"), (float(load.max()), "N")
     if len(run.modes) <= MOST_PIECES and isinstance(run.table, Tables):  # a closed form to integrate
         work = energy(run)
         values["work against friction"] = (work.friction, "J")
@@ -322,8 +322,8 @@ def _values(run: Trajectory) -> dict[str, tuple[float, str]]:
 def _ways(run: Trajectory, row: int) -> tuple[str, str]:
     """What a degree of freedom's displacement and speed are called."""
     turns = run.units("x")[row] == "rad"
-    words = ("angle", "angular speed") if turns else ("displacement", "speed")
-    return numbered_words(run, words[0], "x", row), numbered_words(run, words[1], "v", row)
+    names = ("angle", "angular speed") if turns else ("displacement", "speed")
+    return numbered_words(run, names[0], "x", row), numbered_words(run, names[1], "v", row)
 
 
 def _shares(run: Trajectory) -> dict[str, tuple[float, str]]:
@@ -355,8 +355,8 @@ def _sentences(run: Trajectory, values: Mapping[str, tuple[float, str]]) -> list
         sentences += [holding(run)] if len(masses) == contacts_of(run) == 1 else []
         ways = []
         for j, name in enumerate(masses):
-            words, _ = _ways(run, j)
-            low, high = (_text(*values[f"{words}, {end}"]) for end in ("from", "to"))
+            place, _ = _ways(run, j)
+            low, high = (_text(*values[f"{place}, {end}"]) for end in ("from", "to"))
             ways.append(f"{'the mass moves' if len(masses) == 1 else name} between {low} and {high}")
         speeds: dict[str, float] = {}
         for j in range(len(masses)):

@@ -90,8 +90,8 @@ def _headline(findings: Findings) -> Iterator[str]:
         yield f"Whether it squeaks{where} can not be told: {_untold(squeaks)}."
         yield from _power(squeaks)
     elif not heard:
-        kinds = [(squeaks.of(kind), words) for kind, words in WORDS.items()]
-        yield f"No squeak{where}. {'; '.join(f'{_counted(of)}, {words}' for of, words in kinds if of)}."
+        kinds = [(squeaks.of(kind), label) for kind, label in WORDS.items()]
+        yield f"No squeak{where}. {'; '.join(f'{_counted(of)}, {label}' for of, label in kinds if of)}."
         yield from _power(squeaks)
     else:
         many = f"{len(heard)} times in {record.duration:.3g} s" if len(heard) > 1 else "once"

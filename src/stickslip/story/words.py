@@ -152,9 +152,9 @@ def leading(faults: Iterable[Fault]) -> list[Caution]:
     return [Caution(str(fault)) for fault in faults if fault.kind == "unit"]
 
 
-def sentence(words: str) -> str:
+def sentence(text: str) -> str:
     """Beginning with a capital."""
-    return words[:1].upper() + words[1:]
+    return text[:1].upper() + text[1:]
 
 
 def _rounded(value: float, digits: int) -> str:
