@@ -157,8 +157,8 @@ def digest(file: Path) -> str:
 
 
 def _digest(texts: dict[Path, str]) -> str:
-    held = (f"{file.relative_to(PACKAGE).as_posix()}\0{texts[file]}" for file in sorted(texts))
-    return hashlib.sha256("\0".join(held).encode()).hexdigest()[:16]
+    sources = (f"{file.relative_to(PACKAGE).as_posix()}\0{texts[file]}" for file in sorted(texts))
+    return hashlib.sha256("\0".join(sources).encode()).hexdigest()[:16]
 
 
 def _closure(text: str) -> dict[Path, str]:

@@ -413,16 +413,16 @@ def compare_decays(findings: Sequence[Findings]) -> Comparison:
     (True, {})
     """
     require_several(findings)
-    apart, asked = _apart(findings), Asked()
+    apart, log = _apart(findings), Asked()
     ways = {key: [finding.settings.get(key) for finding in findings] for key in ASKED}
     mixed = [key for key, values in ways.items() if len(set(values)) > 1]
     joint = None
     if mixed:
         differ = "; ".join(f"{key} is {' and '.join(map(str, dict.fromkeys(ways[key])))}" for key in mixed)
-        asked.notes.append(f"The records are not fitted together: {differ}.")
+        log.notes.append(f"The records are not fitted together: {differ}.")
     elif not apart and all(finding.decay.best is finding.decay.waveform for finding in findings):
         way = {key: values[0] for key, values in ways.items()}
-        joint = asked.ask("All records at once", lambda: _jointly(findings, way))
+        joint = log.ask("All records at once", lambda: _jointly(findings, way))
     status = f"the records differ in {' and '.join(apart)}" if apart else "ok"
     shared: dict[str, Estimate | None] = {
         name: weighted_mean(estimates, of="records", status=status) for name, estimates in _shared(findings).items()
@@ -433,7 +433,7 @@ def compare_decays(findings: Sequence[Findings]) -> Comparison:
         shared = {name: getattr(joint, name) for name in OF_ALL_AT_ONCE}
         force = force if joint.dry_force is None else replace(joint.dry_force, name="dry friction force")
     results = {"dry_force": force, **dict.fromkeys(OF_ALL_AT_ONCE), **shared, "joint": joint, "apart": apart}
-    return Comparison(tuple(findings), tuple(asked.notes), results=results)
+    return Comparison(tuple(findings), tuple(log.notes), results=results)
 
 
 def _jointly(findings: Sequence[Findings], way: dict[str, Any]) -> DecayFit:

@@ -144,8 +144,8 @@ class ExperimentPlan:
             No setup asks that question.
         """
         if question not in self.questions:
-            asked = ", ".join(self.questions)
-            raise ModelError(f"no question is called '{question}'", f"there are {asked}", "choose one")
+            names = ", ".join(self.questions)
+            raise ModelError(f"no question is called '{question}'", f"there are {names}", "choose one")
         limit = parse_value(error, UNITS[question])
         return next((setup for setup in self.setups if setup.accuracy[question].within(limit, self.draws)), None)
 

@@ -93,8 +93,8 @@ class Task:
                 self.task.ai_channels.add_ai_voltage_chan(
                     f"{device.device}/{one.terminal}", min_val=-volts, max_val=volts
                 )
-            held, mode = round(HELD * device.fs), kinds.AcquisitionType.CONTINUOUS
-            self.task.timing.cfg_samp_clk_timing(device.fs, sample_mode=mode, samps_per_chan=held)
+            buffered, mode = round(HELD * device.fs), kinds.AcquisitionType.CONTINUOUS
+            self.task.timing.cfg_samp_clk_timing(device.fs, sample_mode=mode, samps_per_chan=buffered)
             self.reader = vendors("nidaqmx.stream_readers").AnalogMultiChannelReader(self.task.in_stream)
             self.task.start()
         except self.ni.errors.DaqError as error:

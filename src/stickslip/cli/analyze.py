@@ -89,8 +89,8 @@ def analyze(
     folder = output or default_folder(groups)
     if places.wanted(groups):
         chosen = click.get_current_context().get_parameter_source("twins") is not click.core.ParameterSource.DEFAULT
-        asked = {"method": method, "twins": twins if chosen else 0}
-        answer_many("analyze", groups, rig, asked, places, folder=folder, output=output, **shown)
+        query = {"method": method, "twins": twins if chosen else 0}
+        answer_many("analyze", groups, rig, query, places, folder=folder, output=output, **shown)
         return
     with progress(2 * len(groups) + 1) as tell:
         found, refused = answers(

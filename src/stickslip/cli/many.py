@@ -85,8 +85,8 @@ def ask_many(
         Task(question, tuple(group), tuple(names), "+".join(map(checksum, group)), rig, options)
         for group, names in zip(groups, names_of(groups), strict=True)
     ]
-    asked = {"question": question, "rig": rig.model_dump(), "options": dict(options), "version": ss.__version__}
-    with ss.answers.Kept(_kept(folder), asked) as kept:
+    query = {"question": question, "rig": rig.model_dump(), "options": dict(options), "version": ss.__version__}
+    with ss.answers.Kept(_kept(folder), query) as kept:
         left = list({task.key: task for task in reversed(tasks) if task.key not in kept.rows}.values())[::-1]
         answers = ss.answers.spread(answered, tasks=left, engine=places.engine, workers=places.workers)
         for done, row in enumerate(answers, start=len(tasks) - len(left) + 1):
@@ -105,7 +105,7 @@ def answer_many(
     question: str,
     groups: Sequence[Sequence[Path]],
     rig: RigSettings,
-    asked: Mapping[str, Any],
+    query: Mapping[str, Any],
     places: Places,
     *,
     folder: Path,
@@ -114,7 +114,7 @@ def answer_many(
 ) -> None:
     """Ask all records, write what was found into `folder` (not of JSON alone), show it, forget what was kept of it."""
     with progress(len(groups)) as tell:
-        batch = ask_many(question, groups, rig, asked, places, folder=folder, tell=tell)
+        batch = ask_many(question, groups, rig, query, places, folder=folder, tell=tell)
     written = ss.publish(batch, folder=folder) if output or not shown["as_json"] else None
     if places.table is not None:
         ss.story.write_table(batch, places.table)
@@ -166,12 +166,12 @@ def _analyzed(record: Record, rig: RigSettings, *, method: str, twins: int) -> A
         return replace(findings, notes=(*findings.notes, f"Twins: {error}"))
 
 
-def _decayed(record: Record, rig: RigSettings, **asked: Any) -> Any:
-    return ss.analyze_decay(record, **asked)
+def _decayed(record: Record, rig: RigSettings, **query: Any) -> Any:
+    return ss.analyze_decay(record, **query)
 
 
-def _squeaked(record: Record, rig: RigSettings, **asked: Any) -> Any:
-    findings = ss.analyze_squeaks(record, contact=rig.contact, **asked)
+def _squeaked(record: Record, rig: RigSettings, **query: Any) -> Any:
+    findings = ss.analyze_squeaks(record, contact=rig.contact, **query)
     return replace(findings, normal=rig.normal_load(findings.name) or findings.normal)
 
 

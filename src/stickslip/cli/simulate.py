@@ -124,20 +124,20 @@ def sweep(file: Path, engine: str, store: Path | None, output: Path | None, as_j
     \b
     stickslip sweep grid.toml --engine threads --store map.zarr --output maps
     """
-    asked = ss.maps.read_sweep(file)
+    plan = ss.maps.read_sweep(file)
     place = store if store is not None else file.with_suffix(".zarr")
     atlas = ss.sweep(
-        asked.case.system,
-        asked.grid,
-        measures=asked.measures,
-        cycles=asked.cycles,
-        settle=asked.settle,
-        start=asked.case.start,
+        plan.case.system,
+        plan.grid,
+        measures=plan.measures,
+        cycles=plan.cycles,
+        settle=plan.settle,
+        start=plan.case.start,
         engine=engine,
         store=place,
     )
     story, whole = ss.summary(atlas), atlas.attrs["status"] == "complete"
-    written = ss.publish(atlas, folder=output, system=asked.case.system) if output is not None else None
+    written = ss.publish(atlas, folder=output, system=plan.case.system) if output is not None else None
     if as_json:
         print_json({**story.data(), "store": str(place)})
         raise SystemExit(0 if whole else INTERRUPTED)

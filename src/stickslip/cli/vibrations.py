@@ -68,7 +68,7 @@ def decay(files: tuple[str, ...], output: Path | None, as_json: bool, everything
     stickslip decay "release_*.csv" --method thesis --json
     """
     places, shown = Places.of(options), {"as_json": as_json, "everything": everything}
-    asked = {key: options.pop(key) for key in ("method", "channel", "restoring", "mass", "stiffness")}
+    query = {key: options.pop(key) for key in ("method", "channel", "restoring", "mass", "stiffness")}
     rig = rig_of(**options)
     if any(repair.partition(":")[0] == "drift" for repair in rig.repair):
         raise ss.errors.ModelError(
@@ -78,12 +78,12 @@ def decay(files: tuple[str, ...], output: Path | None, as_json: bool, everything
         )
     groups = [group for argument in files for group in groups_of(argument)]
     folder = output or (default_folder(groups) if len(groups) == 1 else Path("decays-stickslip"))
-    asked |= {key: getattr(rig, key) for key in ("mass", "stiffness") if asked[key] is None}
+    query |= {key: getattr(rig, key) for key in ("mass", "stiffness") if query[key] is None}
     if places.wanted(groups):
-        answer_many("decay", groups, rig, asked, places, folder=folder, output=output, **shown)
+        answer_many("decay", groups, rig, query, places, folder=folder, output=output, **shown)
         return
     with progress(2 * len(groups) + 1) as tell:
-        findings, refused = answers(groups, rig, lambda record: ss.analyze_decay(record, **asked), tell)
+        findings, refused = answers(groups, rig, lambda record: ss.analyze_decay(record, **query), tell)
         tell("drawing and writing", 2 * len(groups))
         results = with_left_out(ss.answers.compare_decays(findings) if len(findings) > 1 else findings[0], refused)
         written = ss.publish(results, folder=folder) if output or not as_json else None
@@ -132,8 +132,8 @@ def squeak(
     folder = output or Path(f"{groups[0][0].stem}-squeak" if len(groups) == 1 else "squeaks-compared")
 
     if places.wanted(groups):
-        asked = {"channel": channel, "frequencies": frequencies, "lever": lever}
-        answer_many("squeak", groups, rig, asked, places, folder=folder, output=output, **shown)
+        query = {"channel": channel, "frequencies": frequencies, "lever": lever}
+        answer_many("squeak", groups, rig, query, places, folder=folder, output=output, **shown)
         return
 
     def ask(record: Record) -> Findings:
@@ -177,14 +177,14 @@ def wavelet(
     groups = groups_of(file)
     if len(groups) != 1:
         raise click.BadParameter(f"'{file}' fits {len(groups)} records; one is mapped at a time", param_hint="FILE")
-    asked = {key: options.pop(key) for key in ("channel", "wavelet_frequency", "normalisation")}
+    query = {key: options.pop(key) for key in ("channel", "wavelet_frequency", "normalisation")}
     rig = rig_of(**options)
     folder = output or (None if as_json else folder_after(groups[0][0], "wavelet"))
     with progress(3) as tell:
         tell(f"reading {name_of(groups[0])}", 0)
         parts = _told_of(read_parts(groups[0], rig), tell)
-        asked |= {"mass": rig.mass, "stiffness": rig.stiffness}
-        findings = ss.answers.time_frequency(parts, frequencies=frequencies, **asked)
+        query |= {"mass": rig.mass, "stiffness": rig.stiffness}
+        findings = ss.answers.time_frequency(parts, frequencies=frequencies, **query)
         tell("drawing and writing", 2)
         written = ss.publish(findings, folder=folder) if folder else None
     show(findings, written, as_json=as_json, everything=everything)

@@ -230,8 +230,8 @@ def range_checks(record: Record, names: Sequence[str]) -> list[Check]:
         if not mask.any() and cut is None:
             continue
         top = float(np.abs(record[name]).max())
-        held = f"{name} is held at the end of its range in {int(mask.sum())} of {len(mask)} samples"
-        sentence = held if cut is None else cut.message
+        message = f"{name} is held at the end of its range in {int(mask.sum())} of {len(mask)} samples"
+        sentence = message if cut is None else cut.message
         checks.append(
             Check(f"range of {name}", top, top, record.channels[name].unit, math.inf, FAILS, sentence.rstrip("."))
         )

@@ -219,14 +219,14 @@ def _levels(
     """Magnitude of the friction to one side, per cycle; NaN where a cycle does not slide that way."""
     chosen = sliding & (sign * motion.velocity > 0)
     levels = np.full(count, np.nan)
-    held = np.flatnonzero(np.bincount(label[chosen], minlength=count))
+    filled = np.flatnonzero(np.bincount(label[chosen], minlength=count))
     values, weights, cycle = sign * friction[chosen], np.abs(motion.velocity[chosen]), label[chosen]
     order = np.lexsort((values, cycle))
     values, weights, cycle = values[order], weights[order], cycle[order]
-    starts, ends = (np.searchsorted(cycle, held, side=side) for side in ("left", "right"))
+    starts, ends = (np.searchsorted(cycle, filled, side=side) for side in ("left", "right"))
     total = np.concatenate([[0.0], np.cumsum(weights)])
     middle = np.searchsorted(total, (total[starts] + total[ends]) / 2) - 1
-    levels[held] = values[np.clip(middle, starts, ends - 1)]
+    levels[filled] = values[np.clip(middle, starts, ends - 1)]
     return levels
 
 

@@ -126,9 +126,9 @@ class Guard:
 
         async def sending(message: Message) -> None:
             if message["type"] == "http.response.start":
-                held = MutableHeaders(scope=message)
+                headers = MutableHeaders(scope=message)
                 for name, value in self.headers.items():
-                    held.setdefault(name, value)  # a report's own are stricter
+                    headers.setdefault(name, value)  # a report's own are stricter
             await send(message)
 
         return sending

@@ -249,9 +249,9 @@ class ElastoSlip:
 
     def modes(self) -> tuple[Mode, ...]:
         """All hold; or the first j slide, to either side."""
-        held = Mode("held", "microstick", 0, self._force(0, 0), (self._yield(1, 0), self._yield(-1, 0)))
+        stuck = Mode("held", "microstick", 0, self._force(0, 0), (self._yield(1, 0), self._yield(-1, 0)))
         sliding = [self._slide(side, j) for side in (-1, 1) for j in range(1, len(self.forces) + 1)]
-        return held, *sliding
+        return stuck, *sliding
 
     def _slide(self, side: int, count: int) -> Mode:
         anchors = {f"anchor{j}": {"x": 1.0, "1": -side * self.forces[j] / self.stiffnesses[j]} for j in range(count)}

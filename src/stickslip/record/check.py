@@ -328,11 +328,11 @@ def _shape_faults(name: str, unit: str, values: Array) -> list[Fault]:
     if cut is not None:
         faults.append(cut)
     top = flaws.rows_of(cut.rows if cut is not None else (), len(values))
-    held = tuple(run for run in flaws.frozen(values) if not top[run[0] : run[1] + 1].any()) if measured else ()
-    if held:
-        longest = max(last - first + 1 for first, last in held)
+    frozen = tuple(run for run in flaws.frozen(values) if not top[run[0] : run[1] + 1].any()) if measured else ()
+    if frozen:
+        longest = max(last - first + 1 for first, last in frozen)
         what = f"samples frozen while the signal moved on, for up to {longest} rows"
-        faults.append(_fault("frozen", name, held, what, f'make them NaN and use fill_missing(record, "{name}")'))
+        faults.append(_fault("frozen", name, frozen, what, f'make them NaN and use fill_missing(record, "{name}")'))
     rise = flaws.drift(values)
     if rise > DRIFT:
         what = f"a drift of {rise:.2g} times the oscillation's amplitude over the record"

@@ -51,11 +51,11 @@ def read_beside(path: Path) -> dict[str, Any]:
         if file.read(len(BEGINS)) != BEGINS.encode():
             return {}
         file.seek(0)
-        held = parse_metadata(file.read(LONGEST))
-    about = held.get(KEY)
-    if BEFORE in held:
+        metadata = parse_metadata(file.read(LONGEST))
+    about = metadata.get(KEY)
+    if BEFORE in metadata:
         with path.open("rb") as text:
-            about = about if hashlib.file_digest(text, "sha256").hexdigest() == held.get(OF) else held[BEFORE]
+            about = about if hashlib.file_digest(text, "sha256").hexdigest() == metadata.get(OF) else metadata[BEFORE]
     return about if isinstance(about, dict) else {}
 
 

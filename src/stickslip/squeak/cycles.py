@@ -352,5 +352,5 @@ def _shares(motion: Trajectory) -> tuple[tuple[float, ...], tuple[float, ...]]:
     """Share of the time that each contact holds, and is lifted off."""
     kinds = np.array([[part.kind for part in _parts(mode)] for mode in motion.table.modes])[motion.modes]
     weights = motion.durations / motion.duration
-    held = weights @ ((kinds == "stick") | (kinds == "microstick"))
-    return tuple(map(float, held)), tuple(map(float, weights @ (kinds == "flight")))
+    stuck = weights @ ((kinds == "stick") | (kinds == "microstick"))
+    return tuple(map(float, stuck)), tuple(map(float, weights @ (kinds == "flight")))

@@ -103,13 +103,13 @@ def of_commissioned(done: Commissioned) -> Story:
 def _headline(done: Commissioned) -> str:
     known = done.known
     constants = known.constants
-    asked = f"{len(done.results)} step{'s' * (len(done.results) != 1)} answered"
+    answered = f"{len(done.results)} step{'s' * (len(done.results) != 1)} answered"
     refused = f", {len(done.refused)} refused" if done.refused else ""
     if constants is None:
-        return f"{asked}{refused}."
+        return f"{answered}{refused}."
     mass, spring = constants.estimates
     damper = f" and a damper of {value_of(known.damping)}" if known.damping else ""
-    return f"The rig is a mass of {value_of(mass)} on a spring of {value_of(spring)}{damper}: {asked}{refused}."
+    return f"The rig is a mass of {value_of(mass)} on a spring of {value_of(spring)}{damper}: {answered}{refused}."
 
 
 def _leading(done: Commissioned) -> Iterator[tuple[str, Estimate]]:

@@ -59,11 +59,11 @@ def _scope(findings: Findings) -> Scope | None:
     fit = findings.decay.waveform
     if fit is None:
         return None
-    asked = ["decay", "--channel", fit.channel]
+    question = ["decay", "--channel", fit.channel]
     if findings.settings["restoring"] != "linear":
-        asked += ["--restoring", findings.settings["restoring"]]
+        question += ["--restoring", findings.settings["restoring"]]
     time, fitted = np.concatenate(fit.time), np.concatenate(fit.fitted)
-    return of_fit(findings.record, fit.channel, time, fitted, asked, fit.model)
+    return of_fit(findings.record, fit.channel, time, fitted, question, fit.model)
 
 
 def _by_other_ways(estimates: list[Estimate]) -> Iterator[Table]:

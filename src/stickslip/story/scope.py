@@ -204,12 +204,12 @@ def _moved(findings: Findings, twin: Record | None) -> Panel:
     return Panel("displacement", findings.loops.unit, lines)
 
 
-def of_fit(record: Record, name: str, time: Array, fitted: Array, asked: Sequence[str], model: str) -> Scope | None:
+def of_fit(record: Record, name: str, time: Array, fitted: Array, question: Sequence[str], model: str) -> Scope | None:
     """A channel with what was fitted to it at some times; none of a broken clock."""
     if record.stamps is not None:
         return None
     lines = {"measured": record[name], "model": np.interp(record.time, time, fitted, left=np.nan, right=np.nan)}
-    command, first = command_of(record, *asked)
+    command, first = command_of(record, *question)
     panels = [Panel(name, record.channels[name].unit, lines)]
     return Scope(record.start, record.fs, panels, model, command=command, first=first)
 
@@ -221,8 +221,8 @@ def of_run(record: Record, period: float, view: tuple[float, float], constants: 
         base = record["z"] if constants.get("contact") == "base" and "z" in record else 0.0
         moved = Panel("displacement", record.channels["x"].unit, {"measured": record["x"] - base})
     cycles = np.arange(view[0], min(view[1], record.start + record.duration - period), period)
-    asked = _beside(file, [*_stated(constants)])
-    return Scope(record.start, record.fs, list(_panels(record, None)), "", moved, cycles, period, asked, view=view)
+    command = _beside(file, [*_stated(constants)])
+    return Scope(record.start, record.fs, list(_panels(record, None)), "", moved, cycles, period, command, view=view)
 
 
 def _beside(file: str, options: Sequence[str]) -> str:

@@ -155,14 +155,14 @@ def _spoken_name(channel: str) -> str:
 def _untold(squeaks: Squeaks) -> str:
     """Of how many bursts it can not be told whether friction makes them: of tonal ones, where there are any."""
     tonal = [burst for burst in squeaks.untold if burst.kind == "tonal"]
-    kind, asked = ("tonal", len(tonal)) if tonal else ("broad", len(squeaks.untold))
-    every = len(squeaks.of("tonal")) if tonal else asked
-    if every == asked == 1:
+    kind, undecided = ("tonal", len(tonal)) if tonal else ("broad", len(squeaks.untold))
+    every = len(squeaks.of("tonal")) if tonal else undecided
+    if every == undecided == 1:
         return f"one {kind} burst may be friction's, or not"
-    if every == asked:
+    if every == undecided:
         return f"each of {every} {kind} bursts may be friction's, or not"
-    rest = "the other one is not" if every - asked == 1 else f"the other {every - asked} are not"
-    return f"of {every} {kind} bursts {asked} may be friction's, or not; {rest}"
+    rest = "the other one is not" if every - undecided == 1 else f"the other {every - undecided} are not"
+    return f"of {every} {kind} bursts {undecided} may be friction's, or not; {rest}"
 
 
 def _power(squeaks: Squeaks) -> Iterator[str]:
