@@ -17,9 +17,8 @@ COMMANDS = {  # by the file that they stand in
     "files": ("check", "convert", "datasets", "init"),
     "fit": ("fit", "predict"),
     "joint": ("joint",),
-    "lab": ("lab",),
     "rig": ("rig",),
-    "simulate": ("bifurcation", "dither", "simulate", "stability", "sweep"),
+    "simulate": ("bifurcation", "dither", "lab", "simulate", "stability", "sweep"),
     "thesis": ("thesis",),
     "vibrations": ("decay", "squeak", "wavelet"),
 }

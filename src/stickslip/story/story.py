@@ -26,7 +26,7 @@ TELLERS = {
     "Findings": "findings.of_findings", "Comparison": "findings.of_comparison",
     "TimeFrequency": "friction.of_map",
     "LawComparison": "fit.of_laws", "LawFit": "fit.of_law", "CurveFit": "fit.of_curve",
-    "Predictions": "fit.of_predictions", "Batch": "many.of_batch",
+    "Predictions": "fit.of_predictions", "Batch": "findings.of_batch",
     "Outcome": "simulation.of_outcome", "Trajectory": "simulation.of_run",
     "Record": "bench.of_record", "ExperimentPlan": "bench.of_plan",
     "Bifurcation": "maps.of_bifurcation", "Basins": "maps.of_basins", "Boundary": "maps.of_boundary",
