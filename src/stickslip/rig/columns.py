@@ -105,7 +105,7 @@ def guess_columns(record: Record) -> list[Guess]:
     for find in (_by_itself, _by_word, _by_unit):
         for channel in record.channels.values():
             if channel.name not in taken:
-                guess = find(channel, {each for each, _ in taken.values()})
+                guess = find(channel, {channel_taken for channel_taken, _ in taken.values()})
                 if guess[0]:
                     taken[channel.name] = guess
     return [_guess(record, channel, *taken.get(channel.name, ("", ""))) for channel in record.channels.values()]

@@ -504,10 +504,10 @@ class _Builder:
     def stilled(self, held: Mapping[int, float]) -> Array:
         """The state with the velocities of some contacts told, and no more of them left but for rounding."""
         one = self.row(({}, 1.0))
-        told = {
+        columns = {
             c: (self.contacts[c].tangent, (self.row(self.faced(c, 1)) + speed * one)[None]) for c, speed in held.items()
         }
-        return np.asarray(stilled(np.eye(self.size)[None], self.degrees, told)[0])
+        return np.asarray(stilled(np.eye(self.size)[None], self.degrees, columns)[0])
 
 
 def _alone(system: Oscillator) -> Structure:

@@ -126,7 +126,7 @@ def of_outcome(
     form: str = "csv",
     animation: str | None = None,
     sound: bool = False,
-    tell: Callable[[str, float], None] = lambda words, done: None,
+    tell: Callable[[str, float], None] = lambda stage, done: None,
 ) -> Story:
     """A run and what happened; its folder holds the events and the sampled record too.
 
