@@ -25,8 +25,11 @@ WHOLES = {
 }
 BY_FORCE = ("loops", "breakaway", "stiffness", "contact_damping", "transition", "coupled", "cause", "presliding")
 DRIVEN = "forcing frequency"  # no matter of friction
-NOT_TRIED = Doubt("not tried on twins: rigs that never stick, that slide at one level or on a rigid contact may seem "
-                  "to do so as well", UNTRIED)  # fmt: skip
+NOT_TRIED = Doubt(
+    "not tried on twins: rigs that never stick, that slide at one level or on a rigid contact may seem "
+    "to do so as well",
+    UNTRIED,
+)
 ONSETS = ("sticks", "breakaway", "presliding")  # when it sticks, and what it does until it slips
 BY_DECREMENTS = ", by decrements"  # behind the name of a number that another method gave already
 

@@ -97,9 +97,12 @@ def against_load(findings: Sequence[Slid]) -> tuple[dict[str, Estimate | None], 
     (slope,) = _line(loads[:, None], levels, sds)
     scatter = math.sqrt(float(np.sum((levels - slope["value"] * loads) ** 2)) / (len(known) - 1))
     coefficient = Estimate.normal(
-        "friction coefficient", **slope, unit="1", method=f"slope through the origin {over}",
+        "friction coefficient",
+        **slope,
+        unit="1",
+        method=f"slope through the origin {over}",
         checks=(f"scatter about the line {scatter:.3g} N",),
-    )  # fmt: skip
+    )
     if len(np.unique(loads)) >= 3:
         rise, rest = _line(np.column_stack([loads, np.ones_like(loads)]), levels, sds)
         way = f"straight line {over}"

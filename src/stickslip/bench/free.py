@@ -124,9 +124,11 @@ def free_vibration(
             doubts.append(Doubt(f"the phase of {name} is not told: {error}", lesser=True))
             continue
         delays[name], phases[name] = _lead(delay, name, decay.frequency, unsure.get(name, 0.0))
-    ratio = replace(old.damping_ratio, name="damping ratio by decrement") if old else decay.damping_ratio.unknown(
-        "the decrement method is refused"
-    )  # fmt: skip
+    ratio = (
+        replace(old.damping_ratio, name="damping ratio by decrement")
+        if old
+        else decay.damping_ratio.unknown("the decrement method is refused")
+    )
     return FreeVibration(
         decay.frequency, decay.damping_ratio, ratio, decay.dry_displacement, phases, delays,
         _inertia(record, decay) if "load" in record else None, Status(*doubts),
@@ -148,9 +150,12 @@ def _inertia(record: Record, decay: DecayFit) -> Estimate:
     value = math.copysign(abs(ratio), ratio.real)  # the displacement may be late
     gains = math.hypot(*(record.channels[name].gain_sd for name in ("x", "load")))
     return Estimate.normal(
-        "mass before the load cell", value, sd=math.hypot(sd / (turn**2 * abs(x)), gains * value), unit="kg",
+        "mass before the load cell",
+        value,
+        sd=math.hypot(sd / (turn**2 * abs(x)), gains * value),
+        unit="kg",
         method="what the cell reads in the free vibration, over the acceleration",
-    ).within(0.0)  # fmt: skip
+    ).within(0.0)
 
 
 def _amplitude(design: Array, inverse: Array, values: Array) -> tuple[complex, float]:

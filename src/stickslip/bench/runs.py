@@ -228,12 +228,15 @@ def run_list(proposals: Sequence[Proposal], *, seconds: float = 20.0) -> RunList
     return RunList(
         run=tuple(
             Run(
-                name=f"next-{number}", frequency=proposal.frequency, amplitude=proposal.amplitude, seconds=seconds,
+                name=f"next-{number}",
+                frequency=proposal.frequency,
+                amplitude=proposal.amplitude,
+                seconds=seconds,
                 why=proposal.why,
             )
             for number, proposal in enumerate(proposals, start=1)
         )
-    )  # fmt: skip
+    )
 
 
 def _frequencies(laws: Mapping[str, Oscillator], shaker: Shaker) -> list[float]:

@@ -30,17 +30,21 @@ Source = Callable[["BenchStep"], "Record | None"]
 @click.command()
 @click.argument("files", nargs=-1, metavar="[STEP=FILE]...")
 @click.option(
-    "--device", "name", metavar="NAME",
+    "--device",
+    "name",
+    metavar="NAME",
     help="What measures: a table [devices.NAME] of the configuration, or a kind of device. sim needs no hardware.",
-)  # fmt: skip
+)
 @click.option("--config", type=click.Path(path_type=Path), metavar="RIG.TOML", help="What is known of the rig already.")
 @click.option("--step", "steps", multiple=True, metavar="NAME", help="Only this step. Repeatable.")
 @click.option("--again", multiple=True, metavar="NAME", help="Record this step anew. Repeatable.")
 @click.option("--seed", type=click.IntRange(min=0), default=1, show_default=True, help="Of a simulated rig's noise.")
 @click.option(
-    "--output", type=click.Path(path_type=Path), metavar="DIR",
+    "--output",
+    type=click.Path(path_type=Path),
+    metavar="DIR",
     help="Folder of records, rig.toml and report; commission unless given, none where files are named.",
-)  # fmt: skip
+)
 @click.option("--list", "listed", is_flag=True, help="Print the steps, and what to do at each.")
 @click.option("--json", "as_json", is_flag=True, help="Print the results as JSON and nothing else.")
 @all_option
@@ -176,13 +180,18 @@ TRIGGER = re.compile(r"\s*(\w+)\s*([<>])\s*(\S+)\s*")
     "--before", type=click.FloatRange(min=0), default=0.0, metavar="S", help="Time before the trigger that is kept."
 )
 @click.option(
-    "--drive", "drives", multiple=True, metavar='"OUTPUT=AMPLITUDE@HZ"',
+    "--drive",
+    "drives",
+    multiple=True,
+    metavar='"OUTPUT=AMPLITUDE@HZ"',
     help='Move an output by a tone meanwhile, in SI: "base=0.65e-3@2.5". Repeatable.',
-)  # fmt: skip
+)
 @click.option(
-    "--runs", type=click.Path(path_type=Path), metavar="RUNS.TOML",
+    "--runs",
+    type=click.Path(path_type=Path),
+    metavar="RUNS.TOML",
     help="Record every run of a list, as bench next writes it, each with its own tone; --output names their folder.",
-)  # fmt: skip
+)
 @click.option(
     "--output",
     required=True,

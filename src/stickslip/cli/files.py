@@ -165,9 +165,11 @@ def _asked(guess: Guess) -> Guess:
     """The column as the user calls it."""
     say()
     channel = click.prompt(
-        f"{guess.column}: {', '.join(ASKED)}, or {NONE} to leave it out", default=guess.channel or NONE,
-        value_proc=_a_channel, err=False,
-    )  # fmt: skip
+        f"{guess.column}: {', '.join(ASKED)}, or {NONE} to leave it out",
+        default=guess.channel or NONE,
+        value_proc=_a_channel,
+        err=False,
+    )
     if channel == NONE:
         return replace(guess, channel="")
     unit = guess.unit if guess.stated else click.prompt("  its unit", default=guess.unit or USUAL.get(channel, "1"))

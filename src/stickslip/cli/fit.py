@@ -107,9 +107,11 @@ def _oscillator(file: Path | None) -> object:
 @click.argument("files", nargs=-1, required=True, metavar="FILES...")
 @constants_options("Oscillating mass in kg; that of LAW unless given.")
 @click.option(
-    "--plain/--no-plain", default=True, show_default=True,
+    "--plain/--no-plain",
+    default=True,
+    show_default=True,
     help="Fit Coulomb friction and a damper to each record, to stand beside a richer law.",
-)  # fmt: skip
+)
 @result_options("FILE-predicted")
 @reading_options
 def predict(

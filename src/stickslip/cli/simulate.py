@@ -291,9 +291,11 @@ PORT = 8723
     "--config", type=click.Path(path_type=Path), metavar="RIG.TOML", help="The rig whose devices are watched."
 )
 @click.option(
-    "--records", type=click.Path(path_type=Path, file_okay=False, exists=True), metavar="DIR",
+    "--records",
+    type=click.Path(path_type=Path, file_okay=False, exists=True),
+    metavar="DIR",
     help="Where the live view records; the current folder unless given.",
-)  # fmt: skip
+)
 @click.option("--no-browser", is_flag=True, help="Print the address alone; open no browser.")
 def lab(port: int, config: Path | None, records: Path | None, no_browser: bool) -> None:
     """Open the lab in the browser: play with a contact, map its regimes, ask records, watch a rig as it is measured.

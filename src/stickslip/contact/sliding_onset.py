@@ -307,10 +307,13 @@ def _exact(
     doubt[3:, 3:] = fitted.covariance
     centre = math.log(fitted.stiffness.value), fitted.damping.value
     return _propagated(
-        "contact", lambda values: _set_going(values, rig), np.array([*known, *centre]), doubt,
+        "contact",
+        lambda values: _set_going(values, rig),
+        np.array([*known, *centre]),
+        doubt,
         "motion after the turn on the fitted contact",
         ("with the friction and the pull found at the turns; errors of the mass and of gains go into it",),
-    )  # fmt: skip
+    )
 
 
 def _set_going(known: Array, rig: Balance) -> float:

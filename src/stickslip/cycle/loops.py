@@ -255,9 +255,12 @@ def _slope(friction: Array, motion: Motion, sliding: NDArray[np.bool_], label: N
     spread = math.sqrt(float(power.sum()) / len(speed)) / float(speed.mean())
     per_speed = "N s/m" if motion.unit == "m" else "N m s/rad"
     slope = mean_of_cycles(
-        "slope of friction against speed", slopes, unit=per_speed, method="least squares per cycle, mean of cycles",
+        "slope of friction against speed",
+        slopes,
+        unit=per_speed,
+        method="least squares per cycle, mean of cycles",
         checks=(f"sliding speed varies by {100 * spread:.0f} % about its mean",),
-    )  # fmt: skip
+    )
     if spread < LEAST_SPREAD:
         steady = Doubt("the sliding speed hardly varies: no slope can be told", NO_SLOPE)
         return replace(slope, status=Status(steady))

@@ -84,9 +84,11 @@ def c_code(law: Law | CurvedLaw, formula: str) -> str:
     memory = list(law.memory)
     names = {name: f"in->{name}" for name in INPUTS} | {name: f"s->memory[{j}]" for j, name in enumerate(memory)}
     head = HEAD.format(
-        formula=remark(formula), memory=len(memory), size=max(1, len(memory)),
+        formula=remark(formula),
+        memory=len(memory),
+        size=max(1, len(memory)),
         modes=", ".join(f"{_token(mode.name)} = {number}" for number, mode in enumerate(modes)),
-    )  # fmt: skip
+    )
     parts = [head, _start(law, names), _force(modes, names), _rates(modes, memory, names), _leave(modes, names)]
     return "\n".join([*parts, _test(law, modes, memory)])
 
@@ -250,11 +252,14 @@ def python_code(law: Law | CurvedLaw, formula: str, breakaway: float | None) -> 
 
 def _function(modes: Modes, breakaway: float) -> str:
     back, _, forward = (written(mode.friction or {}) for mode in modes)
-    return "\n".join([
-        "def friction(v, hold=0.0):", "    if v == 0:",
-        f"        return min(max(hold, -{breakaway!r}), {breakaway!r})",
-        f"    return {forward} if v > 0 else {back}",
-    ])  # fmt: skip
+    return "\n".join(
+        [
+            "def friction(v, hold=0.0):",
+            "    if v == 0:",
+            f"        return min(max(hold, -{breakaway!r}), {breakaway!r})",
+            f"    return {forward} if v > 0 else {back}",
+        ]
+    )
 
 
 def _class(law: Law | CurvedLaw, modes: Modes) -> str:

@@ -65,10 +65,13 @@ def of_plan(plan: ExperimentPlan, *, needs: Sequence[tuple[str, str]] = ()) -> S
     ]
     errors = f"Root-mean-square errors of {plan.draws} record{'s' * (plan.draws > 1)} at each rate."
     return Story(
-        "Plan of an experiment", ["; ".join(_enough(plan, *need) for need in needs)] * bool(needs), notes=plan.refusals,
+        "Plan of an experiment",
+        ["; ".join(_enough(plan, *need) for need in needs)] * bool(needs),
+        notes=plan.refusals,
         tables=[Table("What each setup tells", ("fs [Hz]", "sensors", *plan.questions), rows, errors)],
-        draw=lambda: [plate("plan", partial(plot_plan, plan), "What each setup tells", CAPTION)], data=plan.to_dict,
-    )  # fmt: skip
+        draw=lambda: [plate("plan", partial(plot_plan, plan), "What each setup tells", CAPTION)],
+        data=plan.to_dict,
+    )
 
 
 def _enough(plan: ExperimentPlan, question: str, error: str) -> str:

@@ -88,10 +88,13 @@ def of_comparison(comparison: Comparison) -> Story:
     joint = comparison.joint
     half_cycles = None if joint is None else joint.half_cycles
     return Story(
-        f"{len(comparison.findings)} records together", list(_together(comparison)), doubts(comparison.estimates),
-        lines=own, draw=lambda: plates_together(comparison),
+        f"{len(comparison.findings)} records together",
+        list(_together(comparison)),
+        doubts(comparison.estimates),
+        lines=own,
+        draw=lambda: plates_together(comparison),
         data=lambda: {"joint": joint is not None, "apart": comparison.apart, "half_cycles": half_cycles},
-    )  # fmt: skip
+    )
 
 
 def _data(decay: Decay) -> dict[str, Any]:

@@ -113,18 +113,21 @@ def of_bifurcation(diagram: Bifurcation) -> Story:
     rows = [(change.direction, f"{change.value:.6g}", change.before, change.after) for change in diagram.changes]
     ways = (("up", diagram.up), ("down", diagram.down))
     return _story(
-        "Motion along a parameter", "bifurcation", partial(plot_bifurcation, diagram),
+        "Motion along a parameter",
+        "bifurcation",
+        partial(plot_bifurcation, diagram),
         "Where the mass is once in each period of the drive: blue followed upwards, orange downwards; lines mark "
         "where the kind of motion changes. Below, the largest multiplier: at 1 the motion ceases to attract.",
         headline=list(_along(diagram)),
         tables=[Table("Changes of the motion", ("way", diagram.parameter, "before", "after"), rows)] if rows else (),
         data=lambda: {
-            "parameter": diagram.parameter, "values": diagram.values.tolist(),
+            "parameter": diagram.parameter,
+            "values": diagram.values.tolist(),
             "coexisting": diagram.coexisting.tolist(),
             "regimes": {name: [motion.regime for motion in way] for name, way in ways},
             "changes": [vars(change) for change in diagram.changes],
         },
-    )  # fmt: skip
+    )
 
 
 def _along(diagram: Bifurcation) -> Iterator[str]:
@@ -158,26 +161,32 @@ def of_stability(stability: Stability) -> Story:
     keys = ("stable", "mechanism", "growth", "without_coupling", "without_slope", "place", "loads", "status")
     modes = [{key: getattr(mode, key) for key in ("frequency", "growth", "damping_ratio")} for mode in stability.modes]
     return Story(
-        "Stability of steady sliding", [answer], [] if stability.status == "ok" else [stability.status],
+        "Stability of steady sliding",
+        [answer],
+        [] if stability.status == "ok" else [stability.status],
         tables=[Table("Modes", ("frequency", "growth", "damping ratio"), rows)],
         data=lambda: plain({**{key: getattr(stability, key) for key in keys}, "modes": modes}),
-    )  # fmt: skip
+    )
 
 
 def of_basins(basins: Basins) -> Story:
     """Attractors over starts."""
     return _story(
-        "Which start leads where", "basins", partial(plot_basins, basins),
+        "Which start leads where",
+        "basins",
+        partial(plot_basins, basins),
         "Each start in the colour of the motion it leads to; crosses: where that motion is at phase zero.",
-    )  # fmt: skip
+    )
 
 
 def of_boundary(boundary: Boundary) -> Story:
     """Where the kind of motion changes."""
     return _story(
-        "Where the kind of motion changes", "boundary", partial(plot_boundary, boundary),
+        "Where the kind of motion changes",
+        "boundary",
+        partial(plot_boundary, boundary),
         "Points: found by bisection of exact runs. Line: the closed form.",
-    )  # fmt: skip
+    )
 
 
 def of_dither(dither: Dither) -> Story:
