@@ -11,7 +11,8 @@ import click
 
 import stickslip as ss
 from stickslip.cli.options import together
-from stickslip.cli.records import checksum, names_of, read
+from stickslip.cli.records import answers as answers_of
+from stickslip.cli.records import checksum, name_left_out, names_of, read, with_left_out
 from stickslip.cli.show import show
 from stickslip.cli.terminal import progress
 
@@ -122,6 +123,31 @@ def answer_many(
     show(batch, written, **shown)
 
 
+def answer_all(
+    question: str,
+    groups: Sequence[Sequence[Path]],
+    rig: RigSettings,
+    query: Mapping[str, Any],
+    places: Places,
+    *,
+    compare: Callable[[Any], Any],
+    folder: Path,
+    output: Path | None,
+    **shown: bool,
+) -> None:
+    """Ask all records: many are a row each, few have each a part of the page, and are compared."""
+    if places.wanted(groups):
+        answer_many(question, groups, rig, query, places, folder=folder, output=output, **shown)
+        return
+    with progress(2 * len(groups) + 1) as tell:
+        findings, refused = answers_of(groups, rig, lambda record: ASK[question](record, rig, **query), tell)
+        tell("drawing and writing", 2 * len(groups))
+        results = with_left_out(compare(findings) if len(findings) > 1 else findings[0], refused)
+        written = ss.publish(results, folder=folder) if output or not shown["as_json"] else None
+    name_left_out(refused)
+    show(results, written, **shown)
+
+
 def _rows(tasks: Sequence[Task], kept: Mapping[str, Row]) -> Iterator[Row]:
     """In the order given, copies after the record that they are copies of."""
     first: dict[str, str] = {}
@@ -172,7 +198,8 @@ def _decayed(record: Record, rig: RigSettings, **query: Any) -> Any:
 
 def _squeaked(record: Record, rig: RigSettings, **query: Any) -> Any:
     findings = ss.analyze_squeaks(record, contact=rig.contact, **query)
-    return replace(findings, normal=rig.normal_load(findings.name) or findings.normal)
+    loads = (rig.normal_load(part) for part in (*findings.name.split(" + "), findings.name))
+    return replace(findings, normal=next((load for load in loads if load is not None), findings.normal))
 
 
 ASK: dict[str, Callable[..., Any]] = {"analyze": _analyzed, "decay": _decayed, "squeak": _squeaked}

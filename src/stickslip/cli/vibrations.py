@@ -3,33 +3,28 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
 import stickslip as ss
-from stickslip.cli.many import Places, answer_many, many_options
+from stickslip.cli.many import Places, answer_all, many_options
 from stickslip.cli.options import contact_option, normal_option, reading_options, result_options
 from stickslip.cli.records import (
-    answers,
     default_folder,
     folder_after,
     groups_of,
-    name_left_out,
     name_of,
     read_parts,
     require_fits,
     rig_of,
-    with_left_out,
 )
 from stickslip.cli.show import show
 from stickslip.cli.terminal import progress
 
 if TYPE_CHECKING:
     from stickslip import Record
-    from stickslip.answers import Findings
 
 
 @click.command()
@@ -79,16 +74,8 @@ def decay(files: tuple[str, ...], output: Path | None, as_json: bool, everything
     groups = [group for argument in files for group in groups_of(argument)]
     folder = output or (default_folder(groups) if len(groups) == 1 else Path("decays-stickslip"))
     query |= {key: getattr(rig, key) for key in ("mass", "stiffness") if query[key] is None}
-    if places.wanted(groups):
-        answer_many("decay", groups, rig, query, places, folder=folder, output=output, **shown)
-        return
-    with progress(2 * len(groups) + 1) as tell:
-        findings, refused = answers(groups, rig, lambda record: ss.analyze_decay(record, **query), tell)
-        tell("drawing and writing", 2 * len(groups))
-        results = with_left_out(ss.answers.compare_decays(findings) if len(findings) > 1 else findings[0], refused)
-        written = ss.publish(results, folder=folder) if output or not as_json else None
-    name_left_out(refused)
-    show(results, written, **shown)
+    compare = ss.answers.compare_decays
+    answer_all("decay", groups, rig, query, places, compare=compare, folder=folder, output=output, **shown)
 
 
 @click.command()
@@ -130,26 +117,9 @@ def squeak(
     groups = [group for argument in files for group in groups_of(argument)]
     require_fits(options["normal"], groups)
     folder = output or Path(f"{groups[0][0].stem}-squeak" if len(groups) == 1 else "squeaks-compared")
-
-    if places.wanted(groups):
-        query = {"channel": channel, "frequencies": frequencies, "lever": lever}
-        answer_many("squeak", groups, rig, query, places, folder=folder, output=output, **shown)
-        return
-
-    def ask(record: Record) -> Findings:
-        findings = ss.analyze_squeaks(
-            record, channel=channel, frequencies=frequencies, contact=rig.contact, lever=lever
-        )
-        loads = (rig.normal_load(part) for part in (*findings.name.split(" + "), findings.name))
-        return replace(findings, normal=next((load for load in loads if load is not None), findings.normal))
-
-    with progress(2 * len(groups) + 1) as tell:
-        findings, refused = answers(groups, rig, ask, tell)
-        results = with_left_out(ss.answers.compare_squeaks(findings) if len(findings) > 1 else findings[0], refused)
-        tell("drawing and writing", 2 * len(groups))
-        written = ss.publish(results, folder=folder) if output or not as_json else None
-    name_left_out(refused)
-    show(results, written, **shown)
+    query = {"channel": channel, "frequencies": frequencies, "lever": lever}
+    compare = ss.answers.compare_squeaks
+    answer_all("squeak", groups, rig, query, places, compare=compare, folder=folder, output=output, **shown)
 
 
 @click.command()
