@@ -14,6 +14,7 @@ from scipy.optimize import brentq
 
 import stickslip as ss
 from stickslip import drives, laws
+from stickslip.solve.assembly import table_of
 
 Array = NDArray[np.float64]
 FREQUENCY = 0.12
@@ -183,3 +184,57 @@ duration = 1.0
     case = ss.systems.read_system(path)
     assert isinstance(case.system, ss.Structure)
     assert case.system.contacts[0].law == CURVE
+
+
+def pressed_by_a_power(power: float) -> ss.Structure:
+    """A pad on a belt that couples, whose load grows with a power of its approach."""
+    pad = ss.Contact(laws.Coulomb(0.6), [1, 0], normal=[0, 1], stiffness=11.0, preload=5.0, power=power)
+    return ss.Structure(
+        np.eye(2), np.zeros((2, 2)), [[23.25, 3.9], [3.9, 7.75]], contacts=[pad], drive=drives.Belt(0.8)
+    )
+
+
+def motion_under_a_power(power: float, start: list[float], end: float) -> tuple[list[float], Array]:
+    """The instants at which that pad stops or starts, and its motion at the end, by scipy."""
+    springs, state, now, side, changes = pressed_by_a_power(power).stiffness, np.array(start), 0.0, -1.0, []
+
+    def load(y: Array) -> float:
+        return float(5.0 * max(0.0, 1 + 11.0 * y[1] / (5.0 * power)) ** power)
+
+    def rate(_: float, y: Array) -> list[float]:
+        force = -np.asarray(springs) @ y[:2] - [side * 0.6 * load(y), load(y) - 5.0]
+        return [y[2], y[3], *(force if side else (0.0, force[1]))]
+
+    def change(_: float, y: Array) -> float:
+        return float(y[2] - 0.8 if side else abs((springs @ y[:2])[0]) - 0.6 * load(y))
+
+    change.terminal = True  # type: ignore[attr-defined]
+    while True:
+        options = {"method": "DOP853", "rtol": 1e-12, "atol": 1e-13}
+        begun = solve_ivp(rate, (now, now + 1e-6), state, **options)
+        lap = solve_ivp(rate, (now + 1e-6, end), begun.y[:, -1], events=change, **options)
+        now, state = lap.t[-1], lap.y[:, -1]
+        if not lap.t_events[0].size:
+            return changes, state
+        changes.append(now)
+        push = -(springs @ state[:2])[0]
+        state[2] = 0.8
+        side = 0.0 if side and abs(push) < 0.6 * load(state) else float(np.sign(push))
+
+
+def test_a_load_of_a_power_is_followed_through_lifting() -> None:
+    """1.5 is no whole number, of which nothing has no Taylor series."""
+    run = ss.simulate(pressed_by_a_power(1.5), duration=9.8, start={"x1": 0.3, "v1": 0.0})
+    changes, state = motion_under_a_power(1.5, [0.3, 0.0, 0.0, 0.0], 9.8)
+    lifts = [event.time for event in run.events if event.mode == "lifted"]
+    assert 8.7 < lifts[0] < 8.8
+    own = [event.time for event in run.events if event.mode in ("stuck", "forward", "back") and event.kind != "land"]
+    landed = [t for t in own if not np.any(np.abs(np.subtract(changes, t)) < 1e-6)]
+    assert len(landed) == len(lifts)
+    assert len(own) - len(landed) == len(changes)
+    np.testing.assert_allclose(run.sample([9.8], ("x", "v"))[0].ravel(), state, atol=1e-7)
+
+
+def test_what_asks_for_linear_modes_says_that_the_load_is_curved() -> None:
+    with pytest.raises(ss.errors.ModelError, match=r"a load of power 1.5 with curved modes.*leave out power="):
+        table_of(pressed_by_a_power(1.5))

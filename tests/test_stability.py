@@ -236,3 +236,38 @@ def test_a_threshold_and_what_dies_away_are_told_in_words() -> None:
 def test_a_map_that_turns_back_is_refused() -> None:
     with pytest.raises(ss.errors.ModelError, match="sort them, each of them once"):
         ss.squeak.stability_map(lambda load: ss.squeak.squeak_rig("wet", load), grid={"load": [2, 1, 1]}, speed=-0.1)
+
+
+@pytest.mark.parametrize("power", [1.5, 2.5])
+def test_a_load_of_a_power_slides_where_its_forces_balance(power: float) -> None:
+    rig = ss.squeak.squeak_rig("wet", 6.13).having(power=power)
+    found = ss.stability(rig, speed=-0.1)
+    left = rig.stiffness @ np.array(found.place)
+    for contact, load in zip(rig.contacts, found.loads, strict=True):
+        approach = contact.normal @ np.array(found.place) * contact.stiffness / (power * contact.preload)
+        assert load == pytest.approx(contact.preload * (1 + approach) ** power, rel=1e-12)
+        friction = contact.law.kinetic * load + 0.1 * contact.law.slope * contact.preload
+        left = left + (load - contact.preload) * np.asarray(contact.normal) + friction * np.asarray(contact.tangent)
+    assert np.max(np.abs(left)) < 1e-12 * np.max(found.loads)
+
+
+def test_a_vibration_under_a_power_grows_as_its_eigenvalue_says() -> None:
+    pad = ss.Contact(ss.laws.Coulomb(0.6), [1, 0], normal=[0, 1], stiffness=11.0, preload=5.0, power=1.5)
+    springs = [[23.25, 3.9], [3.9, 7.75]]
+    mass = ss.Structure(np.eye(2), np.zeros((2, 2)), springs, contacts=[pad], drive=ss.drives.Belt(1.0))
+    cycle = ss.squeak.limit_cycle(mass)
+    assert cycle.growth == pytest.approx(cycle.sliding.growth, rel=1e-3)
+
+
+def test_friction_that_rises_is_not_said_to_fall() -> None:
+    """What damps the slide alone may let two coupled motions grow: the paradox of destabilising damping."""
+    dry = ss.squeak.squeak_rig("dry", 12.0)
+    found = ss.stability(dry, speed=-0.1)
+    assert dry.contacts[0].law.slope > 0
+    assert found.mechanism == "mode coupling and rising friction together"
+    assert found.without_slope < 0 < found.growth
+
+
+def test_a_power_without_a_preload_is_refused() -> None:
+    with pytest.raises(ss.errors.ModelError, match="power = 2 without normal"):
+        ss.Contact(ss.laws.Coulomb(0.6), [1, 0], preload=5.0, power=2)

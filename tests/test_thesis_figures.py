@@ -7,11 +7,12 @@ from collections.abc import Callable
 import pytest
 from matplotlib.figure import Figure
 
-from stickslip_thesis import page, printed, sketches
+import stickslip as ss
+from stickslip_thesis import chapter7, page, printed, sketches
 
 Sketch = Callable[[printed.Given], Figure]
 
-OURS = {"4": 1, "6": 1, "beyond": 4}  # figures that the thesis does not have
+OURS = {"4": 1, "6": 1, "7": 2, "beyond": 4}  # figures that the thesis does not have
 
 
 @pytest.mark.parametrize("chapter", page.CHAPTERS)
@@ -26,6 +27,17 @@ def test_every_figure_is_drawn(chapter: str) -> None:
     assert wanted <= drawn
     assert len(drawn) == len(wanted) + OURS.get(chapter, 0) == len(plates)
     assert all(plate.caption for plate in plates)
+
+
+def test_the_critical_load_falls_with_wetness() -> None:
+    given = printed.given()
+    loads = [chapter7.critical_load(given, wetness, 1.0) for wetness in (0.0, 0.5, 1.0)]
+    assert loads[0] > given["squeak"]["heavy"] > loads[1] > loads[2] > given["squeak"]["light"]
+    for wetness, surface in ((0.0, "dry"), (1.0, "wet")):
+        rig = chapter7.rig_between(given, wetness, 6.13, 1.0)
+        assert ss.stability(rig, speed=-0.1).growth == pytest.approx(
+            ss.stability(ss.squeak.squeak_rig(surface, 6.13), speed=-0.1).growth, rel=1e-9
+        )
 
 
 def words_of(drawn: Figure) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,7 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 import stickslip as ss
+from stickslip.figures.limit_cycle import plot_stability
 from stickslip.figures.plate import Plate
 from stickslip.figures.style import BLUE, GREEN, INK, ORANGE, PURPLE, envelope, styled
 from stickslip_thesis.drawing import figure, panels, responses, tag
@@ -23,6 +25,10 @@ TITLE = "Why rubber on wet steel squeals"
 STARTS_FROM = ("squeak", "bearing")  # sections of given.toml
 SETTLED = 20  # cycles: near its resonance of 5.5 Hz the mass takes that long, by trial with each condition
 KEPT = 2  # cycles that are looked at
+HERTZ = 1.5  # power of the load of a sphere
+POWERS = {"virtual rig": 1.0, "spheres, 1.5": HERTZ, "rough surfaces, 2.5": 2.5}  # Oden and Martins: 2 to 3.3
+TOWARDS = -0.1  # m/s: the side on which the rig squeals
+LOADS, COARSE = (0.5, 40.0), 16  # N, and at how many of them the critical one is looked for
 LOUDEST = 0.125  # s: over what a sound level meter averages on "fast"
 CONDITIONS = (("dry", "heavy"), ("wet", "heavy"), ("dry", "light"), ("wet", "light"))
 SIGNALS = {
@@ -72,6 +78,35 @@ def plates(given: Given) -> Iterator[Plate]:
         f"{given['squeak']['reflector']:g} Hz.",
     )
     yield figure("7.11", _spectra(wet, ("friction", "a", "sound")), words)
+    yield from _critical(given)
+
+
+def _critical(given: Given) -> Iterator[Plate]:
+    """Figures of ours: the load from which it squeals over wetness, and what feeds it."""
+    (dry, wet), (dry_sphere, wet_sphere) = (
+        [critical_load(given, wetness, power) for wetness in (0.0, 1.0)] for power in (1.0, HERTZ)
+    )
+    yield figure(
+        "critical-load",
+        _thresholds(given),
+        "(a) Load from which sliding is not stable, between dry and wet rubber (friction and slope in proportion): "
+        f"{dry:.1f} N dry and {wet:.1f} N wet of the virtual rig, whose contacts are springs that the preload sets. "
+        "Under a load that grows with a power, as Tworzydło and Oden and Martins have it, friction's moment makes one "
+        f"contact stiffer than the other: {dry_sphere:.1f} N and {wet_sphere:.1f} N of spheres; dry rubber would then "
+        f"squeal under {given['squeak']['heavy']:g} N, where all are equally stiff at rest. (b) Frequencies of bending "
+        "and torsion, wet: whatever the power, they meet where it begins (dotted).",
+        title="The critical load against wetness, and against the normal law",
+    )
+    light = ss.squeak.squeak_rig("wet", given["squeak"]["light"])
+    steep = ss.squeak.critical_value(light, "slope", between=(-8.0, 0.0), speed=TOWARDS)
+    yield figure(
+        "mechanisms",
+        plot_stability(mechanisms(), labels=("slope of the friction coefficient [s/m]", "normal load [N]")),
+        "What feeds the squeal of the virtual rig, wet: each mechanism is switched off in turn. Its own slope is "
+        f"{light.contacts[0].law.slope:g} s/m; under {given['squeak']['light']:g} N it would have to be "
+        f"{steep.value:.2g} s/m: friction falls there, and sliding is stable.",
+        title="Coupling and slope: which of them feeds the squeal",
+    )
 
 
 def level_of(sound: Array) -> float:
@@ -171,6 +206,47 @@ def merging(given: Given) -> tuple[float, float]:
     return high[0], high[1]
 
 
+def rig_between(given: Given, wetness: float, load: float, power: float) -> ss.Structure:
+    """The rig between dry (0) and wet (1), with a normal law of a power; at rest all are alike under the heavy load."""
+    heavy = given["squeak"]["heavy"]
+    ends = [ss.squeak.squeak_rig(surface, heavy).contacts[0] for surface in ("dry", "wet")]
+    kinetic, slope = (
+        (1 - wetness) * getattr(ends[0].law, name) + wetness * getattr(ends[1].law, name)
+        for name in ("kinetic", "slope")
+    )
+    stiffness = ends[0].stiffness * (load / heavy) ** (1 - 1 / max(power, HERTZ))
+    rig = ss.squeak.squeak_rig("wet", load)
+    contacts = [replace(contact, stiffness=stiffness, power=power) for contact in rig.contacts]
+    return replace(rig, contacts=contacts).having(kinetic=kinetic, slope=slope)
+
+
+@functools.lru_cache(64)
+def _critical_load(wetness: float, power: float, heavy: float) -> float:
+    given = {"squeak": {"heavy": heavy}}
+
+    def growth(load: float) -> float:
+        return ss.stability(rig_between(given, wetness, load, power), speed=TOWARDS).growth
+
+    loads = np.geomspace(*LOADS, COARSE)
+    growing = np.array([growth(float(load)) > 0 for load in loads])
+    first = int(np.argmax(growing))
+    return float(brentq(growth, loads[first - 1], loads[first], rtol=1e-6)) if first else np.nan
+
+
+def critical_load(given: Given, wetness: float, power: float) -> float:
+    """Load from which sliding is not stable [N]; nan where there is none."""
+    return _critical_load(wetness, power, given["squeak"]["heavy"])
+
+
+def mechanisms() -> Any:
+    """What ends the steady sliding of the wet rig, over slope and load."""
+    return ss.squeak.stability_map(
+        lambda slope, load: ss.squeak.squeak_rig("wet", load).having(slope=slope),
+        grid={"slope": np.linspace(-4, 4, 17), "load": np.linspace(0.5, 15.5, 21)},
+        speed=TOWARDS,
+    )
+
+
 def strongest(record: ss.Record, name: str) -> float:
     """The strongest line of a signal above 100 Hz [Hz]."""
     frequency, power = _spectrum(record, name)
@@ -216,6 +292,25 @@ def _signals(record: ss.Record, names: tuple[str, ...]) -> Any:
         tag(ax, letter)
     axes[-1].set_xlabel("time [s]")
     drawn.align_ylabels(list(axes))
+    return drawn
+
+
+@styled
+def _thresholds(given: Given) -> Any:
+    drawn, axes = panels(1, 2, height=3.0)
+    wetness, loads = np.linspace(0, 1, 9), np.linspace(0.5, 12.0, 41)
+    for (name, power), colour in zip(POWERS.items(), (GREEN, BLUE, ORANGE), strict=True):
+        critical = [critical_load(given, float(share), power) for share in wetness]
+        axes[0].plot(wetness, critical, color=colour, label=name)
+        sliding = [ss.stability(rig_between(given, 1.0, float(load), power), speed=TOWARDS) for load in loads]
+        modes = [sorted(mode.frequency for mode in found.modes)[-2:] for found in sliding]
+        axes[1].plot(loads, modes, color=colour)
+        axes[1].axvline(critical[-1], color=colour, linestyle=":", linewidth=0.9)
+    axes[0].set(xlabel="wetness: 0 dry, 1 wet", ylabel="critical load [N]", ylim=(0, None))
+    axes[0].legend()
+    axes[1].set(xlabel="normal load [N]", ylabel="frequency [Hz]")
+    for ax, letter in zip(axes, "ab", strict=True):
+        tag(ax, letter)
     return drawn
 
 

@@ -20,6 +20,7 @@ COMMANDS = {  # by the file that they stand in
     "rig": ("rig",),
     "simulate": ("bifurcation", "dither", "lab", "simulate", "stability", "sweep"),
     "thesis": ("thesis",),
+    "tribometer": ("tribometer",),
     "vibrations": ("decay", "squeak", "wavelet"),
 }
 ARGUMENTS = "stickslip.arguments"  # the key under which the context keeps what was typed

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 COLOURS = {
     "stable": "#ffffff", "mode coupling": ORANGE, "falling friction": BLUE, "jamming": INK,
     "mode coupling, and falling friction too": PURPLE, "mode coupling and falling friction together": SKY,
-    "the structure itself": FAINT,
+    "mode coupling and rising friction together": GREEN, "the structure itself": FAINT,
 }  # fmt: skip
 FILLED = 0.55  # how opaque a region is
 

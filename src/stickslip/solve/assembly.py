@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 
 from stickslip.errors import ModelError
 from stickslip.laws.base import Mode
-from stickslip.laws.curved import CurvedLaw
 from stickslip.oscillator import Oscillator
 from stickslip.solve.cells import DEGREE, cells_of, derivatives, derive
 from stickslip.solve.operations import stilled
@@ -30,8 +29,7 @@ from stickslip.solve.tables import (
     Tables,
     batch_of,
     by_value,
-    is_curved,
-    laws_of,
+    curves_of,
     numbered,
     reached,
     systems_of,
@@ -45,12 +43,12 @@ WHOLE = 1e3 * float(np.finfo(np.longdouble).eps)  # a part this close to a whole
 
 def table_of(system: System) -> Tables:
     """The flat tables of one system."""
-    if is_curved(system):
-        curved = [type(law).__name__ for law in laws_of(system) if isinstance(law, CurvedLaw)]
+    curved = curves_of(system)
+    if curved:
         raise ModelError(
             f"{' and '.join(curved)} with curved modes",
             "this question needs a law of linear modes",
-            "ask simulate(), or make a polygon of the curve with Tabulated.of()",
+            "ask simulate(), or make a polygon of a law's curve with Tabulated.of() and leave out power=",
         )
     return _known(system) if isinstance(system, Oscillator) and by_value(system) else _built(system)
 

@@ -281,8 +281,15 @@ class Systems:
 
 
 def is_curved(system: System) -> bool:
-    """Whether a contact has a law of curved modes: then Taylor series are marched, not closed forms."""
-    return any(isinstance(law, CurvedLaw) for law in laws_of(system))
+    """Whether a contact has a law of curved modes, or a load that does: then Taylor series are marched."""
+    return bool(curves_of(system))
+
+
+def curves_of(system: System) -> list[str]:
+    """What is curved in the contacts of a system, in words."""
+    curved = [type(law).__name__ for law in laws_of(system) if isinstance(law, CurvedLaw)]
+    contacts = system.contacts if isinstance(system, Structure) else ()
+    return curved + [f"a load of power {contact.power:g}" for contact in contacts if contact.power != 1]
 
 
 def laws_of(system: System) -> list[Any]:

@@ -171,6 +171,14 @@ class _Contact:
         modes = (*(replace(mode, exits=(stop[mode.side],)) for mode in law.rates()), law.holding(least))
         self.modes = modes if self.alone else self.contact.closing(modes, (back, "held", forward))
 
+    def press(self, part: Any, moving: Operations) -> None:
+        """Tell the load in a mode; of a contact that is lifted it is what would press it."""
+        closed, preload, power = self.symbols["closed"], self.contact.preload, self.contact.power
+        if power != 1 and part.kind not in ("flight", "landing"):
+            share = combined([(1 / preload, closed)])
+            closed = combined([(preload, moving.power(share, power))])
+        self.symbols["1"] = closed
+
     def left(self, mode: Any, exit_: Exit, to: Any) -> float:
         """The speed [m/s] that an exit leaves against the counter-face; nan where it leaves what there is.
 
@@ -242,8 +250,9 @@ class _Builder:
         known = {"x": combined([(1.0, place), (-1.0, face[0])]), "v": combined([(1.0, speed), (-1.0, face[1])])}
         load: Form = ({}, contact.contact.preload)
         if contact.normal is not None:
-            press = contact.contact.stiffness * contact.normal
+            press = contact.contact.stiffness / contact.contact.power * contact.normal
             load = combined([(1.0, load), *((press[i], ({i: 1.0}, 0.0)) for i in range(n))])
+        known |= {"closed": load}
         known |= {"1": load, "always": ({}, 1.0), "face_acceleration": face[2]}
         for name, j in zip(contact.law.memory, contact.memory, strict=True):
             own: Form = ({j: 1.0}, 0.0)
@@ -299,6 +308,8 @@ class _Builder:
         """Nodes for the march and with outputs, rates of the entries, nodes of the exits and of the outputs."""
         moving, n = Operations(self.size, {}), self.degrees
         still: Form = ({}, 0.0)
+        for part, contact in zip(parts, self.contacts, strict=True):
+            contact.press(part, moving)
         landing = any(part.kind == "landing" for part in parts)  # no time passes: a contact has yet to find its mode
         friction: list[Form] = [still for _ in parts]
         force = list(self.push)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
 from typing import Any
 
@@ -23,6 +23,7 @@ from stickslip.parameters import finite
 from stickslip.structure import Contact, Structure
 
 ROUNDING = 1e-11  # of the largest eigenvalue: growth below it is none
+STEPS = 30  # of Newton towards steady sliding under loads that grow with a power: a dozen reach it from no load
 JAMS, ITSELF = "jamming", "the structure itself"
 
 Array = NDArray[np.float64]
@@ -67,9 +68,10 @@ class Stability:
         Those that grow fastest first.
     mechanism : str
         "stable", or what feeds the growth: "mode coupling", "falling friction", "mode coupling and falling friction
-        together" (neither alone is enough), "mode coupling, and falling friction too" (each alone is enough),
-        "jamming" (the contact draws itself in without oscillating, as a sprag does), or "the structure itself" (it
-        grows without any friction: dampers that feed it, springs that buckle).
+        together" (neither alone is enough), "mode coupling and rising friction together" (so too, where no friction
+        falls: what damps one motion alone can feed both), "mode coupling, and falling friction too" (each alone is
+        enough), "jamming" (the contact draws itself in without oscillating, as a sprag does), or "the structure itself"
+        (it grows without any friction: dampers that feed it, springs that buckle).
     growth : float
         Fastest growth [1/s].
     without_coupling, without_slope : float
@@ -149,7 +151,9 @@ def stability(system: System, *, speed: float | None = None) -> Stability:
     >>> found.mechanism, round(found.frequency, 3)
     ('mode coupling', 0.73)
     """
-    mass, damping, stiffness, rubbing = sliding_parts(system, speed)
+    mass, damping, stiffness, contacts = sliding_parts(system, speed)
+    place, loads, status = _rest(stiffness, contacts)
+    rubbing = [r.about(load) for r, load in zip(contacts, loads, strict=True)]
     pressed = stiffness + sum((r.stiffness * np.outer(r.normal, r.normal) for r in rubbing), np.zeros_like(mass))
     follows = sum((r.follows for r in rubbing), np.zeros_like(mass))
     falls = sum((r.slope * np.outer(r.tangent, r.tangent) for r in rubbing), np.zeros_like(mass))
@@ -157,11 +161,10 @@ def stability(system: System, *, speed: float | None = None) -> Stability:
     uncoupled, unsloped = (mass, damping + falls, pressed), (mass, damping, pressed + follows)
     bare = (mass, damping, pressed)
     modes = modes_of(whole)
-    place, loads, status = _rest(pressed + follows, rubbing)
     return Stability(
         stable=margin(whole) <= ROUNDING,
         modes=modes,
-        mechanism=_mechanism(whole, bare, uncoupled, unsloped, modes),
+        mechanism=_mechanism(whole, bare, uncoupled, unsloped, modes, any(r.slope < 0 for r in rubbing)),
         growth=modes[0].growth,
         without_coupling=modes_of(uncoupled)[0].growth,
         without_slope=modes_of(unsloped)[0].growth,
@@ -213,7 +216,7 @@ def modes_of(matrices: Matrices) -> tuple[SlidingMode, ...]:
 
 
 def _mechanism(
-    whole: Matrices, bare: Matrices, uncoupled: Matrices, unsloped: Matrices, modes: Sequence[SlidingMode]
+    whole: Matrices, bare: Matrices, uncoupled: Matrices, unsloped: Matrices, modes: Sequence[SlidingMode], falls: bool
 ) -> str:
     if margin(whole) <= ROUNDING:
         return "stable"
@@ -225,17 +228,27 @@ def _mechanism(
     if grows_by_slope and grows_by_coupling:
         return "mode coupling, and falling friction too"
     if not grows_by_slope and not grows_by_coupling:
-        return "mode coupling and falling friction together"
+        return f"mode coupling and {'falling' if falls else 'rising'} friction together"
     return "falling friction" if grows_by_slope else "mode coupling"
 
 
 def _rest(stiffness: Array, rubbing: Sequence[Rubbing]) -> tuple[tuple[float, ...], tuple[float, ...], str]:
-    """Place and loads of steady sliding, and whether it can be."""
-    if np.linalg.cond(stiffness) > 1 / np.finfo(float).eps:
-        loads = tuple(r.preload for r in rubbing)
-        return (math.nan,) * len(stiffness), loads, "no spring holds it: the loads are those before it slides"
-    place = -np.linalg.solve(stiffness, sum((r.constant * r.tangent for r in rubbing), np.zeros(len(stiffness))))
-    loads = tuple(float(r.preload + r.stiffness * (r.normal @ place)) for r in rubbing)
+    """Place and loads of steady sliding by Newton's steps, of which linear loads take one; and whether it can be."""
+    place, none = np.zeros(len(stiffness)), np.zeros_like(stiffness)
+    for _ in range(1 if all(r.power == 1 for r in rubbing) else STEPS):
+        loads = tuple(float(r.load(place)) for r in rubbing)
+        around = [r.about(load) for r, load in zip(rubbing, loads, strict=True)]
+        steep = stiffness + sum((r.stiffness * np.outer(r.normal, r.normal) + r.follows for r in around), none)
+        if np.linalg.cond(steep) > 1 / np.finfo(float).eps:
+            unpressed = tuple(r.preload for r in rubbing)
+            return (math.nan,) * len(place), unpressed, "no spring holds it: the loads are those before it slides"
+        pairs = zip(rubbing, loads, strict=True)
+        left = stiffness @ place + sum(((load - r.preload) * r.normal + r.at(load) * r.tangent for r, load in pairs), 0)
+        step = np.linalg.solve(steep, left)
+        place = place - step
+        if np.linalg.norm(step) <= np.finfo(float).eps * np.linalg.norm(place):
+            break
+    loads = tuple(float(r.load(place)) for r in rubbing)
     lifting = [str(j) for j, load in enumerate(loads, start=1) if load <= 0]
     status = f"contact {', '.join(lifting)} would lift off before it slides steadily" if lifting else "ok"
     return tuple(map(float, place)), loads, status
@@ -243,7 +256,7 @@ def _rest(stiffness: Array, rubbing: Sequence[Rubbing]) -> tuple[tuple[float, ..
 
 @dataclass(frozen=True, eq=False)
 class Rubbing:
-    """A contact that slides steadily: its friction is level (N_0 + k_n w_n q) + slope (w_t q' - face)."""
+    """A contact that slides steadily: its friction is level N(w_n q) + slope (w_t q' - face)."""
 
     tangent: Array
     normal: Array
@@ -252,22 +265,34 @@ class Rubbing:
     level: float
     slope: float
     velocity: float
+    power: float = 1.0
+
+    def load(self, place: Array) -> float:
+        """Normal load at displacements [N]; of a power it ends where the contact opens."""
+        closed = self.preload + self.stiffness / self.power * float(self.normal @ place)
+        return closed if self.power == 1 else self.preload * (max(closed, 0.0) / self.preload) ** self.power
+
+    def about(self, load: float) -> Rubbing:
+        """The same with the normal stiffness that it has under a load [N]."""
+        if self.power == 1:
+            return self
+        return replace(self, stiffness=self.stiffness * (load / self.preload) ** (1 - 1 / self.power))
 
     @property
     def follows(self) -> Array:
         """What the friction adds to K because it follows the load."""
         return self.level * self.stiffness * np.outer(self.tangent, self.normal)
 
-    @property
-    def constant(self) -> float:
-        """Friction force at q = 0 [N]."""
-        return self.level * self.preload + self.slope * self.velocity
+    def at(self, load: float) -> float:
+        """Friction force under a load [N]."""
+        return self.level * load + self.slope * self.velocity
 
 
 def sliding_matrices(system: System, speed: float | None) -> Matrices:
     """M, C, K of small motions about steady sliding."""
-    mass, damping, stiffness, rubbing = sliding_parts(system, speed)
-    for r in rubbing:
+    mass, damping, stiffness, contacts = sliding_parts(system, speed)
+    _, loads, _ = _rest(stiffness, contacts)
+    for r in (contact.about(load) for contact, load in zip(contacts, loads, strict=True)):
         damping = damping + r.slope * np.outer(r.tangent, r.tangent)
         stiffness = stiffness + r.stiffness * np.outer(r.normal, r.normal) + r.follows
     return mass, damping, stiffness
@@ -311,7 +336,7 @@ def _rubbing(contact: Contact, speed: float) -> Rubbing:
             "give carried=, or leave that contact out",
         )
     level, slope = _row(contact, velocity)
-    return Rubbing(tangent, normal, contact.stiffness, contact.preload, level, slope, velocity)
+    return Rubbing(tangent, normal, contact.stiffness, contact.preload, level, slope, velocity, contact.power)
 
 
 def _row(part: Any, velocity: float) -> tuple[float, float]:

@@ -186,6 +186,7 @@ class _Contact(BaseModel):
     normal: list[float] | None = None
     stiffness: Stiffness | None = None
     preload: Annotated[float, quantity("N")] | None = None
+    power: float | None = None
     carried: float | None = None
 
 
