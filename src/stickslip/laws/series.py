@@ -56,8 +56,9 @@ class InSeries:
         if isinstance(self.law, TimeDelay):
             raise ModelError(
                 "TimeDelay in series",
-                "a slider without mass jumps where friction of a while ago jumps",
-                "use SmoothStateVariable for a friction that lags",
+                "a lag recalls the speed of a mass, and no state tells that of a slider without one",
+                "give the slider a mass: an Oscillator of it under the lag, its spring to a HarmonicBase; or use "
+                "SmoothStateVariable for a friction that lags",
             )
         if isinstance(self.law, CurvedLaw):
             object.__setattr__(self, "rates", self._rates)  # with it, it is a curved law itself
