@@ -71,11 +71,13 @@ def _require_given_way(law: Law | CurvedLaw) -> None:
     name = type(law).__name__
     if not hasattr(law, "modes"):
         raise ModelError(
-            f"{name} under an imposed motion", "it takes a law of linear modes",
+            f"{name} under an imposed motion",
+            "it takes a law of linear modes",
             "move the counter-face under a heavy mass, or make a polygon of the curve with Tabulated.of()",
-        ).of("law")  # fmt: skip
+        ).of("law")
     if any(mode.friction is None for mode in law.modes()):
         raise ModelError(
-            f"{name} under an imposed motion", "a rigid contact would hold the mass against it",
+            f"{name} under an imposed motion",
+            "a rigid contact would hold the mass against it",
             "put a spring before it: CompliantContact(), or InSeries() of this law",
-        ).of("law")  # fmt: skip
+        ).of("law")
