@@ -72,6 +72,7 @@ def _require_given_way(law: Any) -> None:
     modes = law.rates() if isinstance(law, CurvedLaw) else law.modes()
     if isinstance(law, Creeping) or any(mode.friction is None for mode in modes):
         raise ModelError(
-            f"{name} under an imposed motion", "a rigid contact would hold the mass against it",
+            f"{name} under an imposed motion",
+            "a rigid contact would hold the mass against it",
             "put a spring before it: CompliantContact(), or InSeries() of this law",
-        ).of("law")  # fmt: skip
+        ).of("law")

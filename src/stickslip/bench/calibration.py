@@ -125,14 +125,19 @@ def calibrate(
         )
     method = f"{len(read)} {'steps between levels' if leaks else 'levels'} against known values"
     gain = Estimate.normal(f"gain of {channel}", fit[0], sd=gain_sd, unit="1", method=method, quantile=quantile)
-    zero = None if leaks else Estimate.normal(
-        f"zero of {channel}", fit[1], sd=sd[1], unit=unit, method=method, quantile=quantile
-    )  # fmt: skip
+    zero = (
+        None
+        if leaks
+        else Estimate.normal(f"zero of {channel}", fit[1], sd=sd[1], unit=unit, method=method, quantile=quantile)
+    )
     largest = float(np.abs(left).max() / np.ptp(fit[0] * known))
     linearity = Estimate.normal(
-        f"deviation of {channel} from a straight line", largest,
-        sd=float(weight_sd.max() / np.ptp(fit[0] * known)), unit="1", method=method,
-    ).within(0.0)  # fmt: skip
+        f"deviation of {channel} from a straight line",
+        largest,
+        sd=float(weight_sd.max() / np.ptp(fit[0] * known)),
+        unit="1",
+        method=method,
+    ).within(0.0)
     bent = [Doubt(f"{channel} is off a straight line by {100 * largest:.2g} % of the range", "bent")]
     return Calibration(channel, gain, zero, linearity, known, read, Status(*bent * (largest > BENT)))
 
@@ -224,11 +229,14 @@ def spring_by_weights(
     # an even interval of the logarithm: a stiffness is never below zero
     part = math.hypot(compliance.spread / compliance.value, gain_sd)
     stiffness = Estimate(
-        "spring stiffness", 1 / compliance.value,
+        "spring stiffness",
+        1 / compliance.value,
         (math.exp(-1.96 * part) / compliance.value, math.exp(1.96 * part) / compliance.value),
-        part / compliance.value, "N/m", f"displacement under {len(calibration.levels)} weights",
+        part / compliance.value,
+        "N/m",
+        f"displacement under {len(calibration.levels)} weights",
         checks=(f"off a straight line by {100 * calibration.linearity.value:.2g} %",),
-    )  # fmt: skip
+    )
     return SpringByWeights(
         replace(stiffness, status=calibration.status), calibration.reference, calibration.levels, calibration.status
     )

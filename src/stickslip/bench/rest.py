@@ -72,7 +72,9 @@ class AtRest(Result):
     @property
     def estimates(self) -> tuple[Estimate, ...]:
         """Zero, noise and drift of each."""
-        return tuple(each for sensor in self.sensors.values() for each in (sensor.zero, sensor.noise, sensor.drift))
+        return tuple(
+            estimate for sensor in self.sensors.values() for estimate in (sensor.zero, sensor.noise, sensor.drift)
+        )
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON."""
@@ -136,12 +138,12 @@ def _sensor(name: str, record: Record) -> SensorAtRest:
         f"drift of {name}", slope, sd=sd, unit=f"{unit}/s", method=f"slope of {of}", quantile=student(slope_freedom)
     )
     spread = noise[1] if math.isfinite(noise[1]) else 0.0
-    told = Estimate.normal(
+    rounded = Estimate.normal(
         f"noise of {name}", noise[0], sd=spread, unit=unit, method=f"likelihood of the counts of {of}" if count else of
     ).within(0.0)
     if not noise[0] or not math.isfinite(noise[1]):
-        told = Estimate(told.name, 0.0, (0.0, count / 2 or 0.0), count / 4, unit, f"{of} stand on one count")
-    return SensorAtRest(name, zero, drift, told, count, _status(name, values, left, worth, drift))
+        rounded = Estimate(rounded.name, 0.0, (0.0, count / 2 or 0.0), count / 4, unit, f"{of} stand on one count")
+    return SensorAtRest(name, zero, drift, rounded, count, _status(name, values, left, worth, drift))
 
 
 def _noise(values: Array, left: Array, count: float, worth: float) -> tuple[float, tuple[float, float]]:
@@ -296,9 +298,10 @@ def _fitted(time: Array, blocks: Array, before: Rows, after: Rows, at: float, un
     noise = max(float(np.std(np.diff(y[~behind]))) / math.sqrt(2), 1e-12 * abs(high - zero))
     if abs(high - zero) < LOUD * noise:
         raise EstimateError(
-            f"a step of {high - zero:.3g} {unit} in noise of {noise:.2g} {unit}", f"{DISCHARGE} needs a step {LOUD:g} "
-            "times as high as the noise", "put a heavier weight on",
-        )  # fmt: skip
+            f"a step of {high - zero:.3g} {unit} in noise of {noise:.2g} {unit}",
+            f"{DISCHARGE} needs a step {LOUD:g} times as high as the noise",
+            "put a heavier weight on",
+        )
     span = float(t[behind][-1] - t[behind][0])
     begin = np.array(
         [zero, high - zero, max(1e-3 / span, math.log(abs(high - zero) / max(noise, abs(y[-1] - zero))) / span)]

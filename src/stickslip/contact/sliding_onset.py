@@ -307,10 +307,13 @@ def _exact(
     doubt[3:, 3:] = fitted.covariance
     centre = math.log(fitted.stiffness.value), fitted.damping.value
     return _propagated(
-        "contact", lambda values: _set_going(values, rig), np.array([*known, *centre]), doubt,
+        "contact",
+        lambda values: _set_going(values, rig),
+        np.array([*known, *centre]),
+        doubt,
         "motion after the turn on the fitted contact",
         ("with the friction and the pull found at the turns; errors of the mass and of gains go into it",),
-    )  # fmt: skip
+    )
 
 
 def _set_going(known: Array, rig: Balance) -> float:
@@ -384,9 +387,9 @@ def _amplitude(displacement: Array) -> tuple[float, float]:
 def _stops(loops: Loops, branches: Sequence[Branch], peak: float) -> str:
     """Whether the contact holds for too long for harmonic sliding, in words."""
     speeds = [float(branch.speed[-1]) for branch in branches]
-    held = math.asin(min(1.0, float(np.mean(speeds)) / peak)) / math.pi  # of half a cycle
+    stuck = math.asin(min(1.0, float(np.mean(speeds)) / peak)) / math.pi  # of half a cycle
     measured = float(np.median(np.abs(loops.velocity)) / np.max(np.abs(loops.velocity)))
-    if held < STOPPED and measured > 0.5:  # of a sine it is 0.71
+    if stuck < STOPPED and measured > 0.5:  # of a sine it is 0.71
         return "ok"
     return "it stops between its turns: the equation is for harmonic sliding, the rest for the turns out of sliding"
 

@@ -110,8 +110,8 @@ def find_noise(blocks: Blocks, fits: Array, samples: Array, step: float, kind: s
             smooth = _refined(blocks, int(row[0]), row[3:], power)
             corner, power, _ = drift(blocks, int(row[0]), smooth)
             white = math.sqrt(float(power[-1]) / (1 + corner / frequencies(blocks)[-1]) * blocks.size)
-            words = f"white, and drift that outweighs it below {corner:.3g} Hz"
-            return Noise("coloured", white, words, lambda n: coloured(blocks, n, power))
+            label = f"white, and drift that outweighs it below {corner:.3g} Hz"
+            return Noise("coloured", white, label, lambda n: coloured(blocks, n, power))
     return Noise("white", level, "white", lambda n: white_noise(blocks, n, least))
 
 
@@ -215,7 +215,7 @@ def drift(blocks: Blocks, n: int, p: Array) -> tuple[float, Array, float]:
         return float(cost), float(squares)
 
     corners = np.geomspace(0.1 * tones[1], 2 * tones[-1], CORNERS)
-    costs = [judged(each)[0] for each in corners]
+    costs = [judged(place)[0] for place in corners]
     best = int(np.argmin(costs))
     if 0 < best < CORNERS - 1:  # a parabola through three costs
         below, here, above = costs[best - 1 : best + 2]

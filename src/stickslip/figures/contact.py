@@ -190,8 +190,8 @@ def plot_micro_slips(findings: Findings) -> Figure:
     """Does the contact hold all the time that it sticks? One stick, with the micro-slips in it shaded."""
     assert findings.sticks is not None
     events, record = findings.sticks.events, findings.record
-    held = record.time[0], record.time[-1]
-    inside = [event for event in events if event.kind == "microslip" and held[0] < event.time < held[1]]
+    span = record.time[0], record.time[-1]
+    inside = [event for event in events if event.kind == "microslip" and span[0] < event.time < span[1]]
     middle = inside[len(inside) // 2]
     stick = max((e for e in events if e.kind == "stick" and e.time <= middle.time), key=lambda event: event.time)
     margin = MARGIN * stick.duration

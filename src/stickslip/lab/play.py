@@ -88,10 +88,10 @@ async def _parts(
     strips = _changing(values) if request["measure"] in COUNTED else []
     for number, (i, begin, end) in enumerate(strips, start=1):
         x, y = xs[i : i + 2], ys[begin:end]
-        found = await _asked(socket, request, names, x, y, want="refine")
+        finer = await _asked(socket, request, names, x, y, want="refine")
         yield (
             {"level": "fine", "done": number, "of": len(strips)},
-            {"x": _finer(x), "y": _finer(y), "values": found.ravel()},
+            {"x": _finer(x), "y": _finer(y), "values": finer.ravel()},
         )
 
 

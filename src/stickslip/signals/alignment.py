@@ -134,10 +134,10 @@ class Lines:
     @property
     def telling(self) -> Lines:
         """The lines that tell nearly all that these tell of a mount."""
-        told = self.information * self.turn**4
-        ordered = np.sort(told)
+        curvature = self.information * self.turn**4
+        ordered = np.sort(curvature)
         least = np.searchsorted(np.cumsum(ordered), (1 - TELLING) * ordered.sum())
-        return self.chosen(told >= ordered[least]) if len(told) else self
+        return self.chosen(curvature >= ordered[least]) if len(curvature) else self
 
     def without_offset(self, gain: float) -> Lines:
         """The second less its offset, which is all that the relation leaves at frequency zero."""
@@ -284,9 +284,9 @@ def align(
     used = [0, 1, 2, 3] if free else [0, 1]
     for done in range(rounds):
         if not done:
-            theta[1] = told([next(pairs[0].stretches(delay, room))]).gain or 1.0
+            theta[1] = merged([next(pairs[0].stretches(delay, room))]).gain or 1.0
         parts = (part.without_offset(theta[1]) for pair in pairs for part in pair.stretches(delay, room))
-        lines = told(part.weighed(theta) if done and rounds > 2 else part for part in parts)
+        lines = merged(part.weighed(theta) if done and rounds > 2 else part for part in parts)
         theta, misfit = _likeliest(lines, theta, used)
         delay, theta[0] = float(np.clip(delay + theta[0], -FARTHEST, FARTHEST)), 0.0
     square = window(1 << 12) ** 2
@@ -343,10 +343,10 @@ def _likeliest(lines: Lines, theta: Array, free: list[int]) -> tuple[Array, Misf
     for _ in range(STEPS):
         step, tried = misfit.step(damping), theta.copy()
         tried[free] += step * misfit.scale
-        found, gain = Misfit.of(lines, tried, free), float(-step @ misfit.gradient)
-        if found.value < misfit.value:
-            gain = min(gain, misfit.value - found.value)
-            theta, misfit, damping = tried, found, damping / 10 if damping > DAMPED else 0.0
+        moved, gain = Misfit.of(lines, tried, free), float(-step @ misfit.gradient)
+        if moved.value < misfit.value:
+            gain = min(gain, misfit.value - moved.value)
+            theta, misfit, damping = tried, moved, damping / 10 if damping > DAMPED else 0.0
         else:
             damping = max(10 * damping, DAMPED)
         if gain < SETTLED * max(1.0, misfit.value / (2 * len(lines.turn))):
@@ -362,10 +362,12 @@ def _terms(mount: tuple[float, float] | None) -> tuple[float, float]:
     return 2 * mount[1] / turn, 1 / turn**2
 
 
-def told(parts: Iterable[Lines]) -> Lines:
+def merged(parts: Iterable[Lines]) -> Lines:
     """The clear lines of all stretches that tell something of a delay or a mount, of what their own stretch tells."""
     clear = [part.chosen(part.clear).telling for part in parts]
-    lines = Lines(*(np.concatenate([getattr(each, field.name) for each in clear], axis=-1) for field in fields(Lines)))
+    lines = Lines(
+        *(np.concatenate([getattr(chosen, field.name) for chosen in clear], axis=-1) for field in fields(Lines))
+    )
     if len(lines.turn) < 2:
         raise EstimateError(
             "no line of the spectra stands above the noise of either channel",
@@ -413,7 +415,7 @@ def _middle(pair: Pair, most: int) -> Pair:
 def _peaks(pair: Pair) -> list[float]:
     """Delays [s], to a sample, at which a pair correlates most, fast lines first: the highest and the nearest."""
     part = next(_middle(pair, BLOCK).stretches(0.0))
-    lines, step = told([part]), float(part.turn[1])
+    lines, step = merged([part]), float(part.turn[1])
     count = round(2 * math.pi * pair.fs / step)
     spectrum = np.zeros(count // 2 + 1, dtype=complex)
     across = lines.first.conj() * lines.second[0]

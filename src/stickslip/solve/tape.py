@@ -425,10 +425,11 @@ class _Builder:
         quantities = [
             [
                 one.moving.scaled(self.told(self.contacts[c], exit_.quantity, one.known[c]))
-                for i, c, exit_ in leaving if i == j
+                for i, c, exit_ in leaving
+                if i == j
             ]
             for j, one in enumerate(made)
-        ]  # fmt: skip
+        ]
         shown = [self.shown(one, own) for one, own in zip(made, parts, strict=True)]
         rate = tuple(np.array([[r[c] for r in one.entries] for one in made], dtype=d) for c, d in enumerate(DTYPES))
         exits = self.exits(joints, parts, leaving, quantities)
@@ -520,10 +521,10 @@ class _Builder:
     def stilled(self, held: Mapping[int, float]) -> Array:
         """The state with the velocities of some contacts told, and no more of them left but for rounding."""
         one = self.row(({}, 1.0))
-        told = {
+        columns = {
             c: (self.contacts[c].tangent, (self.row(self.faced(c, 1)) + speed * one)[None]) for c, speed in held.items()
         }
-        return np.asarray(stilled(np.eye(self.size)[None], self.degrees, told)[0])
+        return np.asarray(stilled(np.eye(self.size)[None], self.degrees, columns)[0])
 
 
 def _alone(system: Oscillator) -> Structure:
