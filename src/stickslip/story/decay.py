@@ -260,9 +260,9 @@ def _left_over(decay: Decay) -> Iterator[str]:
     fit = decay.waveform
     if fit is None or LEFT_OVER not in kinds(fit.status):
         return
-    time, left = max(zip(fit.time, fit.residual, strict=True), key=lambda pair: float(np.std(pair[1])))
-    power = np.abs(np.fft.rfft((left - left.mean()) * np.hanning(len(left)))) ** 2
-    frequency = np.fft.rfftfreq(len(left), float(time[1] - time[0]))
+    time, residual = max(zip(fit.time, fit.residual, strict=True), key=lambda pair: float(np.std(pair[1])))
+    power = np.abs(np.fft.rfft((residual - residual.mean()) * np.hanning(len(residual)))) ** 2
+    frequency = np.fft.rfftfreq(len(residual), float(time[1] - time[0]))
     own, total = fit.frequency.value, float(power.sum())
     near = slice(max(0, int(np.argmax(power)) - 2), int(np.argmax(power)) + 3)
     line = float(power[near].sum())
