@@ -21,6 +21,7 @@ from stickslip.printing import printable
 from stickslip.record.record import RIG_UNITS, Record
 from stickslip.rig.rig import Rig
 from stickslip.rig.sensor import Digitiser, Noise, Sensor
+from stickslip.rig.settings import READING
 from stickslip.statistics import follows
 from stickslip.twin.belief import Belief
 
@@ -33,7 +34,6 @@ EXPLAINED = "inertia, viscous and dry friction"  # the model of a regression
 BESIDE = {"x": "z"}  # drawn in the same panel
 HERE = "{here}"  # before the name of a file that lies beside the page, which knows its folder
 ROWS = "--rows {first}:{last}"  # of a command, with the rows left open
-READING = ("channels", "units", "fs", "time", "delimiter", "decimal")  # options that read_record has too
 
 
 @dataclass(frozen=True, eq=False)
