@@ -136,7 +136,7 @@ def checked(
             step = f"add {path[0]} = {value if 'dict' in str(kind) else 'VALUE'}"
             raise ModelError(f"{where} has no {key}", f"{key} is needed", step) from error
         raise ModelError(
-            f"{where} sets {key} = {_shown(first['input'])}", _said(first["msg"]), f"correct {key}"
+            f"{where} sets {key} = {_shown(first['input'])}", _mended(first["msg"]), f"correct {key}"
         ) from error
 
 
@@ -162,7 +162,7 @@ def _shown(value: object) -> str:
     return text if len(text) <= SHOWN else f"{text[:SHOWN]}..."
 
 
-def _said(message: str) -> str:
+def _mended(message: str) -> str:
     """What a model says of a value, in the words of a settings file."""
     said = message.removeprefix("Value error, ").replace("Input should", "it should")
     said = (

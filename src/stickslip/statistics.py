@@ -352,6 +352,6 @@ def follows(measured: Array, model: Array) -> float:
     90.0
     """
     both = np.isfinite(measured) & np.isfinite(model)
-    left, whole = (measured - model)[both], measured[both]
+    residual, whole = (measured - model)[both], measured[both]
     size = float(np.linalg.norm(whole - whole.mean()))
-    return 100 * (1 - float(np.linalg.norm(left - left.mean())) / size) if size else 0.0
+    return 100 * (1 - float(np.linalg.norm(residual - residual.mean())) / size) if size else 0.0

@@ -355,9 +355,9 @@ def _by_waveform(
 
 def _followed(fit: DecayFit, restoring: Restoring) -> DecayFit:
     """The fit, where it follows the motion; refused where it leaves much of it."""
-    left, moved = np.concatenate(fit.residual), np.concatenate(fit.measured) - fit.bias.value
-    share = float(np.linalg.norm(left) / np.linalg.norm(moved))
-    if share > LOST and float(np.std(left)) > SEEN * fit.ring_downs[0].noise:
+    residual, moved = np.concatenate(fit.residual), np.concatenate(fit.measured) - fit.bias.value
+    share = float(np.linalg.norm(residual) / np.linalg.norm(moved))
+    if share > LOST and float(np.std(residual)) > SEEN * fit.ring_downs[0].noise:
         straight = restoring == "linear" and fit.channel == "theta"
         raise EstimateError(
             f"the fit leaves {100 * share:.0f} % of the motion",

@@ -304,16 +304,16 @@ class _Trial:
         answers = {}
         if math.isfinite(late := self._lag("a") - self._lag("x")):
             answers["delay"] = (
-                _asked(late, lambda: sensor_delay(self.record).delay.value - late)
+                _answer_of(late, lambda: sensor_delay(self.record).delay.value - late)
                 if "a" in self.record
                 else _Answer(late, refusal="it needs an accelerometer")
             )
-        answers["friction"] = _asked(level, self._trace)
+        answers["friction"] = _answer_of(level, self._trace)
         if "sliding friction" in truth:
-            answers["sliding friction"] = _asked(level, lambda: friction_loops(self.force).level.value - level)
+            answers["sliding friction"] = _answer_of(level, lambda: friction_loops(self.force).level.value - level)
         if "contact stiffness" in truth:
             stiff = truth["contact stiffness"]
-            answers["contact stiffness"] = _asked(stiff, lambda: contact_stiffness(self.force).value - stiff)
+            answers["contact stiffness"] = _answer_of(stiff, lambda: contact_stiffness(self.force).value - stiff)
         return answers
 
     @functools.cached_property
@@ -333,7 +333,7 @@ class _Trial:
         return np.asarray(force["friction"][inside] - self.run.sample(times, ("friction",))[0][0])
 
 
-def _asked(truth: float, error: Callable[[], Array | float]) -> _Answer:
+def _answer_of(truth: float, error: Callable[[], Array | float]) -> _Answer:
     try:
         errors = error()
     except StickslipError as refusal:

@@ -119,7 +119,7 @@ def analyze(
     results = {**dict.fromkeys(names), **answers, "delay": made.delay, "comparison": made.comparison, "trial": None}
     results |= {"slips": slips, "lacking": missing(whole, rig)}
     normal = normal_load(record, rig, name, asked.notes)
-    settings = {**_stated(rig, all_of_it=bool(results["lacking"])), **_told(whole), "contact": slid}
+    settings = {**_stated(rig, all_of_it=bool(results["lacking"])), **_constants_of(whole), "contact": slid}
     return Findings(name, whole, faults, normal, tuple(asked.notes), settings, results=results)
 
 
@@ -165,7 +165,7 @@ class Question:
             all(any(name in record for name in group) for group in self.needs)
             and not any(name in record for name in self.without)
             and (not self.fused or _can_be_fused(record, again=not self.follows))
-            and (not self.derived or bool(_told(record)) or "load" in record)
+            and (not self.derived or bool(_constants_of(record)) or "load" in record)
         )
 
 
@@ -223,7 +223,7 @@ def _settings(rig: RigSettings | None, given: Mapping[str, Any]) -> RigSettings:
 
 def _can_be_fused(record: Record, *, again: bool) -> bool:
     """Whether the friction comes from all sensors together; or might have, `again`, if the record were not so long."""
-    method = _told(record).get("differentiation")
+    method = _constants_of(record).get("differentiation")
     sensors = any(is_measured(record, name) and described(record.channels[name]) for name in ("a", "load"))
     return method in FUSIONS or (
         again and method == "smoother" and len(record) > AT_ONCE and sensors and slid_on(record, None) == "ground"
@@ -238,7 +238,7 @@ def _fused(record: Record) -> Record:
     return friction_force(cut, method="fusion", **{key: getattr(cut.rig, key) for key in CONSTANTS})
 
 
-def _told(record: Record) -> dict[str, Any]:
+def _constants_of(record: Record) -> dict[str, Any]:
     """The constants and the method behind the friction force, where it comes from a balance of forces."""
     if "friction" not in record or is_measured(record, "friction"):
         return {}

@@ -115,7 +115,7 @@ def calibrate(
         known, read = values, np.array([hold.level for hold in holds])
         design = np.column_stack([known, np.ones(len(known))])
         weight_sd = np.array([hold.sd for hold in holds])
-    fit, sd, left, quantile = _line(design, read, weight_sd)
+    fit, sd, residual, quantile = _line(design, read, weight_sd)
     gain_sd = math.hypot(sd[0], reference_sd * fit[0])
     if not abs(fit[0]) > 3 * sd[0]:
         raise EstimateError(
@@ -130,7 +130,7 @@ def calibrate(
         if leaks
         else Estimate.normal(f"zero of {channel}", fit[1], sd=sd[1], unit=unit, method=method, quantile=quantile)
     )
-    largest = float(np.abs(left).max() / np.ptp(fit[0] * known))
+    largest = float(np.abs(residual).max() / np.ptp(fit[0] * known))
     linearity = Estimate.normal(
         f"deviation of {channel} from a straight line",
         largest,
@@ -157,11 +157,11 @@ def _line(design: Array, read: Array, read_sd: Array) -> tuple[Array, Array, Arr
     The scatter may by chance be less than what noise alone leaves of a level: then that counts.
     """
     fit = np.linalg.lstsq(design, read)[0]
-    left = read - design @ fit
+    residual = read - design @ fit
     freedom = max(1, len(read) - design.shape[1])
-    scatter, chance = math.sqrt(float(left @ left) / freedom), math.sqrt(float(np.mean(read_sd**2)))
+    scatter, chance = math.sqrt(float(residual @ residual) / freedom), math.sqrt(float(np.mean(read_sd**2)))
     sd = max(scatter, chance) * np.sqrt(np.diag(np.linalg.inv(design.T @ design)))
-    return np.asarray(fit, dtype=float), sd, left, student(float(freedom))
+    return np.asarray(fit, dtype=float), sd, residual, student(float(freedom))
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -161,8 +161,10 @@ def _inertia(record: Record, decay: DecayFit) -> Estimate:
 def _amplitude(design: Array, inverse: Array, values: Array) -> tuple[complex, float]:
     """Complex amplitude of a decaying oscillation in a channel, and the deviation of its real part."""
     fit = inverse @ (design.T @ values)
-    left = values - design @ fit
-    sd = math.sqrt(float(inverse[0, 0]) * float(left @ left) / len(left) * max(1.0, correlation_time(left)))
+    residual = values - design @ fit
+    sd = math.sqrt(
+        float(inverse[0, 0]) * float(residual @ residual) / len(residual) * max(1.0, correlation_time(residual))
+    )
     return complex(fit[0], fit[1]), sd
 
 

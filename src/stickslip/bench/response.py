@@ -289,11 +289,11 @@ def modal_fit(
     doubt = Doubt(
         f"the answer leaves {power:.2g} times the noise: more than one mass on one spring, or friction", "model"
     )
-    modal = _told(lines, fit.x, cover, given, Status(*[doubt] * (power > UNEXPLAINED)))
-    return replace(modal, response=_seen(record, channels))
+    modal = _modal_of(lines, fit.x, cover, given, Status(*[doubt] * (power > UNEXPLAINED)))
+    return replace(modal, response=_response_of(record, channels))
 
 
-def _seen(record: Record, channels: tuple[str, str]) -> FrequencyResponse | None:
+def _response_of(record: Record, channels: tuple[str, str]) -> FrequencyResponse | None:
     try:
         return frequency_response(record, channels=channels)
     except StickslipError:
@@ -377,7 +377,7 @@ class _Lines:
         return np.concatenate([residual.real, residual.imag])
 
 
-def _told(lines: _Lines, p: Array, cover: Array, given: dict[str, Estimate], status: str) -> ModalFit:
+def _modal_of(lines: _Lines, p: Array, cover: Array, given: dict[str, Estimate], status: str) -> ModalFit:
     method = f"{len(lines.turn)} lines, errors in both channels"
 
     def of(name: str, value: float, gradient: Sequence[float], unit: str, extra: float = 0.0) -> Estimate:

@@ -207,7 +207,7 @@ def next_runs(
             motion = (frequency, _round(share * top))
             if motion[1] > 0 and all(_apart(motion, other) for other in done):
                 bound = shaker.bound(frequency) if share == 1.0 and top >= 0.99 * shaker.largest(frequency) else ""
-                proposals += _told(laws, motion, noise, largest, bound)
+                proposals += _proposals(laws, motion, noise, largest, bound)
     if not proposals:
         raise EstimateError(
             "no motion of the base is left to try", "the shaker has to move the mass", "check its limits"
@@ -278,7 +278,7 @@ def _several(ranked: Sequence[Proposal], count: int) -> tuple[Proposal, ...]:
     return tuple(chosen[:count])
 
 
-def _told(
+def _proposals(
     laws: Mapping[str, Oscillator], motion: tuple[float, float], noise: float, largest: float, bound: str
 ) -> list[Proposal]:
     """What a motion tells; nothing where a law can not be simulated or the mass leaves the sensor's range."""

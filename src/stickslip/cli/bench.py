@@ -71,7 +71,7 @@ def commission(
         return
     config: Path | None = options["config"]
     rig = ss.rig.read_rig(config) if config else ss.rig.rig_settings({})
-    given = dict(_given(file) for file in files)
+    given = dict(_step_and_file(file) for file in files)
     if given and not options["steps"]:
         chosen = [step for step in bench.STEPS if step.name in given]
     folder = output or (None if given or as_json else Path("commission"))
@@ -88,7 +88,7 @@ def commission(
         say(f"Settings: {folder / 'rig.toml'}")
 
 
-def _given(text: str) -> tuple[str, Path]:
+def _step_and_file(text: str) -> tuple[str, Path]:
     """A step and the file that answers it."""
     name, file = pair(text, "STEP=FILE")
     return bench.step_named(name).name, groups_of(file)[0][0]

@@ -116,7 +116,7 @@ def init(files: tuple[str, ...], yes: bool, output: Path, force: bool, **options
     guesses = [] if stated.channels else ss.rig.guess_columns(record)
     _show(groups[0], record, guesses)
     if not yes:
-        guesses = [_asked(guess) for guess in guesses]
+        guesses = [_confirmed(guess) for guess in guesses]
     settings = _settings(options, stated, guesses, {} if yes else _constants(options, record, guesses))
     rig = ss.rig.rig_settings(settings, source="the answers")
     try:
@@ -134,7 +134,8 @@ def _show(files: Sequence[Path], record: Record, guesses: Sequence[Guess]) -> No
     say(" + ".join(map(str, files)))
     say(f"{len(record)} samples at {record.fs:.6g} Hz, {record.duration:.4g} s.")
     rows = [
-        (guess.column, guess.unit + ("" if guess.stated else " ?"), guess.spanned, _words(guess)) for guess in guesses
+        (guess.column, guess.unit + ("" if guess.stated else " ?"), guess.spanned, _description(guess))
+        for guess in guesses
     ]
     for line in aligned(("column", "unit", "span", "taken for"), rows) if rows else ():
         say(line)
@@ -154,14 +155,14 @@ def _unsure(guess: Guess) -> bool:
     return not guess.stated and bool(guess.unit) and guess.unit != "1"
 
 
-def _words(guess: Guess) -> str:
+def _description(guess: Guess) -> str:
     return f"{guess.channel}, {guess.words}" if guess.channel else guess.words
 
 
 # ---- what is asked
 
 
-def _asked(guess: Guess) -> Guess:
+def _confirmed(guess: Guess) -> Guess:
     """The column as the user calls it."""
     say()
     channel = click.prompt(

@@ -166,7 +166,7 @@ def folder_after(file: Path, ending: str) -> Path:
 
 def read(files: Sequence[Path], rig: RigSettings, names: Sequence[str] = ()) -> Record:
     """The record, its files called by their names or by those given."""
-    record = ss.read_record(_paths(files), rows=rig.row_range(), **_told(rig))
+    record = ss.read_record(files, rows=rig.row_range(), **rig.reading())
     return rig.logged(ss.answers.mend(_with_source(record, files, names), repairs=rig.repair))
 
 
@@ -182,17 +182,9 @@ def read_parts(
     if rig.rows or rig.repair:
         yield read(files, rig, names)
         return
-    options = {**_told(rig), **({} if size is None else {"size": size})}
-    for part in ss.read_blocks(_paths(files), **options):
+    options = {**rig.reading(), **({} if size is None else {"size": size})}
+    for part in ss.read_blocks(files, **options):
         yield rig.logged(_with_source(part, files, names))
-
-
-def _paths(files: Sequence[Path]) -> Any:
-    return files[0] if len(files) == 1 else list(files)
-
-
-def _told(rig: RigSettings) -> dict[str, Any]:
-    return {key: getattr(rig, key) or None for key in ("channels", "fs", "units", "time", "delimiter", "decimal")}
 
 
 def _folder(path: Path) -> dict[str, str]:

@@ -351,8 +351,8 @@ def stops_check(seen: Seen) -> Check:
     k, m = seen.rig["stiffness"], seen.rig["mass"]
     z = abs(complex(seen.strongest("z").mean()))
     amplitude, rests = _mean_cycle(seen)
-    left = k * seen.channels["z"] - seen.drag
-    source = seen.work(seen.channels.get("load", left))
+    residual = k * seen.channels["z"] - seen.drag
+    source = seen.work(seen.channels.get("load", residual))
     friction = float(source.mean()) / (4 * amplitude)
     if friction <= 0:
         return untold(name, "energy runs the wrong way")

@@ -380,8 +380,8 @@ def _amplitude(displacement: Array) -> tuple[float, float]:
     """Half the range of a mean cycle by its first harmonics, and its standard deviation by what they leave."""
     spectrum = np.fft.rfft(displacement)
     smooth = np.fft.irfft(np.where(np.arange(len(spectrum)) <= HARMONICS, spectrum, 0.0), len(displacement))
-    left = float(np.std(displacement - smooth))
-    return float(np.ptp(smooth)) / 2, left * math.sqrt((2 * HARMONICS + 1) / len(displacement))
+    residual = float(np.std(displacement - smooth))
+    return float(np.ptp(smooth)) / 2, residual * math.sqrt((2 * HARMONICS + 1) / len(displacement))
 
 
 def _stops(loops: Loops, branches: Sequence[Branch], peak: float) -> str:

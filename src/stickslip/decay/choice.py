@@ -138,12 +138,12 @@ class Candidate:
             return np.zeros(len(fitted.residual)), 0.0, 0.0
         direction = fitted.jacobian[:, fitted.motion.free.index(added)]
         others = fitted.jacobian[:, fitted.settled]
-        left = direction - others @ (np.linalg.pinv(others) @ direction)
-        power, value = float(left @ left), fitted.value(added)
+        residual = direction - others @ (np.linalg.pinv(others) @ direction)
+        power, value = float(residual @ residual), fitted.value(added)
         room = HIGHEST.get(added, math.inf) - value
         if power <= (APART * np.linalg.norm(direction)) ** 2:
             return direction, -value, room if math.isfinite(room) else 0.0
-        sd, freedom = self.noise.along(left / power)
+        sd, freedom = self.noise.along(residual / power)
         reach = student(freedom) * sd
         return direction, -min(reach, value), min(reach, room)
 

@@ -412,8 +412,8 @@ def _frequency(times: Array, values: Array, ring_down: RingDown) -> tuple[Estima
     freedom = max(1, len(at) - 2)
     share = sharp**2 / np.sum(sharp**2)
     spread = float(share @ (at - share @ at) ** 2)
-    left = math.sqrt(float(share @ (when - first - half * at) ** 2) * len(at) / freedom)
-    sd = max(left, 0.1 / ring_down.fs) / math.sqrt(len(at) * spread)
+    residual = math.sqrt(float(share @ (when - first - half * at) ** 2) * len(at) / freedom)
+    sd = max(residual, 0.1 / ring_down.fs) / math.sqrt(len(at) * spread)
     notes: tuple[str, ...] = ()
     if not ring_down.isochronous:
         longer = "longer" if ring_down.unevenness > 0 else "shorter"

@@ -295,8 +295,8 @@ def _fitted_swings(sizes: Array, numbers: Array, signs: Array, restoring: str) -
     dry = _dry(sizes, numbers)
     scale = np.array([sizes[0], 1e-2, max(dry, 1e-3 * sizes[0]), 1e-2 * sizes[0]])
     fitted = search(left_by, [sizes[0], 1e-3, dry, 0.0], x_scale=scale, method="lm")
-    slopes, left = np.asarray(fitted.jac, dtype=float), np.asarray(fitted.fun, dtype=float)
-    covariance = np.linalg.pinv(slopes.T @ slopes) * float(left @ left) / max(1, len(sizes) - FREE)
+    slopes, residual = np.asarray(fitted.jac, dtype=float), np.asarray(fitted.fun, dtype=float)
+    covariance = np.linalg.pinv(slopes.T @ slopes) * float(residual @ residual) / max(1, len(sizes) - FREE)
     return np.asarray(fitted.x[1:3]), np.sqrt(np.diag(covariance)[1:3])
 
 

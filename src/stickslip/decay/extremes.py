@@ -311,9 +311,9 @@ def _fitted(ring_down: RingDown, number: int, turn: float) -> tuple[float, float
     if len(rows) <= design.shape[1]:
         return _sampled(ring_down, number)
     solution = np.linalg.lstsq(design, ring_down.samples[rows], rcond=None)[0]
-    left = ring_down.samples[rows] - design @ solution
+    residual = ring_down.samples[rows] - design @ solution
     spread = float(np.sqrt(np.linalg.pinv(design.T @ design)[0, 0]))
-    noise = max(ring_down.noise, float(np.sqrt(left @ left / (len(rows) - design.shape[1]))))
+    noise = max(ring_down.noise, float(np.sqrt(residual @ residual / (len(rows) - design.shape[1]))))
     return turn, float(solution[0]), noise * spread, CERTAIN * noise * spread
 
 

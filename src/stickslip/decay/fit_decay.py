@@ -344,11 +344,11 @@ def _misfit(releases: list[Release], fitted: list[Array]) -> tuple[Doubt, ...]:
     """Doubt where the residual is much more than the record's own noise from block to block."""
     worst = 0.0
     for release, values in zip(releases, fitted, strict=True):
-        left = release.blocks.means - values
+        residual = release.blocks.means - values
         counted = release.noise.level if release.noise.kind == "quantised" else 0.0
         floor = max(float(roughness(release.blocks.means)), counted, 1e-12 * float(np.ptp(values)))
         if release.blocks.order < 2:
-            worst = max(worst, math.sqrt(float(left @ left) / release.blocks.freedom) / floor)
+            worst = max(worst, math.sqrt(float(residual @ residual) / release.blocks.freedom) / floor)
     if worst <= UNLIKE:
         return ()
     doubt = f"the residual is {worst:.2g} times the noise: drift, or another motion (see choose_motion)"

@@ -282,7 +282,7 @@ async def limits(request: Request) -> Response:
 @described("Start an analysis", body=schema_of(Ask), answer=object_of(id="string"), status=202)
 async def ask(request: Request) -> Response:
     """Start an analysis."""
-    request_of = _asked(await _body(request))
+    request_of = _question_of(await _body(request))
     data = _of(request)
     files = [[data.uploads.get(key) for key in record] for record in request_of.records]
     names = {upload.path.name: upload.label for record in files for upload in record}
@@ -304,7 +304,7 @@ async def _body(request: Request) -> bytes:
     return bytes(body)
 
 
-def _asked(body: bytes) -> Ask:
+def _question_of(body: bytes) -> Ask:
     try:
         question = Ask.model_validate_json(body)
         options = OPTIONS[question.question].model_validate(question.options).model_dump(exclude_defaults=True)

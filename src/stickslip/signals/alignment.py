@@ -147,30 +147,30 @@ class Lines:
     def residual(self, theta: Array) -> Complex:
         """Of the relation, over its standard deviation; theta is (delay [s], gain, 2 zeta/w_m [s], 1/w_m^2 [s^2])."""
         delay, gain, damped, squared = theta
-        left = self.second[0] + damped * self.second[1] + squared * self.second[2]
+        residual = self.second[0] + damped * self.second[1] + squared * self.second[2]
         factor = 1 + 1j * damped * self.turn - squared * self.turn**2
         spread = np.abs(factor) ** 2 * self.noise[1] + gain**2 * self.noise[0]
-        return np.asarray((left - gain * np.exp(-1j * self.turn * delay) * self.first) / np.sqrt(spread))
+        return np.asarray((residual - gain * np.exp(-1j * self.turn * delay) * self.first) / np.sqrt(spread))
 
     def expansion(self, theta: Array) -> tuple[float, Array, Array, Array]:
         """Sum of squares of :meth:`residual`, half its slopes and curvatures by theta, and the slopes' products."""
         delay, gain, damped, squared = theta
         w, (of_first, of_second), none = self.turn, self.noise, np.zeros_like(self.turn)
         stiff, turned = 1 - squared * w**2, np.exp(-1j * w * delay) * self.first
-        left = self.second[0] + damped * self.second[1] + squared * self.second[2] - gain * turned
+        residual = self.second[0] + damped * self.second[1] + squared * self.second[2] - gain * turned
         spread = (stiff**2 + (damped * w) ** 2) * of_second + gain**2 * of_first
         by_theta = np.array([1j * w * gain * turned, -turned, self.second[1], self.second[2]])
         widened = np.array([none, gain * of_first, damped * w**2 * of_second, -stiff * w**2 * of_second]) / spread
-        power = np.abs(left) ** 2 / spread
-        slopes = (left.conj() * by_theta).real / spread
+        power = np.abs(residual) ** 2 / spread
+        slopes = (residual.conj() * by_theta).real / spread
         mixed = 2 * slopes @ widened.T
         curvature = ((by_theta.conj() / spread) @ by_theta.T).real - mixed - mixed.T + 4 * (power * widened) @ widened.T
-        twice = np.array([gain * w**2, 1j * w]) * turned * left.conj() / spread  # delay and delay, delay and gain
+        twice = np.array([gain * w**2, 1j * w]) * turned * residual.conj() / spread  # delay and delay, delay and gain
         curvature[0, 0] += np.sum(twice[0].real)
         curvature[[0, 1], [1, 0]] += np.sum(twice[1].real)
         widest = np.array([none, of_first, w**2 * of_second, w**4 * of_second]) / spread
         curvature -= np.diag(widest @ power)
-        of_residual = (by_theta - left * widened) / np.sqrt(spread)
+        of_residual = (by_theta - residual * widened) / np.sqrt(spread)
         products = (of_residual.conj() @ of_residual.T).real
         return float(np.sum(power)), np.sum(slopes - power * widened, axis=1), curvature, products
 

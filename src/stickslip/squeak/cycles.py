@@ -156,7 +156,7 @@ def limit_cycle(
     table = tables(system)
     cycle = 1 / (sliding.frequency or system.frequency)
     begin = _pushed(system, table, sliding, push) if start is None else opening(table, start)
-    return _told(system, sliding, *_followed(system, table, sliding, begin, cycle, patience))
+    return _cycle_of(system, sliding, *_followed(system, table, sliding, begin, cycle, patience))
 
 
 def separating_cycle(system: System, lasting: LimitCycle) -> LimitCycle | None:
@@ -184,11 +184,11 @@ def separating_cycle(system: System, lasting: LimitCycle) -> LimitCycle | None:
         near = stretch(system, table, *opening(table, start(share)), span=(0.0, cycles * cycle))
         settled = settled_cycle(near, cycle)
         if settled is not None and abs(settled[1][0]) > 1:
-            return _told(system, sliding, "unstable", *settled)
+            return _cycle_of(system, sliding, "unstable", *settled)
     return None
 
 
-def _told(
+def _cycle_of(
     system: System, sliding: Stability, status: str, motion: Trajectory, multipliers: NDArray[np.complex128]
 ) -> LimitCycle:
     """What there is to say of a motion."""
@@ -221,7 +221,7 @@ def _followed(
         end, after = motion.end()
         part = count / 4
         first, last = (_size(motion, sliding, begin * cycle, part, cycle) for begin in (0.0, count - part))
-        if _held(motion):
+        if _sticks(motion):
             return "held", motion, none
         opened = opened or first
         if sliding.stable and last < DYING * min(opened, 1.0):
@@ -242,7 +242,7 @@ def _followed(
         state[:physical], mode, count = end[:physical], after, min(done, patience - done)
 
 
-def _held(motion: Trajectory) -> bool:
+def _sticks(motion: Trajectory) -> bool:
     """Whether the last piece is a rest on the counter-face that lasts."""
     mode = motion.table.modes[motion.modes[-1]]
     return mode.friction is None and bool(motion.durations[-1] > 0.5 * motion.duration)

@@ -228,7 +228,7 @@ def _abstract(tour: Tour) -> list[str]:
         + (f", and before it slides gives way like a spring of {value_of(contact)}." if contact else "."),
         f"The rig, commissioned from nothing, is a mass of {value_of(constants.mass)} on a spring of "
         f"{value_of(constants.stiffness)} with a damping ratio of {_ratio(tour)}.",
-        _held(tour),
+        _stuck_runs(tour),
         *_squeaked(tour),
     ]
     if tour.proposals:
@@ -246,7 +246,7 @@ def _ratio(tour: Tour) -> str:
     return value_of(ratio) if ratio is not None else "unknown size"
 
 
-def _held(tour: Tour) -> str:
+def _stuck_runs(tour: Tour) -> str:
     """Which runs stuck."""
     stuck = [
         f"{run.frequency:g} Hz ({value_of(share)} of the time)"

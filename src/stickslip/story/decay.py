@@ -178,7 +178,7 @@ def _dying(decay: Decay) -> str:
     curved = decay.best is decay.thesis and not decay.releases.ring_downs[0].isochronous
     if decay.motion is not None and decay.best is decay.motion:
         forces = decay.motion.choice.chosen.fitted.motion.words
-        return f"The motion dies away by {forces}: {_listed([_told(term) for term in decay.motion.terms])}."
+        return f"The motion dies away by {forces}: {_listed([_with_interval(term) for term in decay.motion.terms])}."
     if decay.denied and decay.whichever:
         ratio, dry = decay.whichever
         reach = f"the damping ratio is {_reach(ratio)} and the dry friction displacement {_reach(dry)}"
@@ -190,9 +190,9 @@ def _dying(decay: Decay) -> str:
         return f"The motion dies away by {model if 'friction' in model else f'{model} friction'}: {shown}."
     if viscous:
         widest = max((dry, *decay.whichever[1:]), key=lambda estimate: estimate.interval[1])
-        return f"The motion dies away by viscous friction: {_told(ratio)}. {_hidden(widest, 'dry friction')}"
+        return f"The motion dies away by viscous friction: {_with_interval(ratio)}. {_hidden(widest, 'dry friction')}"
     if rubs:
-        return f"The motion dies away by dry friction: {_told(dry)}. {_hidden(ratio, 'viscous friction')}"
+        return f"The motion dies away by dry friction: {_with_interval(dry)}. {_hidden(ratio, 'viscous friction')}"
     return "Neither viscous nor dry friction can be told from zero."
 
 
@@ -242,10 +242,10 @@ def _reach(estimate: Estimate) -> str:
 
 
 def _both(ratio: Estimate, dry: Estimate) -> str:
-    return f"{_told(ratio)} and {_told(dry)}"
+    return f"{_with_interval(ratio)} and {_with_interval(dry)}"
 
 
-def _told(estimate: Estimate) -> str:
+def _with_interval(estimate: Estimate) -> str:
     return f"a {estimate.name} of {value_of(estimate)} (95 %: {interval_of(estimate)})"
 
 
@@ -260,9 +260,9 @@ def _left_over(decay: Decay) -> Iterator[str]:
     fit = decay.waveform
     if fit is None or LEFT_OVER not in kinds(fit.status):
         return
-    time, left = max(zip(fit.time, fit.residual, strict=True), key=lambda pair: float(np.std(pair[1])))
-    power = np.abs(np.fft.rfft((left - left.mean()) * np.hanning(len(left)))) ** 2
-    frequency = np.fft.rfftfreq(len(left), float(time[1] - time[0]))
+    time, residual = max(zip(fit.time, fit.residual, strict=True), key=lambda pair: float(np.std(pair[1])))
+    power = np.abs(np.fft.rfft((residual - residual.mean()) * np.hanning(len(residual)))) ** 2
+    frequency = np.fft.rfftfreq(len(residual), float(time[1] - time[0]))
     own, total = fit.frequency.value, float(power.sum())
     near = slice(max(0, int(np.argmax(power)) - 2), int(np.argmax(power)) + 3)
     line = float(power[near].sum())

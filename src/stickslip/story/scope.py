@@ -21,6 +21,7 @@ from stickslip.printing import printable
 from stickslip.record.record import RIG_UNITS, Record
 from stickslip.rig.rig import Rig
 from stickslip.rig.sensor import Digitiser, Noise, Sensor
+from stickslip.rig.settings import READING
 from stickslip.statistics import follows
 from stickslip.twin.belief import Belief
 
@@ -33,7 +34,6 @@ EXPLAINED = "inertia, viscous and dry friction"  # the model of a regression
 BESIDE = {"x": "z"}  # drawn in the same panel
 HERE = "{here}"  # before the name of a file that lies beside the page, which knows its folder
 ROWS = "--rows {first}:{last}"  # of a command, with the rows left open
-READING = ("channels", "units", "fs", "time", "delimiter", "decimal")  # options that read_record has too
 
 
 @dataclass(frozen=True, eq=False)
@@ -235,7 +235,7 @@ def command_of(record: Record, question: str, *options: str) -> tuple[str, int]:
 
     Empty of a record that came from no file, or from several that were read one by one.
     """
-    command = _asked(record, question, options)
+    command = _command(record, question, options)
     return (f"{shlex.join(command)} {ROWS}", _read(record).get("rows", (0,))[0] or 0) if command else ("", 0)
 
 
@@ -284,7 +284,7 @@ def completed(findings: Findings, question: str = "analyze", options: Sequence[s
 def _again(
     findings: Findings, question: str, read: Mapping[str, Any], settings: Mapping[str, Any], options: Sequence[str]
 ) -> str:
-    command = _asked(findings.record, question, (*_stated(settings), *_loaded(findings), *options), read)
+    command = _command(findings.record, question, (*_stated(settings), *_loaded(findings), *options), read)
     rows = read.get("rows")
     if command and rows:
         command += ["--rows", ":".join("" if row is None else str(row) for row in rows)]
@@ -309,7 +309,7 @@ def _read(record: Record) -> Mapping[str, Any]:
     return reads[0] if len(reads) == 1 else {}
 
 
-def _asked(record: Record, question: str, options: Sequence[str], read: Mapping[str, Any] | None = None) -> list[str]:
+def _command(record: Record, question: str, options: Sequence[str], read: Mapping[str, Any] | None = None) -> list[str]:
     """The words of a command about the record's file, `read` otherwise where that is given."""
     read = _read(record) if read is None else read
     if not read.get("files"):

@@ -108,7 +108,7 @@ class Outcome:
             ],
             "known_answers": _plain(self.known),
             "event_count": counts.total(),
-            "events": [_told(event) for event in itertools.islice(self.run.each_event(), MOST_TOLD)],
+            "events": [_event_data(event) for event in itertools.islice(self.run.each_event(), MOST_TOLD)],
         }
 
 
@@ -245,10 +245,10 @@ def _write_sound(run: Trajectory, folder: Path, fs: float, form: str) -> None:
 def _write_events(run: Trajectory, path: Path) -> None:
     with path.open("w", encoding="utf-8") as file:
         file.write(",".join(["time [s]", *Event._fields[1:]]) + "\n")
-        file.writelines(",".join(map(str, _told(event).values())) + "\n" for event in run.each_event())
+        file.writelines(",".join(map(str, _event_data(event).values())) + "\n" for event in run.each_event())
 
 
-def _told(event: Event) -> dict[str, Any]:
+def _event_data(event: Event) -> dict[str, Any]:
     """An event for readers: contacts are counted from 1, as in a system's file."""
     return {**event._asdict(), "contact": event.contact + 1}
 
