@@ -217,7 +217,7 @@ def test_c_code_along_a_motion_is_the_friction_of_the_exact_solver(name: str, tm
 
 def test_mujoco_has_coulomb_and_viscous_joints() -> None:
     text = ss.laws.export_law(ss.laws.LinearSlope(1.0, slope=0.2), format="mujoco")
-    assert '<joint type="slide" frictionloss="1.0" damping="0.2"/>' in text
+    assert '<joint type="slide" frictionloss="1.0" damping="0.2" solreffriction="1e-06 1"/>' in text
     for law in LAWS.values():
         file = ElementTree.fromstring(ss.laws.export_law(law, format="mujoco"))
         assert file.tag == "mujocoinclude"

@@ -30,12 +30,13 @@ class Contact:
     r"""One place where a structure rubs: a direction of sliding, a friction law, and the load that presses it.
 
     The load is :math:`N = N_0 + k_n\,w_n\cdot q`, and the contact pushes back with it; the preload comes from outside
-    and balances it at q = 0; with a `power` m other than 1 it is :math:`N = N_0 (1 + k_n\,w_n\cdot q/(m N_0))^m`, whose
+    and balances it at q = 0. With a `power` m other than 1 it is :math:`N = N_0 (1 + k_n\,w_n\cdot q/(m N_0))^m`, whose
     stiffness at the preload is :math:`k_n` (of a sphere m = 1.5: Hertz; of rough surfaces 2 to 3.3: Oden and Martins,
-    Computer Methods in Applied Mechanics and Engineering 52, 1985). Every force level of the law is multiplied by N: a friction coefficient in place of a
-    force. Where friction depends on the speed, as a straight line :math:`\mu_0 + s v` or a table of them, it is
-    :math:`\mu_0 N + s N_0 v`: its slope keeps to the preload, for the product of load and speed is not linear. Curved
-    laws are coefficients as a whole, :math:`f = N \mu(v, \theta)`, and so are a slider's spring and damper. At N = 0
+    Computer Methods in Applied Mechanics and Engineering 52, 1985). Every force level of the law is multiplied by N: a
+    friction coefficient in place of a force. Where friction depends on the speed, as a straight line
+    :math:`\mu_0 + s v` or a table of them, it is :math:`\mu_0 N + s N_0 v`: its slope keeps to the preload, for the
+    product of load and speed is not linear. Curved laws are coefficients as a whole, :math:`f = N \mu(v, \theta)`, and
+    so are a slider's spring and damper. At N = 0
     the contact separates, and it closes again where N would rise above zero. Without `normal` the
     load is the preload; as that is 1 where left out, the levels of the law are then forces [N], as in an Oscillator.
 

@@ -89,12 +89,12 @@ def _critical(given: Given) -> Iterator[Plate]:
     yield figure(
         "critical-load",
         _thresholds(given),
-        f"(a) Load from which sliding is not stable, between dry and wet rubber (friction and its slope in proportion): "
-        f"{dry:.1f} N dry and {wet:.1f} N wet of the virtual rig, whose two contacts are springs that the preload sets. "
-        f"Under a load that grows with a power, as Tworzydło and Oden and Martins have it, friction's moment makes one "
-        f"contact stiffer than the other: {dry_sphere:.1f} N and {wet_sphere:.1f} N of spheres, so that dry rubber would "
-        f"squeal under {given['squeak']['heavy']:g} N, where all are equally stiff at rest. (b) Frequencies of bending and "
-        "torsion, wet: whatever the power, they meet where it begins (dotted).",
+        "(a) Load from which sliding is not stable, between dry and wet rubber (friction and slope in proportion): "
+        f"{dry:.1f} N dry and {wet:.1f} N wet of the virtual rig, whose contacts are springs that the preload sets. "
+        "Under a load that grows with a power, as Tworzydło and Oden and Martins have it, friction's moment makes one "
+        f"contact stiffer than the other: {dry_sphere:.1f} N and {wet_sphere:.1f} N of spheres; dry rubber would then "
+        f"squeal under {given['squeak']['heavy']:g} N, where all are equally stiff at rest. (b) Frequencies of bending "
+        "and torsion, wet: whatever the power, they meet where it begins (dotted).",
         title="The critical load against wetness, and against the normal law",
     )
     light = ss.squeak.squeak_rig("wet", given["squeak"]["light"])
@@ -103,8 +103,8 @@ def _critical(given: Given) -> Iterator[Plate]:
         "mechanisms",
         plot_stability(mechanisms(), labels=("slope of the friction coefficient [s/m]", "normal load [N]")),
         "What feeds the squeal of the virtual rig, wet: each mechanism is switched off in turn. Its own slope is "
-        f"{light.contacts[0].law.slope:g} s/m; under {given['squeak']['light']:g} N it would have to be {steep.value:.2g} "
-        "s/m: friction falls there, and sliding is stable.",
+        f"{light.contacts[0].law.slope:g} s/m; under {given['squeak']['light']:g} N it would have to be "
+        f"{steep.value:.2g} s/m: friction falls there, and sliding is stable.",
         title="Coupling and slope: which of them feeds the squeal",
     )
 

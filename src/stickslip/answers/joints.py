@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import itertools
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
+import numpy as np
+
 from stickslip.answers.axes import axis_record
-from stickslip.answers.findings import Asked, Findings, flagged, record_name, with_doubt
+from stickslip.answers.findings import Asked, Comparison, Findings, flagged, record_name, require_several, with_doubt
 from stickslip.cycle.joint import JointFriction, regress_joint
+from stickslip.cycle.joint_logs import regress_joint_logs
 from stickslip.cycle.joint_onset import joint_breakaway
 from stickslip.cycle.sticks import find_sticks
-from stickslip.estimate import UNTRIED, Constant, Doubt
+from stickslip.estimate import UNTRIED, Constant, Doubt, Estimate
+from stickslip.record.clock import fit_clock
 from stickslip.record.record import Record, Step, require_record
 from stickslip.signals.derivatives import differentiate
 from stickslip.signals.interpolate import without_delays
@@ -88,6 +94,83 @@ def analyze_joint(
         doubt = f"nobody stated a unit: {' and '.join(unstated)}"
         results = {key: flagged(result, doubt) for key, result in results.items()}
     return Findings(name, whole, faults, notes=tuple(asked.notes), settings=_settings(joint, given), results=results)
+
+
+def compare_joints(
+    findings: Sequence[Findings], *, gravity: bool | None = None, **constants: Constant | None
+) -> Comparison:
+    """Several logs of one joint: what they tell together, and how much of each the others predict.
+
+    Parameters
+    ----------
+    findings : sequence of Findings
+        Two or more, of :func:`analyze_joint`.
+    gravity : bool, optional
+        As there.
+    **constants : float, str, tuple or Estimate
+        `inertia`, `kp`, `kd` and `torque_constant`, as there.
+
+    Returns
+    -------
+    Comparison
+        Its results: ``together``, a :class:`~stickslip.cycle.JointLogs`, and each of its numbers by name.
+
+    Raises
+    ------
+    EstimateError
+        Fewer than two logs, or what they can not tell together.
+    RecordError
+        Logs whose torques have different sources.
+
+    Examples
+    --------
+    >>> def moved(seed, speed):
+    ...     t = np.arange(4000) / 200
+    ...     q = np.sin(2 * np.pi * speed * t) + 0.4 * np.sin(2 * np.pi * 3.1 * speed * t)
+    ...     v, a = np.gradient(q, 1 / 200), np.gradient(np.gradient(q, 1 / 200), 1 / 200)
+    ...     torque = 0.02 * a + 0.03 * v + 0.06 * np.sign(v) + np.random.default_rng(seed).normal(0, 0.01, t.size)
+    ...     return Record.of({"theta": q, "force": torque}, fs=200, units={"force": "N m"})
+    >>> found = [analyze_joint(moved(seed, speed), gravity=False) for seed, speed in enumerate((0.2, 0.3))]
+    >>> compare_joints(found, gravity=False).forward.includes(0.06)
+    True
+    """
+    require_several(findings)
+    together = regress_joint_logs([one.record for one in findings], gravity=gravity, **constants)
+    numbers = {name: value for name, value in vars(together).items() if isinstance(value, Estimate)}
+    return Comparison(tuple(findings), results={**numbers, "together": together})
+
+
+def episodes(record: Record) -> Iterator[Record]:
+    """The episodes of a data set that holds several in one file, as LeRobot's do.
+
+    Parameters
+    ----------
+    record : Record
+        With a channel ``episode_index``, where it has several.
+
+    Returns
+    -------
+    iterator of Record
+        Each episode on its own clock; the record itself where it has no such channel.
+
+    Examples
+    --------
+    >>> both = Record.of({"q": [0.0, 0.1, 0.2, 0.3], "episode_index": [7, 7, 8, 8]}, fs=30.0)
+    >>> [len(episode) for episode in episodes(both)]
+    [2, 2]
+    """
+    if "episode_index" not in record:
+        yield record
+        return
+    index = record["episode_index"]
+    ends = [0, *(np.flatnonzero(np.diff(index) != 0) + 1), len(record)]
+    for first, last in itertools.pairwise(ends):
+        part = record.rows(int(first), int(last))
+        if part.stamps is not None:
+            clock = fit_clock(part.stamps)
+            part = replace(part, fs=clock.fs, start=clock.start, stamps=clock.stamps)
+        step = Step("episodes", {"episode_index": int(index[first])}, f"episode {index[first]:g}")
+        yield replace(part, history=(*part.history, step))
 
 
 def _settings(joint: JointFriction, given: Mapping[str, Any]) -> dict[str, Any]:

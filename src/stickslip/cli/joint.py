@@ -2,20 +2,25 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 import stickslip as ss
 from stickslip.cli.options import reading_options, result_options
-from stickslip.cli.records import default_folder, groups_of, read, rig_of
+from stickslip.cli.records import answers, default_folder, groups_of, name_left_out, read, rig_of, with_left_out
 from stickslip.cli.show import show
 from stickslip.cli.terminal import progress
 
+if TYPE_CHECKING:
+    from stickslip import Record
+    from stickslip.answers import Findings
+
 
 @click.command()
-@click.argument("file", metavar="LOG")
+@click.argument("files", nargs=-1, required=True, metavar="LOGS...")
 @click.option("--inertia", metavar="VALUE", help="Moment of inertia in kg m^2, or with its unit; found unless given.")
 @click.option("--kp", metavar="VALUE", help="The controller's gain in N m/rad, for a log without torque and current.")
 @click.option("--kd", metavar="VALUE", help="The controller's damping in N m s/rad; found unless given.")
@@ -29,15 +34,17 @@ from stickslip.cli.terminal import progress
 @result_options("LOG-joint")
 @reading_options
 def joint(
-    file: str, output: Path | None, as_json: bool, everything: bool, propose: Path | None, **options: Any
+    files: tuple[str, ...], output: Path | None, as_json: bool, everything: bool, propose: Path | None, **options: Any
 ) -> None:
     """How much friction is in this joint of a robot, servo or axis?
 
-    LOG holds its position with one of: the torque, the motor's current (then --torque-constant), or the controller's
-    reference (then --kp). Columns are known by the names that ROS, LeRobot, MuJoCo, Dynamixel and drives give them.
+    Each of LOGS holds its position with one of: the torque, the motor's current (then --torque-constant), or the
+    controller's reference (then --kp). Columns are known by the names that ROS, LeRobot, MuJoCo, Dynamixel and drives
+    give them.
 
     Told are the friction either way, its viscous part, what of it grows with the load, inertia and gravity, breakaway
-    and stops; or what the log can not tell, and which motion would.
+    and stops; or what the log can not tell, and which motion would. Several logs of one joint, or a file of several
+    episodes, are told together too, and each is predicted by the others.
 
     Results go into a folder: report.html to open in a browser, results.json, the figures, and the joint for MuJoCo,
     URDF, Modelica, Simulink and C.
@@ -45,24 +52,32 @@ def joint(
     \b
     stickslip joint shoulder.csv --torque-constant "0.87 N m/A"
     stickslip joint shoulder.csv --kp "17.8 N m/rad" --propose next.csv
+    stickslip joint "shoulder_*.csv"
     stickslip joint episode.parquet --axis 2 --kp "17.8 N m/rad" --units "observation.state.2=deg"
     """
-    names = ("inertia", "kp", "kd", "torque_constant", "gravity", "axis")
+    names, axis = ("inertia", "kp", "kd", "torque_constant", "gravity"), options.pop("axis")
     asked = {name: options.pop(name) for name in names}
     if propose is not None and propose.exists():
         raise click.BadParameter(f"'{propose}' is there already; name another file", param_hint="--propose")
     rig = rig_of(**options)
-    groups = groups_of(file)
-    if len(groups) != 1:
-        raise click.BadParameter(f"'{file}' fits {len(groups)} logs; give one at a time", param_hint="LOG")
+    groups = [group for argument in files for group in groups_of(argument)]
     folder = output or (None if as_json else default_folder(groups, "joint"))
-    with progress(2) as tell:
-        tell(f"reading {file}", 0)
-        record = read(groups[0], rig)
+
+    def ask(record: Record) -> list[Findings]:
+        parts = list(ss.answers.episodes(record))
+        names = [f", {part.history[-1].outcome}" if len(parts) > 1 else "" for part in parts]
+        told = [ss.answers.analyze_joint(part, **asked, axis=axis) for part in parts]
+        return [replace(one, name=one.name + name) for one, name in zip(told, names, strict=True)]
+
+    with progress(2 * len(groups) + 1) as tell:
         if propose is not None:
-            log = ss.answers.axis_record(record, axis=asked["axis"])
+            log = ss.answers.axis_record(next(ss.answers.episodes(read(groups[0], rig))), axis=axis)
             ss.write_record(ss.cycle.telling_motion(log), propose)
-        tell("asking", 1)
-        found = ss.answers.analyze_joint(record, **asked)
-        written = ss.publish(found, folder=folder) if folder else None
-    show(found, written, as_json=as_json, everything=everything)
+        found, refused = answers(groups, rig, ask, tell)
+        logs = [one for part in found for one in part]
+        results = ss.answers.compare_joints(logs, **asked) if len(logs) > 1 else logs[0]
+        results = with_left_out(results, refused)
+        tell("drawing and writing", 2 * len(groups))
+        written = ss.publish(results, folder=folder) if folder else None
+    name_left_out(refused)
+    show(results, written, as_json=as_json, everything=everything)

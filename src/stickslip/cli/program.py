@@ -17,6 +17,7 @@ from stickslip.cli.rig import rig
 from stickslip.cli.simulate import bifurcation, dither, simulate, stability, sweep
 from stickslip.cli.terminal import compiling, complain, mended, say, spoken
 from stickslip.cli.thesis import thesis
+from stickslip.cli.tribometer import tribometer
 from stickslip.cli.vibrations import decay, squeak, wavelet
 from stickslip.errors import INTERRUPTED, INTERRUPTION
 
@@ -98,6 +99,7 @@ for _command in (
     stability,
     sweep,
     thesis,
+    tribometer,
     wavelet,
 ):
     main.add_command(_command)

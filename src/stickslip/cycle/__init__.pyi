@@ -2,6 +2,9 @@ from stickslip.cycle.before_slip import Presliding as Presliding
 from stickslip.cycle.before_slip import presliding as presliding
 from stickslip.cycle.joint import JointFriction as JointFriction
 from stickslip.cycle.joint import regress_joint as regress_joint
+from stickslip.cycle.joint_logs import JointLogs as JointLogs
+from stickslip.cycle.joint_logs import JointPrediction as JointPrediction
+from stickslip.cycle.joint_logs import regress_joint_logs as regress_joint_logs
 from stickslip.cycle.joint_motion import telling_motion as telling_motion
 from stickslip.cycle.joint_onset import JointBreakaway as JointBreakaway
 from stickslip.cycle.joint_onset import joint_breakaway as joint_breakaway
@@ -15,5 +18,8 @@ from stickslip.cycle.slips import SlipRinging as SlipRinging
 from stickslip.cycle.slips import slip_ringing as slip_ringing
 from stickslip.cycle.sticks import StickEvent as StickEvent
 from stickslip.cycle.sticks import Sticks as Sticks
+from stickslip.cycle.tribometer import Coefficients as Coefficients
+from stickslip.cycle.tribometer import WearIn as WearIn
+from stickslip.cycle.tribometer import friction_coefficients as friction_coefficients
 
 __all__: list[str]

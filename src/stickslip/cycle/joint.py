@@ -2,56 +2,23 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from stickslip.balance.motion import require_fit
-from stickslip.cycle.joint_columns import Sliding, Told, sliding
-from stickslip.cycle.regression import TURNING, UNITS
-from stickslip.errors import EstimateError, ModelError, RecordError
-from stickslip.estimate import NORMAL_95, Constant, Doubt, Estimate, Result, Status
-from stickslip.record.record import Record, Step, require_record
-from stickslip.signals.interpolate import without_delays
+from stickslip.cycle.joint_asked import Asked, asked_of, turning
+from stickslip.cycle.joint_fit import ADVICE, Telling, fitted
+from stickslip.estimate import Constant, Doubt, Estimate, Result, Status
+from stickslip.record.record import Record
 from stickslip.signals.noise import noise_level
-from stickslip.statistics import FEW_INDEPENDENT, LeastSquares, least_squares
+from stickslip.statistics import FEW_INDEPENDENT, LeastSquares
 
 Array = NDArray[np.float64]
 
-QUESTION = "the friction of a joint"
-LEAST = 200  # samples
-ROWS = 20  # instants at which it slides
-ROUNDS = 25  # of the regression about a load part: six are enough where the log tells it
-SETTLED = 1e-6  # of the load part between two rounds
-STARTS = (0.0, 0.3)  # of the load part: from none alone one joint in a hundred ended where gravity has the wrong sign
-SURELY = 4.0  # deviations, by which the viscous friction of both directions differs: chance gives that once in 15000
-BARELY = 0.5  # of a value: an interval that is wider on either side hardly tells it
 BIASED = 0.01  # share of noise in the power of the acceleration above which the inertia is visibly low
 WAYS = ((1.0, "forward"), (-1.0, "back"))
-CONFOUNDED, NOISY, LOADED = "confounded", "noisy", "loaded"  # kinds of doubt
-WORDS = {
-    "inertia": "inertia", "viscous": "viscous friction", "uneven": "uneven viscous friction",
-    "forward": "Coulomb friction forward", "back": "Coulomb friction back", "load": "friction per load",
-    "sine": "gravity, sine part", "cosine": "gravity, cosine part", "damping": "damping of the control loop",
-}  # fmt: skip
-ADVICE = {
-    "inertia": "accelerate harder, by steps or faster swings",
-    "viscous": "slide at several speeds, slow ones and fast ones",
-    "uneven": "slide at several speeds either way, slow ones and fast ones",
-    "forward": "pass the same places both ways, slowly and fast",
-    "back": "pass the same places both ways, slowly and fast",
-    "load": "carry another payload, or turn farther, so that gravity's torque changes",
-    "sine": "turn farther, a quarter turn at least",
-    "cosine": "turn farther, a quarter turn at least",
-    "damping": "log the torque or the motor's current, or state kd",
-}
-OPTIONAL: tuple[tuple[str, ...], ...] = (
-    ("load",),
-    ("sine", "cosine"),
-)  # left out in this order where the motion can not tell all of them apart
+NOISY, LOADED = "noisy", "loaded"  # kinds of doubt
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -138,20 +105,6 @@ class JointFriction(Result):
         return self.level.value + share * (carried - self.carried)
 
 
-@dataclass(frozen=True)
-class _Asked:
-    """What is regressed: the torque at the rows, and what was stated, each with its standard deviation's column."""
-
-    told: Told
-    torque: Array
-    terms: tuple[str, ...]
-    source: str
-    raw: Array
-    known: Array
-    unsure: tuple[Array, ...] = ()
-    stated: dict[str, Estimate] = field(default_factory=dict)
-
-
 def regress_joint(
     record: Record,
     *,
@@ -214,212 +167,20 @@ def regress_joint(
     >>> found.forward.includes(0.06), found.load.includes(0.1), round(found.inertia.value, 3)
     (True, True, 0.02)
     """
-    require_record(record)
-    constants = _constants(record, inertia=inertia, kp=kp, kd=kd, torque_constant=torque_constant)
-    record = _torqued(record, constants)
-    asked = _asked(record, constants, _turning(record) if gravity is None else gravity)
-    fit, terms, pull, left_out = _fitted(asked)
+    record, asked = asked_of(record, gravity, inertia=inertia, kp=kp, kd=kd, torque_constant=torque_constant)
+    fit, terms, pull, left_out = fitted(asked)
     return _answer(record, asked, fit, terms, pull, left_out)
 
 
-def _turning(record: Record) -> bool:
-    return "theta" in record or "x" not in record
-
-
-def _constants(record: Record, **given: Constant | None) -> dict[str, Estimate]:
-    """The stated constants, in the units of the motion."""
-    torque = "N m" if _turning(record) else "N"
-    stiff, damped, heavy = ("N m/rad", "N m s/rad", "kg m^2") if _turning(record) else ("N/m", "N s/m", "kg")
-    units = {"inertia": heavy, "kp": stiff, "kd": damped, "torque_constant": f"{torque}/A"}
-    stated = {name: Estimate.stated(name, value, units[name]) for name, value in given.items() if value is not None}
-    for name, constant in stated.items():
-        if constant.value < 0 or (constant.value == 0 and name != "kd") or not math.isfinite(constant.value):
-            raise ModelError(
-                f"{name} = {constant.value:g} {constant.unit}", f"a joint's {name} is positive", f"correct {name}="
-            )
-    return stated
-
-
-def _torqued(record: Record, constants: dict[str, Estimate]) -> Record:
-    """The record with a torque, from a current where it has none; delays taken out."""
-    position = "theta" if _turning(record) else "x"
-    used = [name for name in (position, "reference", "force", "current") if name in record]
-    record.require_clean(position, *used, question=QUESTION, samples=LEAST)
-    record = without_delays(record, *used, question=QUESTION, samples=LEAST)
-    if "force" not in record and "current" in record and "torque_constant" in constants:
-        constant = constants["torque_constant"]
-        step = Step("regress_joint", {"torque_constant": constant.value}, "torque of the current")
-        unit = "N m" if _turning(record) else "N"
-        record = record.with_channel(
-            "force", constant.value * record["current"], unit=unit, source="current", step=step
-        )
-    if "force" in record:
-        require_fit(record, "force", length="rad" if position == "theta" else "m", question=QUESTION)
-        return record
-    if not ("reference" in record and "kp" in constants):
-        lacks = "the current's torque_constant" if "current" in record else "kp" if "reference" in record else "force"
-        raise RecordError(
-            f"no torque: the record has {', '.join(record)}, and {lacks} is missing",
-            f"{QUESTION} needs a torque: measured, of a current with its constant, or of a controller with its gains",
-            "name the column of the torque (force=), give --torque-constant of a current, or --kp with the reference",
-        )
-    return record
-
-
-def _asked(record: Record, constants: dict[str, Estimate], gravity: bool) -> _Asked:
-    position = record["theta" if _turning(record) else "x"]
-    followed = "reference" in record
-    reference = record["reference"] if followed else None
-    if np.ptp(position) == 0:
-        raise EstimateError("the position never changes", f"{QUESTION} needs motion", "check the column")
-    slides = sliding(position, record.fs)
-    _refuse_still(slides, record)
-    told = Told(position, reference, slides)
-    window, rows = slides.window, slides.rows
-    terms = ["viscous", "forward", "back", *(("sine", "cosine", "load") if gravity else ())]
-    known, unsure = np.zeros(len(rows)), []
-    if "inertia" in constants:
-        column = window.apply(position, 2)[rows]
-        known, unsure = known + constants["inertia"].value * column, [constants["inertia"].sd * column]
-    else:
-        terms.insert(0, "inertia")
-    if "force" in record:
-        raw = record["force"]
-        torque = window.apply(raw)[rows]
-        scale = constants.get("torque_constant") if record.channels["force"].source == "current" else None
-        source = "current" if scale else "force"
-    else:
-        assert reference is not None
-        scale, source = constants["kp"], "reference"
-        raw = scale.value * (reference - position)
-        torque = window.apply(raw)[rows]
-        if "kd" in constants:
-            rate = window.apply(reference - position, 1)[rows]
-            raw = raw + constants["kd"].value * window.apply(reference - position, 1)
-            torque, unsure = torque + constants["kd"].value * rate, [*unsure, constants["kd"].sd * rate]
-        else:
-            terms.append("damping")
-    if scale is not None:
-        unsure.append(scale.sd / scale.value * torque)
-    gain_sd = max((record.channels[name].gain_sd for name in ("force", "current") if name in record), default=0.0)
-    unsure.append(gain_sd * torque)
-    moving = tuple(column for column in unsure if np.any(column))
-    return _Asked(told, torque, tuple(terms), source, np.asarray(raw), known, moving, constants)
-
-
-def _refuse_still(slides: Sliding, record: Record) -> None:
-    """Refuse a log that does not slide both ways for long enough."""
-    ways = [int(np.sum(slides.side[slides.rows] == side)) for side in (1, -1)]
-    if min(ways) >= ROWS // 2 and sum(ways) >= ROWS:
-        return
-    raise EstimateError(
-        f"it slides steadily faster than {slides.slowest:.2g} rad/s at {ways[0]} instants forward and {ways[1]} back",
-        f"friction is told from gravity by strokes both ways, {ROWS // 2} instants each at least",
-        "swing it back and forth, farther or faster, through the same places",
-    )
-
-
-def _fitted(asked: _Asked) -> tuple[LeastSquares, tuple[str, ...], tuple[float, float], tuple[str, ...]]:
-    """The regression, with viscous friction of each direction where these differ surely."""
-    fit, terms, pull, left_out = _separable(asked)
-    try:
-        richer = (*terms, "uneven")
-        fit_both, pull_both = _about_load(asked, richer)
-    except EstimateError:
-        return fit, terms, pull, left_out
-    uneven = fit_both.combined(np.eye(len(richer))[-1], "", "", "")
-    sure = abs(uneven.value) > SURELY * uneven.sd
-    return (fit_both, richer, pull_both, left_out) if sure else (fit, terms, pull, left_out)
-
-
-def _separable(asked: _Asked) -> tuple[LeastSquares, tuple[str, ...], tuple[float, float], tuple[str, ...]]:
-    """The regression with as many terms as the motion tells apart, and what was left out."""
-    terms, left_out = asked.terms, list[str]()
-    for optional in (*OPTIONAL, ()):
-        try:
-            fit, pull = _about_load(asked, terms)
-            return fit, terms, pull, tuple(left_out)
-        except EstimateError:
-            if not set(optional) & set(terms):
-                if optional:
-                    continue
-                raise _inseparable(asked, terms) from None
-            terms = tuple(term for term in terms if term not in optional)
-            left_out.append(f"{' and '.join(WORDS[term] for term in optional)}: {ADVICE[optional[0]]}")
-    raise _inseparable(asked, terms)
-
-
-def _about_load(asked: _Asked, terms: tuple[str, ...]) -> tuple[LeastSquares, tuple[float, float]]:
-    """The regression, linear about its own load part: of those that settle the one that leaves least."""
-    if "load" not in terms:
-        fit = _solved(asked, terms, 0.0, (0.0, 0.0))
-        return fit, _pull(fit, terms)
-    settled = [one for start in STARTS if (one := _settled(asked, terms, start)) is not None]
-    if not settled:
-        raise EstimateError(
-            "the load part does not settle", "gravity's torque is known while it slides", ADVICE["load"]
-        )
-    return min(settled, key=lambda one: float(np.linalg.norm(one[0].residual)))
-
-
-def _settled(asked: _Asked, terms: tuple[str, ...], start: float) -> tuple[LeastSquares, tuple[float, float]] | None:
-    """From a load part that is guessed; gravity's torque is first that of a joint with just so much of it."""
-    bare = tuple(term for term in terms if term != "load")
-    pull = _pull(_solved(asked, bare, 0.0, (0.0, 0.0)), bare)
-    for _ in range(2 if start else 0):
-        pull = _pull(_solved(asked, bare, start, pull), bare)
-    share = start
-    for _ in range(ROUNDS):
-        fit = _solved(asked, terms, share, pull)
-        before, share, pull = share, float(fit.coefficients[terms.index("load")]), _pull(fit, terms)
-        if abs(share - before) < SETTLED:
-            return fit, pull
-    return None
-
-
-def _solved(asked: _Asked, terms: tuple[str, ...], share: float, pull: tuple[float, float]) -> LeastSquares:
-    columns = asked.told.columns(terms, share, pull)
-    data = asked.torque - asked.known
-    if "load" in terms:  # linear about `share`: its column stands in gravity's already
-        data = data + share * columns[:, terms.index("load")]
-    instruments = None if asked.told.reference is None else asked.told.columns(terms, share, pull, told=True)
-    return least_squares(columns, data, instruments=instruments)
-
-
-def _pull(fit: LeastSquares, terms: Sequence[str]) -> tuple[float, float]:
-    if "sine" not in terms:
-        return 0.0, 0.0
-    return float(fit.coefficients[terms.index("sine")]), float(fit.coefficients[terms.index("cosine")])
-
-
-def _inseparable(asked: _Asked, terms: tuple[str, ...]) -> EstimateError:
-    """Which terms are one column to this motion, by the weakest singular vector of the columns."""
-    columns = asked.told.columns(terms, 0.0, (0.0, 0.0))
-    lengths = np.linalg.norm(columns, axis=0)
-    if not np.all(lengths > 0):
-        mixed = [term for term, length in zip(terms, lengths, strict=True) if length == 0]
-    else:
-        weakest = np.abs(np.linalg.svd(columns / lengths)[2][-1])
-        mixed = [term for term, weight in zip(terms, weakest, strict=True) if weight > 0.3 * weakest.max()]
-    return EstimateError(
-        f"{' and '.join(WORDS[term] for term in mixed)} can not be told apart in this log",
-        "every term needs motion that shows it alone",
-        "; ".join(dict.fromkeys(ADVICE[term] for term in mixed)),
-    )
-
-
-# ---- the answer
-
-
 def _answer(
-    record: Record, asked: _Asked, fit: LeastSquares, terms: tuple[str, ...], pull: tuple[float, float],
+    record: Record, asked: Asked, fit: LeastSquares, terms: tuple[str, ...], pull: tuple[float, float],
     left_out: tuple[str, ...],
 ) -> JointFriction:  # fmt: skip
-    slides = asked.told.sliding
+    slides = asked.logs[0].sliding
     rows, window = slides.rows, slides.window
     carried = _carried(asked, pull)
     status = Status(*_worries(asked, fit, terms, record))
-    tell = _Telling(asked, fit, terms, _turning(record), status)
+    tell = Telling(asked, fit, terms, turning(record), status)
     known = {term: tell.one(term) for term in terms if term != "uneven"}
     if "load" in known:
         known["load"] = known["load"].within(0.0)
@@ -429,9 +190,9 @@ def _answer(
     if "uneven" in terms:
         ways = [tell.sum({"viscous": 1, "uneven": by}, f"viscous friction {way}") for by, way in WAYS]
     inertia = replace(asked.stated["inertia"], name="inertia") if "inertia" in asked.stated else known["inertia"]
-    speed, acceleration = (window.apply(asked.told.position, order)[rows] for order in (1, 2))
-    weight = pull[0] * window.apply(np.sin(asked.told.position))[rows]
-    weight += pull[1] * window.apply(np.cos(asked.told.position))[rows]
+    speed, acceleration = (window.apply(asked.logs[0].position, order)[rows] for order in (1, 2))
+    weight = pull[0] * window.apply(np.sin(asked.logs[0].position))[rows]
+    weight += pull[1] * window.apply(np.cos(asked.logs[0].position))[rows]
     damped = known["damping"].value * _error_rate(asked) if "damping" in known else np.zeros(len(asked.raw))
     return JointFriction(
         level=level.within(0.0), forward=forward, back=back, viscous=known["viscous"], viscous_forward=ways[0],
@@ -446,18 +207,18 @@ def _answer(
     )  # fmt: skip
 
 
-def _carried(asked: _Asked, pull: tuple[float, float]) -> float:
+def _carried(asked: Asked, pull: tuple[float, float]) -> float:
     """Mean size of gravity's torque while it slides."""
-    place = asked.told.position[asked.told.sliding.rows]
+    place = asked.logs[0].position[asked.logs[0].sliding.rows]
     return float(np.mean(np.abs(pull[0] * np.sin(place) + pull[1] * np.cos(place))))
 
 
-def _level(tell: _Telling, pull: tuple[float, float], load: Estimate | None) -> Estimate:
+def _level(tell: Telling, pull: tuple[float, float], load: Estimate | None) -> Estimate:
     """Sliding friction under the mean load, which gravity's torque is part of, so that it is as unsure as that too."""
     weights = {"forward": 0.5, "back": 0.5}
     if load is None or not load.known:
         return tell.sum(weights, "sliding friction")
-    place = tell.asked.told.position[tell.asked.told.sliding.rows]
+    place = tell.asked.logs[0].position[tell.asked.logs[0].sliding.rows]
     side = np.sign(pull[0] * np.sin(place) + pull[1] * np.cos(place))
     carried, share = _carried(tell.asked, pull), load.value
     weights |= {"load": carried, "sine": share * float(np.mean(side * np.sin(place)))}
@@ -467,57 +228,13 @@ def _level(tell: _Telling, pull: tuple[float, float], load: Estimate | None) -> 
     return replace(level, value=level.value - more, interval=(low - more, high - more))
 
 
-def _error_rate(asked: _Asked) -> Array:
+def _error_rate(asked: Asked) -> Array:
     """How the error of the position changes."""
-    assert asked.told.reference is not None
-    return asked.told.sliding.window.apply(asked.told.reference - asked.told.position, 1)
+    assert asked.logs[0].reference is not None
+    return asked.logs[0].sliding.window.apply(asked.logs[0].reference - asked.logs[0].position, 1)
 
 
-@dataclass(frozen=True)
-class _Telling:
-    """Coefficients and their sums as Estimates."""
-
-    asked: _Asked
-    fit: LeastSquares
-    terms: tuple[str, ...]
-    turning: bool
-    status: str
-
-    def one(self, term: str) -> Estimate:
-        """A coefficient, with a doubt where its interval hardly tells it."""
-        estimate = self.sum({term: 1.0}, WORDS[term])
-        wide = NORMAL_95 * estimate.sd > BARELY * abs(estimate.value)
-        if not wide:
-            return estimate
-        partner = self._partner(self.terms.index(term))
-        doubt = Doubt(f"hardly told from the {WORDS[partner]}: {ADVICE[term]}", CONFOUNDED, lesser=True)
-        return replace(estimate, status=Status(self.status, doubt))
-
-    def sum(self, weights: dict[str, float], name: str) -> Estimate:
-        """A sum of coefficients."""
-        row = np.array([weights.get(term, 0.0) for term in self.terms])
-        beside = math.hypot(*(float(row @ self.fit.projection @ column) for column in self.asked.unsure), 0.0)
-        units = {**(TURNING if self.turning else UNITS), "load": "1"}
-        kind = {"forward": "coulomb", "back": "coulomb", "sine": "coulomb", "cosine": "coulomb", "damping": "viscous"}
-        unit = units[kind.get(next(iter(weights)), next(iter(weights)))]
-        how = "instruments of the reference" if self.asked.told.reference is not None else "least squares"
-        checks = (
-            f"condition number {self.fit.condition:.3g}",
-            f"residuals are worth {self.fit.independent:.0f} independent samples",
-        )
-        return self.fit.combined(
-            row, name, unit, f"{how}, windows within strokes", beside=beside, status=self.status, checks=checks
-        )
-
-    def _partner(self, index: int) -> str:
-        """The term whose coefficient goes with this one most."""
-        forms = self.fit.projection
-        alike = np.abs(forms @ forms[index]) / np.linalg.norm(forms, axis=1)
-        alike[index] = -1.0
-        return self.terms[int(np.argmax(alike))]
-
-
-def _worries(asked: _Asked, fit: LeastSquares, terms: tuple[str, ...], record: Record) -> list[Doubt | str]:
+def _worries(asked: Asked, fit: LeastSquares, terms: tuple[str, ...], record: Record) -> list[Doubt | str]:
     worries: list[Doubt | str] = []
     if "load" in asked.terms and "load" not in terms:
         worries.append(
@@ -525,10 +242,10 @@ def _worries(asked: _Asked, fit: LeastSquares, terms: tuple[str, ...], record: R
         )
     if fit.independent < FEW_INDEPENDENT * len(terms):
         worries.append(f"only {fit.independent:.0f} independent samples for {len(terms)} coefficients")
-    if asked.told.reference is None and "inertia" in terms:
-        window, rows = asked.told.sliding.window, asked.told.sliding.rows
-        column = window.apply(asked.told.position, 2)[rows]
-        noise = noise_level(asked.told.position, record.fs) * window.noise_of_acceleration
+    if asked.logs[0].reference is None and "inertia" in terms:
+        window, rows = asked.logs[0].sliding.window, asked.logs[0].sliding.rows
+        column = window.apply(asked.logs[0].position, 2)[rows]
+        noise = noise_level(asked.logs[0].position, record.fs) * window.noise_of_acceleration
         noisy = float(noise**2 / np.mean(column**2))
         if noisy > BIASED:
             words = f"noise in the acceleration lowers the inertia by about {100 * noisy:.2g} %: log the reference too"

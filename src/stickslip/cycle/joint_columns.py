@@ -136,7 +136,7 @@ class Told:
         Parameters
         ----------
         terms : tuple of str
-            Of inertia, viscous, uneven, forward, back, sine, cosine, load, damping.
+            Of inertia, viscous, uneven, forward, back, coulomb (both alike), sine, cosine, load, damping.
         load : float
             The load part about which gravity's columns are linear.
         pull : (float, float)
@@ -154,6 +154,7 @@ class Told:
             "uneven": lambda: window.apply(side * five_point_difference(position, 1) * window.fs),
             "forward": lambda: window.apply(np.maximum(side, 0.0)),
             "back": lambda: window.apply(np.minimum(side, 0.0)),
+            "coulomb": lambda: window.apply(side),
             "sine": lambda: window.apply(np.sin(position) * stronger),
             "cosine": lambda: window.apply(np.cos(position) * stronger),
             "load": lambda: window.apply(side * np.abs(carried)),

@@ -167,7 +167,7 @@ def friction_loops(
     require_fit(record, "friction", length=motion.unit, question=question)
     cycles = find_cycles(record, motion, frequency=frequency)
     friction, unit = record["friction"], record.channels["friction"].unit
-    sliding = _sliding(motion, cycles)
+    sliding = sliding_parts(motion, cycles)
     label = cycles.labels(len(friction))
     magnitudes = _magnitudes(friction, motion, sliding, label, len(cycles.edges) - 1, unit)
     energy = _energy(friction, motion, cycles)
@@ -189,7 +189,7 @@ def friction_loops(
     )
 
 
-def _sliding(motion: Motion, cycles: Cycles) -> NDArray[np.bool_]:
+def sliding_parts(motion: Motion, cycles: Cycles) -> NDArray[np.bool_]:
     """Where the contact slides, away from reversals if there is sliding left there."""
     threshold = max(CREEP * cycles.peak, AUDIBLE * motion.noise)
     fast = np.abs(motion.velocity) > threshold
@@ -201,7 +201,7 @@ def _magnitudes(
     friction: Array, motion: Motion, sliding: NDArray[np.bool_], label: NDArray[np.intp], count: int, unit: str
 ) -> dict[str, Estimate]:
     """The friction forward and back, half of their sum, and half of their difference."""
-    forward, back = (_levels(sign, friction, motion, sliding & (label >= 0), label, count) for sign in (1.0, -1.0))
+    forward, back = (levels_of(sign, friction, motion, sliding & (label >= 0), label, count) for sign in (1.0, -1.0))
     wanted = {
         "forward": ("sliding friction forward", forward),
         "back": ("sliding friction back", back),
@@ -213,7 +213,7 @@ def _magnitudes(
     return magnitudes | {key: magnitudes[key].within(0.0, otherwise=DRIVES) for key in ("forward", "back", "level")}
 
 
-def _levels(
+def levels_of(
     sign: float, friction: Array, motion: Motion, sliding: NDArray[np.bool_], label: NDArray[np.intp], count: int
 ) -> Array:
     """Magnitude of the friction to one side, per cycle; NaN where a cycle does not slide that way."""

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from stickslip.figures.plate import Plate, captioned
 from stickslip.figures.style import BLUE, INK, ORANGE, axes_of, legend_above, styled
@@ -13,15 +16,31 @@ from stickslip.figures.style import BLUE, INK, ORANGE, axes_of, legend_above, st
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+    from stickslip.answers.findings import Findings
     from stickslip.cycle.joint import JointFriction
+    from stickslip.cycle.joint_logs import JointPrediction
+
+Array = NDArray[np.float64]
 
 
 def plates_of(joint: JointFriction) -> list[Plate]:
     """The figures of one joint, in reading order."""
+    traces = joint.time, joint.measured, joint.explained
     return [
         captioned("joint", "joint-friction", partial(plot_joint, joint)),
-        captioned("joint", "joint-torque", partial(plot_torque, joint)),
+        captioned("joint", "joint-torque", partial(plot_torque, *traces, unit=joint.level.unit)),
     ]
+
+
+def plates_together(logs: Sequence[tuple[Findings, JointPrediction]]) -> list[Plate]:
+    """The torque of the log that the others predict worst, and of the one that they predict best."""
+    ordered = sorted(logs, key=lambda pair: pair[1].error)
+    plates = []
+    for place, (log, one) in (("worst", ordered[-1]), ("best", ordered[0])):
+        traces, unit = (one.time, one.measured, one.predicted), log.joint.level.unit
+        plate = captioned("joint", "joint-predicted", partial(plot_torque, *traces, unit=unit, label="by the others"))
+        plates.append(replace(plate, name=f"{plate.name}-{place}", title=f"{plate.title} {place}: {log.name}"))
+    return plates
 
 
 @styled
@@ -42,11 +61,13 @@ def plot_joint(joint: JointFriction, *, ax: Axes | None = None) -> Axes:
 
 
 @styled
-def plot_torque(joint: JointFriction, *, ax: Axes | None = None) -> Axes:
+def plot_torque(
+    time: Array, measured: Array, model: Array, *, unit: str, label: str = "explained", ax: Axes | None = None
+) -> Axes:
     """The torque while the joint slides, and what is made of it."""
-    ax, what = axes_of(ax), "torque" if joint.level.unit == "N m" else "force"
-    ax.plot(joint.time, joint.measured, ".", color=BLUE, markersize=3, label=f"{what}, smoothed")
-    ax.plot(joint.time, joint.explained, ".", color=ORANGE, markersize=2, label="explained")
-    ax.set(xlabel="time [s]", ylabel=f"{what} [{joint.level.unit}]")
+    ax, what = axes_of(ax), "torque" if unit == "N m" else "force"
+    ax.plot(time, measured, ".", color=BLUE, markersize=3, label=f"{what}, smoothed")
+    ax.plot(time, model, ".", color=ORANGE, markersize=2, label=label)
+    ax.set(xlabel="time [s]", ylabel=f"{what} [{unit}]")
     legend_above(ax, columns=2)
     return ax

@@ -7,6 +7,8 @@ from stickslip.laws.export import export_law as export_law
 from stickslip.laws.geared import Geared as Geared
 from stickslip.laws.lugre import Dahl as Dahl
 from stickslip.laws.lugre import LuGre as LuGre
+from stickslip.laws.pairs import Pair as Pair
+from stickslip.laws.pairs import pair as pair
 from stickslip.laws.rough import RoughSurface as RoughSurface
 from stickslip.laws.series import ElastoSlip as ElastoSlip
 from stickslip.laws.series import InSeries as InSeries

@@ -8,6 +8,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
+import numpy as np
+
 from stickslip.errors import ModelError
 from stickslip.laws import slider
 from stickslip.laws.base import Exit, Law, Mode, Row
@@ -231,6 +233,44 @@ class ElastoSlip:
             raise ModelError(f"elements = {elements}", "at least one", "raise elements=")
         each = stiffness / elements
         return cls([each] * elements, [each * width * (j + 0.5) / elements for j in range(elements)])
+
+    @classmethod
+    def mindlin(cls, kinetic: float, *, stiffness: float, elements: int = 12) -> ElastoSlip:
+        r"""Two spheres under a steady load, whose contact slips from its rim inwards, in equal classes of displacement.
+
+        .. math:: f = f_k\left(1 - (1 - x/x_s)^{3/2}\right), \quad x_s = \frac{3 f_k}{2 K}
+
+        from rest; every later branch is that curve twice as large, as Masing's rule has it (Mindlin and Deresiewicz,
+        Journal of Applied Mechanics 20, 1953). The elements meet it where each of them yields.
+
+        Parameters
+        ----------
+        kinetic : float
+            Sliding friction :math:`f_k` [N].
+        stiffness : float
+            Tangential stiffness K at rest [N/m].
+        elements : int
+            Number of classes.
+
+        Returns
+        -------
+        ElastoSlip
+
+        Examples
+        --------
+        >>> contact = ElastoSlip.mindlin(1.1, stiffness=192e3, elements=12)
+        >>> round(sum(contact.forces), 12)
+        1.1
+        """
+        for name, value, unit in (("kinetic", kinetic, "N"), ("stiffness", stiffness, "N/m")):
+            finite(name, value, unit=unit, positive=True)
+        if elements < 2:
+            raise ModelError(f"elements = {elements}", "a curve takes two at least", "raise elements=")
+        places = 1.5 * kinetic / stiffness * np.linspace(0, 1, elements + 1)
+        force = kinetic * (1 - (1 - np.linspace(0, 1, elements + 1)) ** 1.5)
+        chords = np.append(np.diff(force) / np.diff(places), 0.0)
+        springs = chords[:-1] - chords[1:]
+        return cls(springs.tolist(), (springs * places[1:]).tolist())
 
     @property
     def memory(self) -> Mapping[str, Row]:

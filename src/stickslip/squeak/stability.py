@@ -69,9 +69,9 @@ class Stability:
     mechanism : str
         "stable", or what feeds the growth: "mode coupling", "falling friction", "mode coupling and falling friction
         together" (neither alone is enough), "mode coupling and rising friction together" (so too, where no friction
-        falls: what damps one motion alone can feed both), "mode coupling, and falling friction too" (each alone is enough),
-        "jamming" (the contact draws itself in without oscillating, as a sprag does), or "the structure itself" (it
-        grows without any friction: dampers that feed it, springs that buckle).
+        falls: what damps one motion alone can feed both), "mode coupling, and falling friction too" (each alone is
+        enough), "jamming" (the contact draws itself in without oscillating, as a sprag does), or "the structure itself"
+        (it grows without any friction: dampers that feed it, springs that buckle).
     growth : float
         Fastest growth [1/s].
     without_coupling, without_slope : float

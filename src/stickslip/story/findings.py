@@ -24,11 +24,12 @@ from stickslip.story.story import Line, Story, Table, logged
 from stickslip.story.words import leading, number, value_of
 
 # The file that tells findings which hold a result of this name; friction.py tells all others.
-FAMILIES = {"decay": "decay", "squeaks": "squeak", "joint": "joint"}
+FAMILIES = {"decay": "decay", "squeaks": "squeak", "joint": "joint", "tribometer": "tribometer"}
 
 
 # What an engineer looks for first: these quantities lead the table, those without a value end it.
 FIRST = (
+    "coefficient of friction, plateau", "coefficient of friction, static",
     "sliding friction", "Coulomb friction", "viscous friction", "inertia", "friction coefficient",
     "static over sliding friction", "stuck share of the time", "stops per cycle", "slope of friction against speed",
     "presliding stiffness", "contact stiffness", "forcing frequency", "sliding friction forward",

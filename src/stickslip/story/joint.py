@@ -11,13 +11,14 @@ import numpy as np
 
 from stickslip.answers.findings import Comparison, Findings
 from stickslip.cycle.joint import JointFriction
+from stickslip.cycle.joint_logs import JointLogs
 from stickslip.errors import ModelError
 from stickslip.estimate import stands
-from stickslip.figures.joint import plates_of
+from stickslip.figures.joint import plates_of, plates_together
 from stickslip.laws.coulomb import LinearSlope
 from stickslip.laws.export import export_law, urdf_dynamics
 from stickslip.story.fit import ALONE, FILES
-from stickslip.story.story import Story
+from stickslip.story.story import Story, Table
 from stickslip.story.words import Caution, cautions, interval_of, number, value_of
 
 RARELY = 0.005  # of the time
@@ -35,8 +36,38 @@ def of_findings(findings: Findings) -> Story:
 
 
 def of_comparison(comparison: Comparison) -> Story:
-    """Several logs side by side."""
-    return Story(f"{len(comparison.findings)} logs compared", [])
+    """Several logs of one joint."""
+    logs = list(zip(comparison.findings, comparison.together.predictions, strict=True))
+    rows = [
+        (log.name, value_of(log.joint.level), interval_of(log.joint.level), f"{one.error:.2%}", f"{one.plain:.2%}")
+        for log, one in logs
+    ]
+    table = Table(
+        "Each log by the others", ("log", "sliding friction", "95 %", "missed", "by a plain law"), rows,
+        "Missed: what the others do not predict of the torque while it slides, over how far the torque varies (norms). "
+        "The plain law is Coulomb and viscous friction, alike both ways, beside inertia and gravity.",
+    )  # fmt: skip
+    data = [{"name": log.name, "error": one.error, "plain": one.plain} for log, one in logs]
+    return Story(
+        f"{len(logs)} logs of a joint", list(_together(comparison)),
+        list(map(Caution, _untold(comparison.together, "These logs do"))), tables=[table],
+        draw=lambda: plates_together(logs), data=lambda: {"predictions": data},
+    )  # fmt: skip
+
+
+def _together(comparison: Comparison) -> Iterator[str]:
+    together, logs = comparison.together, comparison.together.predictions
+    parts = [f"{value_of(together.forward)} forward and {value_of(together.back)} back"]
+    parts.append(f"{value_of(together.viscous)} of viscous friction")
+    if together.load is not None and together.load.known and together.load.interval[0] > 0:
+        parts.append(f"{value_of(together.load)} of gravity's torque")
+    yield f"Together the logs tell Coulomb friction of {', '.join(parts)}."
+    missed, plain = (sorted(getattr(one, name) for one in logs) for name in ("error", "plain"))
+    yield (
+        f"The torque of each log is predicted by the others but for {100 * missed[0]:.2g} to {100 * missed[-1]:.2g} % "
+        "of how far it varies; by Coulomb and viscous friction alone but for "
+        f"{100 * plain[0]:.2g} to {100 * plain[-1]:.2g} %."
+    )
 
 
 def _headline(findings: Findings) -> Iterator[str]:
@@ -78,9 +109,9 @@ def _directions(joint: JointFriction) -> Iterator[str]:
         )
 
 
-def _untold(joint: JointFriction) -> Iterator[str]:
+def _untold(joint: JointFriction | JointLogs, who: str = "This log does") -> Iterator[str]:
     for words in joint.left_out:
-        yield f"This log does not tell {words}."
+        yield f"{who} not tell {words}."
 
 
 def _data(joint: JointFriction) -> dict[str, Any]:

@@ -1,0 +1,67 @@
+"""stickslip tribometer"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+import stickslip as ss
+from stickslip.cli.options import normal_option, reading_options, result_options
+from stickslip.cli.records import (
+    answers,
+    default_folder,
+    groups_of,
+    name_left_out,
+    require_fits,
+    rig_of,
+    with_left_out,
+)
+from stickslip.cli.show import show
+from stickslip.cli.terminal import progress
+
+if TYPE_CHECKING:
+    from stickslip import Record
+    from stickslip.answers import Findings
+
+
+@click.command()
+@click.argument("files", nargs=-1, required=True, metavar="FILES...")
+@normal_option
+@click.option("--frequency", metavar="HZ", help="Strokes to and fro in a second; found unless given.")
+@result_options("FILE-tribometer")
+@reading_options
+def tribometer(
+    files: tuple[str, ...], output: Path | None, as_json: bool, everything: bool, frequency: str | None, **options: Any
+) -> None:
+    """What is the coefficient of friction, by which definition, and how does it wear in?
+
+    FILES are tests of a tribometer that slides to and fro: displacement or velocity, the friction force, and the
+    normal load, measured (normal) or stated (--normal).
+
+    Told are the coefficient by plateau, stroke, cycle and energy side by side with intervals, the static one where the
+    record tells breakaway, the wear-in over the cycles, and the friction along the stroke, cycle after cycle. Several
+    tests are told together, too.
+
+    Results go into a folder: report.html to open in a browser, results.json, and the figures.
+
+    \b
+    stickslip tribometer test.csv --channels "x=stroke [mm]" --channels "friction=Ft [N]" --normal 10
+    stickslip tribometer "test_*.csv" --channels "friction=Ft [N]" --channels "normal=Fn [N]"
+    """
+    rig = rig_of(**options)
+    groups = [group for argument in files for group in groups_of(argument)]
+    require_fits(options["normal"], groups)
+    folder = output or (None if as_json else default_folder(groups, "tribometer"))
+
+    def ask(record: Record) -> Findings:
+        return ss.answers.analyze_tribometer(record, frequency=frequency, rig=rig)
+
+    with progress(2 * len(groups) + 1) as tell:
+        found, refused = answers(groups, rig, ask, tell)
+        results = with_left_out(ss.answers.compare_tribometers(found) if len(found) > 1 else found[0], refused)
+        tell("drawing and writing", 2 * len(groups))
+        written = ss.publish(results, folder=folder) if folder else None
+    name_left_out(refused)
+    show(results, written, as_json=as_json, everything=everything)

@@ -1,0 +1,333 @@
+"""The coefficient of friction of a contact that slides to and fro, by the definitions in use, and how it wears in."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stickslip.balance.motion import Cycles, Motion, contact_motion, find_cycles, motion_channels, require_fit
+from stickslip.cycle.loops import DRIVES, levels_of, sliding_parts
+from stickslip.errors import ModelError, RecordError
+from stickslip.estimate import NORMAL_95, Constant, Doubt, Estimate, Result, Status
+from stickslip.record.record import Record, require_record
+from stickslip.signals.interpolate import without_delays
+from stickslip.statistics import correlation_time, mean_of_cycles, student
+
+Array = NDArray[np.float64]
+
+QUESTION = "the coefficient of friction"
+PLACES, ROWS = 64, 400  # of the map: along the stroke, and groups of cycles
+FEWEST = 20  # cycles, from which on a wear-in is looked for
+SURELY = 6.0  # deviations of its size: of 750 even series, alike by up to 0.9 from cycle to cycle, none came to 4.7
+SHORTEST = 2.0  # cycles that a wear-in lasts at least: shorter it is one odd value
+TIMES = 60  # tried
+WEARING = "wearing"  # kind of doubt: the coefficient still changes
+DEFINITIONS = {  # of the coefficient, beside what each is of a cycle
+    "plateau": "median while it slides, weighed by the way",
+    "by_stroke": "mean of a whole stroke forward less that of one back, half of it",
+    "by_cycle": "mean magnitude over all samples of a cycle",
+    "by_energy": "energy of a cycle over load and way",
+}
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class WearIn(Result):
+    """How the coefficient settles: ``mu(n) = final + change exp(-n / cycles)``.
+
+    Attributes
+    ----------
+    final, change : Estimate
+        The coefficient that it settles at, and by how much it begins above it.
+    cycles : Estimate
+        Cycles in which the change falls to 37 %.
+    fitted : ndarray, shape (m,)
+        The coefficient of each cycle by it.
+    """
+
+    final: Estimate
+    change: Estimate
+    cycles: Estimate
+    fitted: Array
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Coefficients(Result):
+    """The coefficient of friction by the definitions in use.
+
+    Attributes
+    ----------
+    plateau : Estimate
+        Kinetic: the friction while it slides, over the load (as :func:`friction_loops` tells its level).
+    by_stroke, by_cycle, by_energy : Estimate
+        By the mean of whole strokes, by the mean magnitude of a cycle, and by the energy of a cycle over load and way.
+    load : Estimate
+        The normal load [N].
+    of_cycles : mapping of str to ndarray, shape (m,)
+        Each of these of every cycle.
+    time : ndarray, shape (m,)
+        When each cycle begins [s].
+    wear_in : WearIn or None
+        How it settles; None where an even coefficient would have looked the same.
+    position : ndarray, shape (p,)
+        Places along the stroke [m or rad].
+    cycle : ndarray, shape (g,)
+        Number of the first cycle of each row of the map.
+    forward, back : ndarray, shape (g, p)
+        Friction over load at each place, positive where it opposes the motion; NaN where it was not met.
+    unit : str
+        Of the position.
+    measured : bool
+        Whether the load was measured, or stated.
+    status : str
+        "ok", or in words what to beware of.
+    """
+
+    plateau: Estimate
+    by_stroke: Estimate
+    by_cycle: Estimate
+    by_energy: Estimate
+    load: Estimate
+    of_cycles: Mapping[str, Array]
+    time: Array
+    wear_in: WearIn | None
+    position: Array
+    cycle: Array
+    forward: Array
+    back: Array
+    unit: str
+    measured: bool
+    status: str
+
+
+def friction_coefficients(
+    record: Record, *, normal: Constant | None = None, frequency: float | str | None = None
+) -> Coefficients:
+    r"""How large is the coefficient of friction, by which definition, and how does it wear in?
+
+    Of each cycle, with the load N of that cycle:
+
+    * plateau: the median of f while the contact slides, every sample weighed by its way, over N;
+    * by stroke: :math:`(\bar f_\text{forward} - \bar f_\text{back}) / 2N`, means of whole strokes, so that an offset of
+      the force is not in it, and a rounded corner at the reversal is;
+    * by cycle: :math:`\overline{|f|} / N` of all samples, where an offset stays (ASTM G133 asks for a mean like this);
+    * by energy: :math:`\oint f\,dx / (N \oint |dx|)` (Fouvry, Kapsa and Vincent, Wear 1995).
+
+    Each is the mean of the cycles, its interval Student's t on the scatter between them, which knows that neighbours
+    are alike, and on what the load and the force's gain are known to. A wear-in is
+    ``final + change exp(-n / cycles)``, by least squares over the plateaus; it is told where an even coefficient would
+    not look so, and then the definitions are of the cycles after three times its length, where as many as that remain.
+
+    Parameters
+    ----------
+    record : Record
+        With ``friction`` [N] and ``x`` (or ``v``); with ``normal`` [N] where the load was measured. Stated delays are
+        taken out first.
+    normal : float, str, tuple or Estimate, optional
+        The load, for a record that has none, as "10 ± 0.2 N".
+    frequency : float or str, optional
+        Strokes to and fro in a second [Hz]; found from the record when not given.
+
+    Returns
+    -------
+    Coefficients
+
+    Raises
+    ------
+    RecordError
+        A channel is missing or broken, or there is no load.
+    ModelError
+        A load that is not positive.
+    EstimateError
+        No motion to and fro, or no cycle that slides both ways.
+
+    Examples
+    --------
+    >>> t = np.arange(40000) / 1000
+    >>> v = 2e-3 * np.pi * 2 * np.cos(2 * np.pi * 2 * t)
+    >>> friction = 3.0 * np.sign(v) + np.random.default_rng(0).normal(0, 0.02, t.size)
+    >>> stroke = Record.of({"x": 2e-3 * np.sin(2 * np.pi * 2 * t), "friction": friction}, fs=1000)
+    >>> found = friction_coefficients(stroke, normal="10 N")
+    >>> found.plateau.includes(0.3), found.wear_in is None
+    (True, True)
+    """
+    require_record(record)
+    names = [*motion_channels(record, "ground"), "friction", *(["normal"] if "normal" in record else [])]
+    record.require_clean(*names, question=QUESTION)
+    record = without_delays(record, *names, question=QUESTION)
+    motion = contact_motion(record, contact="ground", question=QUESTION)
+    require_fit(record, "friction", length="m", question=QUESTION)
+    cycles = find_cycles(record, motion, frequency=frequency)
+    label = cycles.labels(len(record))
+    load, loads = _load(record, normal, label)
+    friction = record["friction"]
+    of_cycles = {name: values / loads for name, values in _forces(friction, motion, cycles, label).items()}
+    wear_in = fit_wear_in(of_cycles["plateau"])
+    steady = _steady(wear_in, len(loads))
+    status = Status(*_doubts(wear_in, steady, len(loads)), *([cycles.status] if cycles.status != "ok" else []))
+    relative = math.hypot(record.channels["friction"].gain_sd, load.sd / load.value)
+    told = {
+        name: _beside(mean_of_cycles(_called(name), of_cycles[name][steady:], unit="1", method=how), relative, status)
+        for name, how in DEFINITIONS.items()
+    }
+    position, cycle, forward, back = _map(friction, motion, label, loads)
+    return Coefficients(
+        told["plateau"], told["by_stroke"], told["by_cycle"], told["by_energy"], load=load, of_cycles=of_cycles,
+        time=motion.start + cycles.edges[:-1] / motion.fs, wear_in=wear_in, position=position, cycle=cycle,
+        forward=forward, back=back, unit=motion.unit, measured=load.method != "stated", status=status,
+    )  # fmt: skip
+
+
+def _called(name: str) -> str:
+    return f"coefficient of friction, {name.replace('_', ' ')}"
+
+
+def _load(record: Record, normal: Constant | None, label: NDArray[np.intp]) -> tuple[Estimate, Array]:
+    """The load, and that of every cycle."""
+    count = int(label.max()) + 1
+    if "normal" in record and normal is None:
+        whole = label >= 0
+        loads = np.bincount(label[whole], np.abs(record["normal"][whole]), count) / np.bincount(label[whole])
+        load = mean_of_cycles("normal load", loads, unit="N", method="measured, mean of cycles")
+        sd = record.channels["normal"].gain_sd * load.value  # that it varies is in the coefficient of each cycle
+        load = Estimate.normal("normal load", load.value, sd=sd, unit="N", method=load.method, checks=load.checks)
+    elif normal is not None:
+        load = replace(Estimate.stated("normal load", normal, "N"), method="stated")
+        loads = np.full(count, load.value)
+    else:
+        raise RecordError(
+            "no normal load: neither a channel normal nor a value",
+            f"{QUESTION} is friction over load",
+            "name its column (normal=), or state it: --normal '10 N'",
+        )
+    if not load.value > 0:
+        raise ModelError(f"a normal load of {load.value:g} N", "the load presses: it is positive", "check normal")
+    return load, loads
+
+
+def _forces(friction: Array, motion: Motion, cycles: Cycles, label: NDArray[np.intp]) -> dict[str, Array]:
+    """The friction of every cycle by each definition [N]."""
+    count = len(cycles.edges) - 1
+    slides = sliding_parts(motion, cycles) & (label >= 0)
+    forward, back = (levels_of(sign, friction, motion, slides, label, count) for sign in (1.0, -1.0))
+    means = []
+    for sign in (1.0, -1.0):
+        stroke = (label >= 0) & (sign * motion.velocity > 0)
+        means.append(np.bincount(label[stroke], friction[stroke], count) / np.bincount(label[stroke], minlength=count))
+    whole = label >= 0
+    way, middle = np.diff(motion.displacement), (friction[1:] + friction[:-1]) / 2
+    work, length = (np.concatenate([[0.0], np.cumsum(steps)]) for steps in (middle * way, np.abs(way)))
+    at = np.arange(len(work))
+    per_cycle = [np.diff(np.interp(cycles.edges, at, values)) for values in (work, length)]
+    return {
+        "plateau": (forward + back) / 2,
+        "by_stroke": (means[0] - means[1]) / 2,
+        "by_cycle": np.bincount(label[whole], np.abs(friction[whole]), count) / np.bincount(label[whole]),
+        "by_energy": per_cycle[0] / per_cycle[1],
+    }
+
+
+def _beside(coefficient: Estimate, relative: float, status: str) -> Estimate:
+    """The coefficient with what load and gain are known to, and with what is to be said of all of them."""
+    more = NORMAL_95 * relative * abs(coefficient.value)
+    below, above = (math.hypot(end - coefficient.value, more) for end in coefficient.interval)
+    interval = coefficient.value - below, coefficient.value + above
+    sd = math.hypot(coefficient.sd, relative * coefficient.value)
+    told = replace(coefficient, interval=interval, sd=sd, status=Status(coefficient.status, status))
+    return told.within(0.0, otherwise=DRIVES)
+
+
+def fit_wear_in(values: Array) -> WearIn | None:
+    """How does a coefficient settle over the cycles; None where an even one would look the same?
+
+    Parameters
+    ----------
+    values : ndarray, shape (m,)
+        Of every cycle; NaN where one has none.
+
+    Returns
+    -------
+    WearIn or None
+
+    Examples
+    --------
+    >>> cycle = np.arange(400)
+    >>> noise = np.random.default_rng(0).normal(0, 0.01, 400)
+    >>> fit_wear_in(0.3 + noise) is None
+    True
+    >>> settled = fit_wear_in(0.3 + 0.1 * np.exp(-cycle / 50) + noise)
+    >>> settled.final.includes(0.3), settled.cycles.includes(50)
+    (True, True)
+    """
+    from scipy.optimize import curve_fit
+
+    number = np.flatnonzero(np.isfinite(values)).astype(float)
+    present = values[np.isfinite(values)]
+    if len(present) < FEWEST or np.ptp(present) == 0:
+        return None
+
+    def settling(cycle: Array, final: float, change: float, cycles: float) -> Array:
+        return np.asarray(final + change * np.exp(-cycle / cycles))
+
+    begin = _first_guess(number, present)
+    low, high = [-np.inf, -np.inf, SHORTEST], [np.inf, np.inf, number[-1]]
+    try:
+        best, covariance = curve_fit(settling, number, present, begin, bounds=(low, high))
+    except RuntimeError:  # no end in its rounds: nothing that such a curve tells
+        return None
+    left = present - settling(number, *best)
+    sds = np.sqrt(np.diag(covariance) * max(1.0, correlation_time(left)))
+    if not (np.all(np.isfinite(sds)) and abs(best[1]) > SURELY * sds[1]):
+        return None
+    how, t = "least squares over the cycles", student(max(1.0, len(present) / max(1.0, correlation_time(left)) - 3))
+    names = ("coefficient of friction, worn in", "wear-in, change of the coefficient", "wear-in, cycles")
+    final, change, cycles = (
+        Estimate.normal(name, value, sd=sd, unit="1", method=how, quantile=t)
+        for name, value, sd in zip(names, best, sds, strict=True)
+    )
+    return WearIn(final, change, cycles.within(0.0), settling(np.arange(len(values), dtype=float), *best))
+
+
+def _first_guess(number: Array, values: Array) -> tuple[float, float, float]:
+    """The time that leaves least, of many; the rest is linear."""
+    best, least = (float(values.mean()), 0.0, SHORTEST), math.inf
+    for cycles in np.geomspace(1.5 * SHORTEST, number[-1] / 2, TIMES):
+        design = np.column_stack([np.ones_like(number), np.exp(-number / cycles)])
+        found = np.linalg.lstsq(design, values, rcond=None)[0]
+        left = float(np.linalg.norm(values - design @ found))
+        if left < least:
+            best, least = (float(found[0]), float(found[1]), float(cycles)), left
+    return best
+
+
+def _steady(wear_in: WearIn | None, count: int) -> int:
+    """The first cycle after the wear-in; the first of all where too few would remain."""
+    after = 0 if wear_in is None else math.ceil(3 * wear_in.cycles.value)
+    return after if after <= count // 2 else 0
+
+
+def _doubts(wear_in: WearIn | None, steady: int, count: int) -> list[Doubt]:
+    if wear_in is None or steady:
+        return []
+    words = f"it is still wearing in after {count} cycles: the mean is not of a state that lasts"
+    return [Doubt(words, WEARING)]
+
+
+def _map(friction: Array, motion: Motion, label: NDArray[np.intp], loads: Array) -> tuple[Array, Array, Array, Array]:
+    """Friction over load along the stroke, of groups of cycles (Belin and Martin, Wear 1992, call it triboscopy)."""
+    group = max(1, math.ceil(len(loads) / ROWS))
+    rows = math.ceil(len(loads) / group)
+    low, high = np.quantile(motion.displacement, [0.001, 0.999])
+    place = np.clip(((motion.displacement - low) / (high - low) * PLACES).astype(int), 0, PLACES - 1)
+    maps = []
+    for sign in (1.0, -1.0):
+        stroke = (label >= 0) & (sign * motion.velocity > 0)
+        cell = label[stroke] // group * PLACES + place[stroke]
+        count = np.bincount(cell, minlength=rows * PLACES)
+        total = np.bincount(cell, sign * friction[stroke] / loads[label[stroke]], minlength=rows * PLACES)
+        maps.append(np.where(count > 0, total / np.maximum(count, 1), np.nan).reshape(rows, PLACES))
+    edges = np.linspace(low, high, PLACES + 1)
+    return (edges[1:] + edges[:-1]) / 2, group * np.arange(rows, dtype=float), maps[0], maps[1]
