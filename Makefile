@@ -33,8 +33,7 @@ docs: $(VENV)/.docs
 	$(BIN)/sphinx-build -W --keep-going -b html docs docs/_build/html
 
 paper: $(VENV)/.user
-	mkdir -p docs/_build
-	$(BIN)/python docs/paper/make.py > docs/_build/paper.md
+	$(BIN)/python docs/paper/make.py docs/_build/paper
 
 bench: $(VENV)/.dev
 	$(BIN)/python benchmarks/run.py

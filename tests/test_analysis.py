@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 import stickslip as ss
-from stickslip.answers.comparison import compare
 from stickslip.answers.findings import Comparison, Findings, record_name
+from stickslip.answers.many import compare
 from stickslip.answers.preparation import mend
 from stickslip.answers.questions import analyze
 from stickslip.errors import EstimateError, ModelError

@@ -39,7 +39,8 @@ from websockets.sync.client import connect
 import stickslip as ss
 from labs import Lab, running_lab
 from stickslip.cli.program import main
-from stickslip.lab import data, security
+from stickslip.lab import data
+from stickslip.lab import server as gate
 from stickslip.lab.server import PatientProtocol, lab_app
 
 ENDED = ("done", "refused", "broken", "cancelled")
@@ -334,7 +335,7 @@ def impatient(monkeypatch: pytest.MonkeyPatch) -> Iterator[int]:
     monkeypatch.setattr(PatientProtocol, "patience", 0.2)
     monkeypatch.setattr(PatientProtocol, "hurry", 0.1)
     monkeypatch.setattr(PatientProtocol, "most", 8)
-    monkeypatch.setattr(security, "SILENCE", 0.2)
+    monkeypatch.setattr(gate, "SILENCE", 0.2)
 
     async def reads(request: Request) -> Response:
         return PlainTextResponse(str(len(await request.body())))
@@ -344,7 +345,7 @@ def impatient(monkeypatch: pytest.MonkeyPatch) -> Iterator[int]:
         door.listen()
         port = door.getsockname()[1]
         app = Starlette(routes=[Route("/alive", reads), Route("/jobs", reads, methods=["POST"])],
-                        middleware=[Middleware(security.Guard, token="t", port=port)],
+                        middleware=[Middleware(gate.Guard, token="t", port=port)],
                         exception_handlers=lab_app(token="t", port=port).exception_handlers)  # fmt: skip
         server = uvicorn.Server(uvicorn.Config(app, http=PatientProtocol, lifespan="off", log_config=None))
         serving = threading.Thread(target=server.run, kwargs={"sockets": [door]})

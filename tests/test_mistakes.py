@@ -15,7 +15,7 @@ from click.testing import CliRunner, Result
 
 import stickslip as ss
 from stickslip.cli.program import main
-from stickslip.consistent.slips import Amplitudes, mixups
+from stickslip.consistent.checks import Amplitudes, mixups
 
 RIG = ("--mass", "2", "--stiffness", "3000", "--damping", "1")
 HEADER = "t [s],x [m],z [m],a [m/s^2],load [N]"

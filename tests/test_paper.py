@@ -27,6 +27,9 @@ def test_it_is_written_from_computed_numbers(monkeypatch: pytest.MonkeyPatch) ->
     sys.modules.pop("make")
     assert values["mean_of_singles"] == pytest.approx(values["of_the_ends"], rel=1e-12), "the mean telescopes"
     assert abs(values["stiffness_by_likelihood"] / values["true_stiffness"] - 1) < 0.01
+    assert values["stiffness_by_slopes"] < 0.97 * values["true_stiffness"], "sensors and smoothing tilt the sticks"
+    assert not values["failed_with_more"]
+    assert 2500 < len(text.split()) < 3500, "with its four figures some eight pages"
     assert f"| same | {values['verdicts']['same']} |" in text
     assert len(re.findall(r"\| (?:corrected|contradicts itself) \|$", text, re.MULTILINE)) == len(values["corrected"])
     assert "{{" not in text

@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from matplotlib.figure import Figure
 
 import stickslip as ss
-from stickslip.answers.comparison import compare
 from stickslip.answers.findings import Findings
+from stickslip.answers.many import compare
 from stickslip.answers.questions import analyze
 from stickslip.figures.contact import plot_velocity_loop
 from stickslip.figures.friction import plot_load_dependence

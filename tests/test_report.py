@@ -15,8 +15,8 @@ import pytest
 
 import stickslip as ss
 from stickslip import whole
-from stickslip.answers.comparison import compare
 from stickslip.answers.findings import Findings
+from stickslip.answers.many import compare
 from stickslip.answers.questions import analyze
 from stickslip.errors import EstimateError, ModelError, StickslipError
 from stickslip.estimate import Doubt, Estimate, Status

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
 import stickslip as ss
-from stickslip_thesis import chapter7, page, printed, sketches
+from stickslip_thesis import beyond, chapter7, page, printed, sketches, small
 
 Sketch = Callable[[printed.Given], Figure]
 
-OURS = {"4": 1, "6": 1, "7": 2, "beyond": 4}  # figures that the thesis does not have
+OURS = {"4": 1, "6": 1, "7": 2, "beyond": 8}  # figures that the thesis does not have
 
 
 @pytest.mark.parametrize("chapter", page.CHAPTERS)
@@ -38,6 +39,37 @@ def test_the_critical_load_falls_with_wetness() -> None:
         assert ss.stability(rig, speed=-0.1).growth == pytest.approx(
             ss.stability(ss.squeak.squeak_rig(surface, 6.13), speed=-0.1).growth, rel=1e-9
         )
+
+
+def test_a_dither_for_what_was_identified_serves_others_with_a_margin() -> None:
+    given = printed.given()
+    period = 1 / beyond.dither(given)[0].frequency
+    smallest, more = beyond.tried(given, 1.0), beyond.tried(given, beyond.STRONGER)
+    assert all(before > 3 * period for before, _ in smallest.values())
+    assert smallest["the rig"][1] < period
+    assert {name for name, (_, after) in smallest.items() if after > period} == {"less stiffness", "more friction"}
+    assert all(after < period for _, after in more.values())
+
+
+def test_more_damping_leaves_fewer_micro_slips_whatever_the_geometry() -> None:
+    given = printed.given()
+    maps = {geometry: small.counted(given, geometry) for geometry in small.GEOMETRIES}
+    for counts in maps.values():
+        assert np.mean(counts[0]) > np.mean(counts[-1]) == 0
+    assert np.ptp(maps["flat"], axis=1).max() == 0, "loads and motions in proportion, and so everything"
+    assert maps["rough"][0, -1] > maps["sphere"][0, -1] > maps["flat"][0, -1]
+
+
+def test_micro_slips_are_heard() -> None:
+    given = printed.given()
+    assert 3 < small.level(small.sound(given, "case2")) - small.level(small.sound(given, "case1")) < 6
+
+
+def test_a_lag_behind_the_contact_s_spring_rounds_what_falls() -> None:
+    """The peak where sliding begins comes late, and friction is less where the motion slows down."""
+    at_once, late = (small.delayed(printed.given(), lag) for lag in (0.0, 0.003))
+    slowing = (at_once["v"] > 2e-3) & (at_once["v"] < 8e-3) & (at_once["a"] < 0)
+    assert np.mean(late["friction"][slowing]) < np.mean(at_once["friction"][slowing]) - 0.02
 
 
 def words_of(drawn: Figure) -> str:

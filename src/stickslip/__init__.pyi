@@ -22,8 +22,8 @@ from stickslip import squeak as squeak
 from stickslip import story as story
 from stickslip import systems as systems
 from stickslip import twin as twin
-from stickslip.answers.comparison import compare as compare
 from stickslip.answers.decays import analyze_decay as analyze_decay
+from stickslip.answers.many import compare as compare
 
 # questions
 from stickslip.answers.on_twins import tried as tried

@@ -76,11 +76,11 @@ class Compilation(event.Listener):  # type: ignore[misc]  # numba tells no types
         return made
 
 
-def _say(words: str) -> None:
+def _say(sentence: str) -> None:
     """To who sits before a prompt of Python; else to who listens to the log of the package."""
     if hasattr(sys, "ps1"):
-        print(f"stickslip: {words}", file=sys.stderr)
-    logging.getLogger(__package__).info(words)
+        print(f"stickslip: {sentence}", file=sys.stderr)
+    logging.getLogger(__package__).info(sentence)
 
 
 compilation = Compilation()
@@ -157,8 +157,8 @@ def digest(file: Path) -> str:
 
 
 def _digest(texts: dict[Path, str]) -> str:
-    held = (f"{file.relative_to(PACKAGE).as_posix()}\0{texts[file]}" for file in sorted(texts))
-    return hashlib.sha256("\0".join(held).encode()).hexdigest()[:16]
+    sources = (f"{file.relative_to(PACKAGE).as_posix()}\0{texts[file]}" for file in sorted(texts))
+    return hashlib.sha256("\0".join(sources).encode()).hexdigest()[:16]
 
 
 def _closure(text: str) -> dict[Path, str]:

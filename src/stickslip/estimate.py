@@ -369,7 +369,7 @@ def table_of(title: str, estimates: Iterable[Estimate]) -> str:
         title,
         ("quantity", "value", "95 % interval", "", "method"),
         rows,
-        [f"{n} {words}" for words, n in reasons.items()],
+        [f"{n} {reason}" for reason, n in reasons.items()],
     )
 
 

@@ -194,15 +194,15 @@ def places(part: Any, within: Path = ()) -> dict[Path, Any]:
     >>> [".".join(path) for path in places(slider)][-4:]
     ['law.stiffness', 'law.damping', 'law.static', 'law.rule']
     """
-    found = {(*within, field.name): part for field in fields(part)}
+    parts = {(*within, field.name): part for field in fields(part)}
     for name in PARTS:
         inner = getattr(part, name, None)
         if name == "contacts" and inner is not None:
             for number, contact in enumerate(inner, start=1):
-                found |= places(contact, (*within, name, str(number)))
+                parts |= places(contact, (*within, name, str(number)))
         elif is_dataclass(inner):
-            found |= places(inner, (*within, name))
-    return found
+            parts |= places(inner, (*within, name))
+    return parts
 
 
 def find(system: Any, name: str) -> tuple[Path, ...]:

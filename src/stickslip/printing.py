@@ -57,7 +57,7 @@ def html_table(title: str, headings: Sequence[str], rows: Iterable[Sequence[str]
     def cells(row: Sequence[str], tag: str) -> str:
         return "".join(f'<{tag} style="text-align: left">{escape(printable(cell))}</{tag}>' for cell in row)
 
-    told = "".join(f"<p>{escape(printable(note))}</p>" for note in notes)
+    remarks = "".join(f"<p>{escape(printable(note))}</p>" for note in notes)
     body = "".join(f"<tr>{cells(row, 'td')}</tr>\n" for row in rows)
     heading = f"<p><b>{escape(printable(title))}</b></p>\n" if title else ""
-    return f"{heading}<table><thead><tr>{cells(headings, 'th')}</tr></thead>\n<tbody>{body}</tbody></table>{told}"
+    return f"{heading}<table><thead><tr>{cells(headings, 'th')}</tr></thead>\n<tbody>{body}</tbody></table>{remarks}"

@@ -292,14 +292,14 @@ def _rises(motion: Trajectory, level: float) -> list[float]:
     """Instants at which the velocity rises through a level [m/s]."""
     times = np.linspace(0, motion.duration, 20_001)
     above = motion.sample(times, ("v",))[0][0] >= level
-    found = []
+    ends = []
     for j in np.flatnonzero(~above[:-1] & above[1:]):
         low, high = times[j], times[j + 1]
         for _ in range(60):
             middle = (low + high) / 2
             low, high = (low, middle) if motion.state(middle)["v"] >= level else (middle, high)
-        found.append(float(high))
-    return found
+        ends.append(float(high))
+    return ends
 
 
 def _pull(motion: Trajectory) -> float:

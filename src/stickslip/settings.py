@@ -136,9 +136,7 @@ def checked(
             step = f"add {path[0]} = {value if 'dict' in str(kind) else 'VALUE'}"
             raise ModelError(f"{where} has no {key}", f"{key} is needed", step) from error
         raise ModelError(
-            f"{where} sets {key} = {_shown(first['input'])}",
-            _said(first["msg"]),
-            f"correct {key}",
+            f"{where} sets {key} = {_shown(first['input'])}", _mended(first["msg"]), f"correct {key}"
         ) from error
 
 
@@ -164,7 +162,7 @@ def _shown(value: object) -> str:
     return text if len(text) <= SHOWN else f"{text[:SHOWN]}..."
 
 
-def _said(message: str) -> str:
+def _mended(message: str) -> str:
     """What a model says of a value, in the words of a settings file."""
     said = message.removeprefix("Value error, ").replace("Input should", "it should")
     said = (
@@ -175,12 +173,12 @@ def _said(message: str) -> str:
 
 def line_of(path: Sequence[str], lines: Sequence[str]) -> str:
     """ ", line N," of the innermost key of `path` that the text shows; a number after a key counts its headings."""
-    found, first, last = None, 0, len(lines)
+    row, first, last = None, 0, len(lines)
     for depth, key in enumerate(path):
         if key.isdigit():
             continue
-        words = [part for part in path[: depth + 1] if not part.isdigit()]
-        dotted = r"\s*\.\s*".join(rf"""["']?{re.escape(part)}["']?""" for part in words)
+        keys = [part for part in path[: depth + 1] if not part.isdigit()]
+        dotted = r"\s*\.\s*".join(rf"""["']?{re.escape(part)}["']?""" for part in keys)
         alone = rf"""["']?{re.escape(key)}["']?"""
         pattern = re.compile(rf"^\s*(\[\[?\s*)?(?:{dotted}|{alone})\s*[\]=.]")
         places = [n for n in range(first, last) if pattern.match(lines[n])]
@@ -188,13 +186,13 @@ def line_of(path: Sequence[str], lines: Sequence[str]) -> str:
             continue
         number = int(path[depth + 1]) if path[depth + 1 : depth + 2] and path[depth + 1].isdigit() else 1
         headings = [n for n in places if re.match(rf"\s*\[\[?\s*(?:{dotted})\s*\]", lines[n])]
-        found = headings[number - 1] if 0 < number <= len(headings) else places[0]
-        heading = re.match(r"\s*\[\[?\s*([^\]]*?)\s*\]", lines[found])
+        row = headings[number - 1] if 0 < number <= len(headings) else places[0]
+        heading = re.match(r"\s*\[\[?\s*([^\]]*?)\s*\]", lines[row])
         if heading:  # the keys of a table stand between its heading and the next one that is not a part of it
             part = re.compile(rf"\s*\[\[?\s*{re.escape(heading[1])}\s*\.")
-            ends = (n for n in range(found + 1, last) if lines[n].lstrip().startswith("[") and not part.match(lines[n]))
-            first, last = found + 1, next(ends, last)
-    return "" if found is None else f", line {found + 1},"
+            ends = (n for n in range(row + 1, last) if lines[n].lstrip().startswith("[") and not part.match(lines[n]))
+            first, last = row + 1, next(ends, last)
+    return "" if row is None else f", line {row + 1},"
 
 
 def nearest(key: str, known: Iterable[str]) -> str:
@@ -204,9 +202,9 @@ def nearest(key: str, known: Iterable[str]) -> str:
 
 
 def _not_toml(name: str, text: str, reason: str) -> ModelError:
-    found = re.search(r"line (\d+)", reason)
+    match = re.search(r"line (\d+)", reason)
     lines = text.splitlines()
-    number = int(found[1]) if found else len(lines)
+    number = int(match[1]) if match else len(lines)
     line = lines[number - 1].strip()[:SHOWN] if 0 < number <= len(lines) else ""
     bare_point = re.search(r"(?:^|[=\[,\s])([-+]?)\.(\d+)", line)
     if bare_point:

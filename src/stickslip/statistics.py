@@ -333,7 +333,7 @@ def least_squares(design: ArrayLike, data: ArrayLike, *, instruments: ArrayLike 
     independent = count / correlation_time(residual)
     leverage = np.einsum("ij,ji->i", unit, projection)
     sure = [_influenced(form, residual, independent, terms) for form in projection]
-    sd = np.array([each for each, _ in sure]) / lengths
+    sd = np.array([value for value, _ in sure]) / lengths
     return LeastSquares(
         scaled / lengths, sd, np.array([freedom for _, freedom in sure]), residual, condition, independent,
         projection / lengths[:, None], np.clip(leverage * count / independent, 0.0, MOST_LEVERAGE),
@@ -352,6 +352,6 @@ def follows(measured: Array, model: Array) -> float:
     90.0
     """
     both = np.isfinite(measured) & np.isfinite(model)
-    left, whole = (measured - model)[both], measured[both]
+    residual, whole = (measured - model)[both], measured[both]
     size = float(np.linalg.norm(whole - whole.mean()))
-    return 100 * (1 - float(np.linalg.norm(left - left.mean())) / size) if size else 0.0
+    return 100 * (1 - float(np.linalg.norm(residual - residual.mean())) / size) if size else 0.0

@@ -130,9 +130,9 @@ def _claimed(folder: Path) -> ExitStack | None:
             continue
         with os.fdopen(handle, "w") as file:
             file.write(own)
-        held = ExitStack()
-        held.callback(path.unlink, missing_ok=True)
-        return held
+        stack = ExitStack()
+        stack.callback(path.unlink, missing_ok=True)
+        return stack
     return None
 
 

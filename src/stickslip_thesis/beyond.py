@@ -12,14 +12,18 @@ from numpy.typing import NDArray
 
 import stickslip as ss
 from stickslip.figures.plate import Plate
-from stickslip.figures.style import BLUE, FAINT, GREEN, ORANGE, PURPLE, styled
-from stickslip_thesis import chapter3
+from stickslip.figures.style import BLUE, FAINT, GREEN, INK, ORANGE, PURPLE, styled
+from stickslip.maps.dither import longest_stick
+from stickslip_thesis import chapter3, chapter4, small
 from stickslip_thesis.drawing import around, exact, figure, panels, tag
 from stickslip_thesis.printed import Given, Ours
 
 Array = NDArray[np.float64]
 
 TITLE = "Beyond the thesis: what section 8.2 leaves for future studies"
+STRONGER = 1.1  # times the smallest dither
+LAPS = (16, 40)  # cycles of the slow motion: let pass, and in all, as the search for a dither has them
+OFTEN = {"stiffness": "stiffness", "kinetic": "friction"}  # what a contact changes by a tenth
 STARTS_FROM = ("beyond", "stick_slip", "sliding")  # sections of given.toml
 
 
@@ -59,16 +63,22 @@ def plates(given: Given) -> Iterator[Plate]:
         "shown ring too slowly to be read within one stick.",
         title="What the transition oscillation depends on",
     )
-    found, ring = dither(given)
-    before, after = (1e3 * longest for longest in found.sticks)
+    designed, ring = dither(given)
+    period = 1 / designed.frequency
+    left = [name for name, (_, after) in tried(given, 1.0).items() if after > period]
+    more = [name for name, (_, after) in tried(given, STRONGER).items() if after > period]
     yield figure(
         "dither",
         _dithered(given),
-        f"The contact rings at {ring:.1f} Hz, read from the acceleration. A dither well above it, "
-        f"{found.frequency:.0f} Hz along the contact, removes sticks from {1e6 * found.amplitude.value:.2f} µm on: "
-        f"the longest one falls from {before:.1f} to {after:.1f} ms, less than a period of the dither.",
-        title="A dither chosen from the transition oscillation removes stick-slip",
+        f"A record of the virtual rig, with its sensors' faults, tells how the contact rings ({ring:.1f} Hz), and by "
+        f"that and the loops' level a contact is built. What removes its sticks, {1e6 * designed.amplitude.value:.2f} "
+        f"µm along the contact at {designed.frequency:.0f} Hz, is tried on rigs that are not the one identified: (a) "
+        f"the rig that was measured; (b) the longest stick without and with it, and with {STRONGER:g} times as much "
+        f"(dotted: a period of the dither). It leaves sticks in {' and '.join(left) or 'none'}; with more, in "
+        f"{' and '.join(more) or 'none'}.",
+        title="A dither designed from what was identified, on rigs that were not",
     )
+    yield from small.plates(given)
 
 
 def behind_the_spring(given: Given) -> dict[str, Any]:
@@ -176,30 +186,76 @@ def _ringing(given: Given) -> Any:
 
 
 def dither(given: Given) -> tuple[Any, float]:
-    """The smallest dither that removes the sticks of case 2, chosen from its ringing; and that ringing [Hz]."""
-    return _dither(stick_slip(given))
+    """The smallest dither that removes the sticks of what was identified, and the frequency of its ringing [Hz]."""
+    return _dither(chapter4.measured(given), stick_slip(given))
 
 
 @functools.lru_cache(4)
-def _dither(system: ss.Oscillator) -> tuple[Any, float]:
-    record = ss.simulate(system, cycles=10).record(fs=4000)
-    found = ss.contact.transition(record.between(2 / system.drive.frequency, record.duration))
-    return ss.dither(system, transition=found), found.frequency.value
+def _dither(record: ss.Record, rig: ss.Oscillator) -> tuple[Any, float]:
+    """Of the rig its mass, spring and base are known; its contact is what the record tells."""
+    ringing = ss.contact.transition(record)
+    ratio = ringing.damping.value
+    natural = 2 * math.pi * ringing.frequency.value / math.sqrt(1 - ratio**2)
+    law = ss.laws.CompliantContact(
+        ss.friction_loops(record).level.value,
+        stiffness=rig.mass * natural**2 - rig.stiffness,
+        damping=2 * ratio * rig.mass * natural,
+    )
+    return ss.dither(rig.having(law=law), transition=ringing), ringing.frequency.value
+
+
+def tried(given: Given, times: float) -> dict[str, tuple[float, float]]:
+    """The longest stick [s] of rigs that were not identified, without the dither and with some times as much."""
+    designed, _ = dither(given)
+    amplitude = times * designed.amplitude.value
+    return {name: _sticks(rig, amplitude, designed.frequency) for name, rig in others(given).items()}
+
+
+def others(given: Given) -> dict[str, ss.Oscillator]:
+    """The rig that was measured, and such as differ from it by what a contact changes from day to day: ours."""
+    rig = stick_slip(given)
+    law = rig.law
+    rigs = {"the rig": rig}
+    for name in ("stiffness", "kinetic"):
+        for share, words in ((0.9, "less"), (1.1, "more")):
+            rigs[f"{words} {OFTEN[name]}"] = rig.having(**{f"law.{name}": share * getattr(law, name)})
+    for share, words in ((0.5, "half"), (2.0, "twice")):
+        rigs[f"{words} the damping"] = rig.having(**{"law.damping": share * law.damping})
+    return rigs
+
+
+@functools.lru_cache(32)
+def _sticks(rig: ss.Oscillator, amplitude: float, frequency: float) -> tuple[float, float]:
+    dithered = rig.having(drive=ss.drives.Dithered(rig.drive, amplitude=amplitude, frequency=frequency))
+    settled, whole = (laps / rig.drive.frequency for laps in LAPS)
+    before, after = (longest_stick(ss.simulate(one, duration=whole), settled) for one in (rig, dithered))
+    return before, after
 
 
 @styled
 def _dithered(given: Given) -> Any:
-    found, _ = dither(given)
-    drawn, axes = panels(2, height=4.4)
-    period = 1 / given["stick_slip"]["frequency"]
-    for system, words, colour in ((stick_slip(given), "without", FAINT), (found.system, "with dither", BLUE)):
+    designed, _ = dither(given)
+    drawn, axes = panels(1, 2, height=3.2)
+    rig, period = stick_slip(given), 1 / given["stick_slip"]["frequency"]
+    tone = {"amplitude": designed.amplitude.value, "frequency": designed.frequency}
+    dithered = rig.having(drive=ss.drives.Dithered(rig.drive, **tone))
+    for system, label, colour in ((rig, "without", FAINT), (dithered, "with dither", BLUE)):
         run = ss.simulate(system, duration=12 * period)
-        time, motion = exact(run, first=10 * period, last=12 * period, names=("x", "v"))
-        for ax, name in zip(axes, ("x", "v"), strict=True):
-            ax.plot(time - time[0], 1e3 * motion[name], color=colour, linewidth=0.9, label=words)
-    axes[0].set_ylabel("displacement [mm]")
-    axes[1].set(xlabel="time [s]", ylabel="velocity [mm/s]")
-    axes[0].legend(ncols=2, loc="lower right", bbox_to_anchor=(1, 1))
+        time, motion = exact(run, first=11 * period, last=12 * period, names=("v",))
+        axes[0].plot(time - time[0], 1e3 * motion["v"], color=colour, linewidth=0.9, label=label)
+    axes[0].set(xlabel="time [s]", ylabel="velocity [mm/s]")
+    axes[0].legend(loc="lower right", bbox_to_anchor=(1, 1), ncols=2)
+    rows = {times: tried(given, times) for times in (1.0, STRONGER)}
+    for place, name in enumerate(rows[1.0]):
+        axes[1].plot(1e3 * rows[1.0][name][0], place, "o", color=FAINT, markersize=5)
+        axes[1].plot(1e3 * rows[1.0][name][1], place, "o", color=BLUE, markersize=5)
+        axes[1].plot(1e3 * rows[STRONGER][name][1], place, "|", color=INK, markersize=8)
+    axes[1].axvline(1e3 / designed.frequency, color=INK, linestyle=":", linewidth=0.9)
+    axes[1].set(xlabel="longest stick [ms]", xscale="log", xticks=[3, 5, 10, 20, 50])
+    axes[1].minorticks_off()
+    axes[1].xaxis.set_major_formatter("{x:g}")
+    axes[1].set_yticks(range(len(rows[1.0])), list(rows[1.0]))
+    axes[1].invert_yaxis()
     for ax, letter in zip(axes, "ab", strict=True):
         tag(ax, letter)
     return drawn

@@ -140,10 +140,10 @@ def _measured(mass: float, spring: float, law: Any, base: float, frequency: floa
     return ss.friction_force(record, mass=mass, stiffness=spring, method="fusion")
 
 
-def measured(given: Given, case: int) -> ss.Record:
-    """What the virtual rig makes of one of the three cases: two seconds, with friction."""
+def measured(given: Given, case: int, *, surface: int = 4) -> ss.Record:
+    """What the virtual rig makes of one of the three cases: two seconds, with friction, on one of many surfaces."""
     told = given["sliding"]
-    law = ss.laws.RoughSurface(contact(given, case), share=told["roughness"], length=2e-4, span=2e-3, seed=4)
+    law = ss.laws.RoughSurface(contact(given, case), share=told["roughness"], length=2e-4, span=2e-3, seed=surface)
     return _measured(told["mass"], told["spring"], law, base_for(given, case), told["frequency"][case])
 
 

@@ -20,6 +20,7 @@ UNITS = {
     "amplitude": "m", "base": "m", "forced_base": "m", "dry": "m", "estimated_dry": "m", "speed": "m/s",
     "mounting_frequency": "Hz", "reflector": "Hz", "microphone": "m", "room": "dB", "radiator": "m^2",
     "gravity": "m/s^2", "fs": "Hz", "frequency": "Hz", "forced": "Hz", "transition": "Hz", "phase": "rad",
+    "slider": "kg", "radius": "m", "face": "m^2", "distance": "m", "delay": "s",
     "natural": "rad/s", "rate": "1/(N s)", "steepness": "s/m", "constant": "s", "hold": "s", "lag": "s",
 }  # fmt: skip
 LETTERS = {

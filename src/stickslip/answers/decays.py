@@ -100,30 +100,32 @@ class Decay(Result):
         if self.motion is not None and self.against < CLEAR and self.motion.choice.status == "ok":
             return self.motion
         swings = cast(BothFrictions | None, self.older.get(EXTREMES))  # of extremes alone, and they tell both
-        found = next((each for each in (self.waveform, self.thesis, self.motion, swings) if each is not None), None)
-        assert found is not None
-        return found
+        best = next(
+            (answer for answer in (self.waveform, self.thesis, self.motion, swings) if answer is not None), None
+        )
+        assert best is not None
+        return best
 
     @property
     def against(self) -> float:
         """How likely a record like this is if viscous and dry friction are the motion: the greatest p-value of them."""
         tried = () if self.motion is None else self.motion.choice.candidates
-        return max((each.p_value for each in tried if each.name in PLAIN), default=1.0)
+        return max((candidate.p_value for candidate in tried if candidate.name in PLAIN), default=1.0)
 
     @property
     def rest(self) -> float:
         """Where the spring is at rest, in the record's zero."""
         if self.motion is not None and self.best is self.motion:
             return self.motion.choice.chosen.fitted.value("rest")
-        told = next((each.bias.value for each in (self.waveform, self.thesis) if each is not None), None)
-        return self.releases.ring_downs[0].rest if told is None else told
+        rest = next((answer.bias.value for answer in (self.waveform, self.thesis) if answer is not None), None)
+        return self.releases.ring_downs[0].rest if rest is None else rest
 
     @property
     def whichever(self) -> tuple[Estimate, ...]:
         """Damping ratio and dry friction with the intervals that hold whichever motion not rejected it was, if any."""
         fit = self.waveform if self.waveform is not None and self.waveform.motions else self.motion
         both = () if fit is None else (fit.damping_ratio_any, fit.dry_displacement_any)
-        return tuple(each for each in both if each is not None)
+        return tuple(estimate for estimate in both if estimate is not None)
 
     @property
     def viscous_residual(self) -> float | None:
@@ -163,9 +165,9 @@ class Decay(Result):
         fits = self.waveform.motions if self.waveform is not None and self.waveform.motions else ()
         tried = [fit.choice for fit in fits or ([] if self.motion is None else [self.motion])]
         without = [
-            len(tried) * min(choice.candidate(each.name).p_value for choice in tried)
-            for each in (tried[0].candidates if tried else ())
-            if "dry_displacement" not in each.fitted.motion.terms
+            len(tried) * min(choice.candidate(candidate.name).p_value for choice in tried)
+            for candidate in (tried[0].candidates if tried else ())
+            if "dry_displacement" not in candidate.fitted.motion.terms
         ]
         if without:
             return dry.interval[0] > 0 and max(without) < CHANCE
@@ -186,16 +188,16 @@ class Decay(Result):
     def quoted(self) -> tuple[Estimate, ...]:
         """The best answer's numbers, with one damping ratio: that of whichever motion, where its own is denied."""
         force = self.dry_force
-        found = [] if force is None else [force]
+        quoted = [] if force is None else [force]
         if self.motion is not None and self.best is self.motion:
-            found += [*self.motion.terms, self.motion.frequency, *self.whichever]
+            quoted += [*self.motion.terms, self.motion.frequency, *self.whichever]
         elif self.waveform is None:
-            found += self.best.estimates
+            quoted += self.best.estimates
         else:
-            found += [estimate for estimate in self.waveform.estimates if estimate is not self.waveform.dry_force]
-            found += [] if self.waveform.motions else self.whichever
+            quoted += [estimate for estimate in self.waveform.estimates if estimate is not self.waveform.dry_force]
+            quoted += [] if self.waveform.motions else self.whichever
         other = self._other_ratio
-        return tuple(each for each in found if each is not other)
+        return tuple(estimate for estimate in quoted if estimate is not other)
 
     @property
     def beside(self) -> tuple[Estimate, ...]:
@@ -204,8 +206,8 @@ class Decay(Result):
             self._other_ratio,
             () if self.thesis is None or self.best is self.thesis else self.thesis.estimates,
         )
-        found = [replace(each, name=f"{each.name}{BY_DECREMENTS}") for each in more]
-        return tuple(found) if other is None else (other, *found)
+        estimates = [replace(estimate, name=f"{estimate.name}{BY_DECREMENTS}") for estimate in more]
+        return tuple(estimates) if other is None else (other, *estimates)
 
     @property
     def _other_ratio(self) -> Estimate | None:
@@ -218,10 +220,10 @@ class Decay(Result):
         """What the older methods say, each with what it gets wrong; not to be relied on."""
         by_extremes = self.waveform is None and self.thesis is None and self.motion is None
         return tuple(
-            replace(estimate, name=f"{estimate.name}, {name}", method=f"for comparison: {each.bias}", status="ok")
-            for name, each in self.older.items()
+            replace(estimate, name=f"{estimate.name}, {name}", method=f"for comparison: {fit.bias}", status="ok")
+            for name, fit in self.older.items()
             if name != EXTREMES or not by_extremes
-            for estimate in (each.damping_ratio, each.dry_displacement)
+            for estimate in (fit.damping_ratio, fit.dry_displacement)
             if estimate is not None
         )
 
@@ -353,9 +355,9 @@ def _by_waveform(
 
 def _followed(fit: DecayFit, restoring: Restoring) -> DecayFit:
     """The fit, where it follows the motion; refused where it leaves much of it."""
-    left, moved = np.concatenate(fit.residual), np.concatenate(fit.measured) - fit.bias.value
-    share = float(np.linalg.norm(left) / np.linalg.norm(moved))
-    if share > LOST and float(np.std(left)) > SEEN * fit.ring_downs[0].noise:
+    residual, moved = np.concatenate(fit.residual), np.concatenate(fit.measured) - fit.bias.value
+    share = float(np.linalg.norm(residual) / np.linalg.norm(moved))
+    if share > LOST and float(np.std(residual)) > SEEN * fit.ring_downs[0].noise:
         straight = restoring == "linear" and fit.channel == "theta"
         raise EstimateError(
             f"the fit leaves {100 * share:.0f} % of the motion",
@@ -411,19 +413,19 @@ def compare_decays(findings: Sequence[Findings]) -> Comparison:
     (True, {})
     """
     require_several(findings)
-    apart, asked = _apart(findings), Asked()
-    ways = {key: [each.settings.get(key) for each in findings] for key in ASKED}
+    apart, log = _apart(findings), Asked()
+    ways = {key: [finding.settings.get(key) for finding in findings] for key in ASKED}
     mixed = [key for key, values in ways.items() if len(set(values)) > 1]
     joint = None
     if mixed:
         differ = "; ".join(f"{key} is {' and '.join(map(str, dict.fromkeys(ways[key])))}" for key in mixed)
-        asked.notes.append(f"The records are not fitted together: {differ}.")
-    elif not apart and all(each.decay.best is each.decay.waveform for each in findings):
+        log.notes.append(f"The records are not fitted together: {differ}.")
+    elif not apart and all(finding.decay.best is finding.decay.waveform for finding in findings):
         way = {key: values[0] for key, values in ways.items()}
-        joint = asked.ask("All records at once", lambda: _jointly(findings, way))
+        joint = log.ask("All records at once", lambda: _jointly(findings, way))
     status = f"the records differ in {' and '.join(apart)}" if apart else "ok"
     shared: dict[str, Estimate | None] = {
-        name: weighted_mean(each, of="records", status=status) for name, each in _shared(findings).items()
+        name: weighted_mean(estimates, of="records", status=status) for name, estimates in _shared(findings).items()
     }
     dry = None if mixed else shared.get("dry_displacement")
     force = None if dry is None else findings[0].decay.as_force(dry, "dry friction force")
@@ -431,25 +433,27 @@ def compare_decays(findings: Sequence[Findings]) -> Comparison:
         shared = {name: getattr(joint, name) for name in OF_ALL_AT_ONCE}
         force = force if joint.dry_force is None else replace(joint.dry_force, name="dry friction force")
     results = {"dry_force": force, **dict.fromkeys(OF_ALL_AT_ONCE), **shared, "joint": joint, "apart": apart}
-    return Comparison(tuple(findings), tuple(asked.notes), results=results)
+    return Comparison(tuple(findings), tuple(log.notes), results=results)
 
 
 def _jointly(findings: Sequence[Findings], way: dict[str, Any]) -> DecayFit:
     """All releases at once, with the intervals that hold whichever motion no record speaks against."""
-    joint = fit_decay([each.record for each in findings], **way)
-    waveforms = [each.decay.waveform for each in findings]
+    joint = fit_decay([finding.record for finding in findings], **way)
+    waveforms = [finding.decay.waveform for finding in findings]
     motions = [() if waveform is None else waveform.motions for waveform in waveforms]
     if not all(motions):
         return joint
-    choices = [motion.choice for each in motions for motion in each]
+    choices = [motion.choice for own in motions for motion in own]
     either = {f"{name}_any": whichever(choices, getattr(joint, name), name) for name in SHARED[:2]}
     return replace(joint, **either)  # type: ignore[arg-type]
 
 
 def _shared(findings: Sequence[Findings]) -> dict[str, list[Estimate]]:
     """What records of one oscillator share, of each record; not what stands in different units."""
-    found = {name: [getattr(each.decay.best, name) for each in findings] for name in SHARED}
-    return {name: each for name, each in found.items() if len({estimate.unit for estimate in each}) == 1}
+    shared = {name: [getattr(finding.decay.best, name) for finding in findings] for name in SHARED}
+    return {
+        name: estimates for name, estimates in shared.items() if len({estimate.unit for estimate in estimates}) == 1
+    }
 
 
 def _apart(findings: Sequence[Findings]) -> dict[str, float]:
@@ -458,5 +462,5 @@ def _apart(findings: Sequence[Findings]) -> dict[str, float]:
 
     freedom = len(findings) - 1
     most = math.sqrt(float(chdtri(freedom, UNLIKE / len(SHARED))) / freedom)
-    gaps = {each[0].name: disagreement(each) for each in _shared(findings).values()}
+    gaps = {estimates[0].name: disagreement(estimates) for estimates in _shared(findings).values()}
     return {name: gap for name, gap in gaps.items() if gap > most}

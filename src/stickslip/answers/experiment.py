@@ -91,8 +91,8 @@ class Setup:
     accuracy: Mapping[str, Accuracy]
 
     def __str__(self) -> str:
-        told = "; ".join(f"{question} {each}" for question, each in self.accuracy.items())
-        return f"{', '.join(self.sensors)} at {self.fs:g} Hz: {told}"
+        answers = "; ".join(f"{question} {accuracy}" for question, accuracy in self.accuracy.items())
+        return f"{', '.join(self.sensors)} at {self.fs:g} Hz: {answers}"
 
 
 @dataclass(frozen=True)
@@ -121,8 +121,8 @@ class ExperimentPlan:
     @property
     def refusals(self) -> tuple[str, ...]:
         """Why draws were not answered: each reason once, with its question."""
-        told = [f"{name}: {each.refusal}" for setup in self.setups for name, each in setup.accuracy.items()]
-        return tuple(dict.fromkeys(reason for reason in told if not reason.endswith(": ")))
+        reasons = [f"{name}: {answer.refusal}" for setup in self.setups for name, answer in setup.accuracy.items()]
+        return tuple(dict.fromkeys(reason for reason in reasons if not reason.endswith(": ")))
 
     def enough(self, question: str, error: float | str) -> Setup | None:
         """The setup of least rate, and then of fewest sensors, whose error is within a limit; None where none is.
@@ -144,8 +144,8 @@ class ExperimentPlan:
             No setup asks that question.
         """
         if question not in self.questions:
-            asked = ", ".join(self.questions)
-            raise ModelError(f"no question is called '{question}'", f"there are {asked}", "choose one")
+            names = ", ".join(self.questions)
+            raise ModelError(f"no question is called '{question}'", f"there are {names}", "choose one")
         limit = parse_value(error, UNITS[question])
         return next((setup for setup in self.setups if setup.accuracy[question].within(limit, self.draws)), None)
 
@@ -163,8 +163,8 @@ class ExperimentPlan:
                     "fs": setup.fs,
                     "sensors": list(setup.sensors),
                     "accuracy": {
-                        question: {name: plain(value) for name, value in vars(found).items()}
-                        for question, found in setup.accuracy.items()
+                        question: {name: plain(value) for name, value in vars(answer).items()}
+                        for question, answer in setup.accuracy.items()
                     },
                 }
                 for setup in self.setups
@@ -301,20 +301,20 @@ class _Trial:
         """By question, of those whose truth is known."""
         truth = self.record.truth
         level = truth.get("sliding friction", math.nan)
-        found = {}
+        answers = {}
         if math.isfinite(late := self._lag("a") - self._lag("x")):
-            found["delay"] = (
-                _asked(late, lambda: sensor_delay(self.record).delay.value - late)
+            answers["delay"] = (
+                _answer_of(late, lambda: sensor_delay(self.record).delay.value - late)
                 if "a" in self.record
                 else _Answer(late, refusal="it needs an accelerometer")
             )
-        found["friction"] = _asked(level, self._trace)
+        answers["friction"] = _answer_of(level, self._trace)
         if "sliding friction" in truth:
-            found["sliding friction"] = _asked(level, lambda: friction_loops(self.force).level.value - level)
+            answers["sliding friction"] = _answer_of(level, lambda: friction_loops(self.force).level.value - level)
         if "contact stiffness" in truth:
             stiff = truth["contact stiffness"]
-            found["contact stiffness"] = _asked(stiff, lambda: contact_stiffness(self.force).value - stiff)
-        return found
+            answers["contact stiffness"] = _answer_of(stiff, lambda: contact_stiffness(self.force).value - stiff)
+        return answers
 
     @functools.cached_property
     def force(self) -> Record:
@@ -333,12 +333,12 @@ class _Trial:
         return np.asarray(force["friction"][inside] - self.run.sample(times, ("friction",))[0][0])
 
 
-def _asked(truth: float, error: Callable[[], Array | float]) -> _Answer:
+def _answer_of(truth: float, error: Callable[[], Array | float]) -> _Answer:
     try:
-        found = error()
+        errors = error()
     except StickslipError as refusal:
         return _Answer(truth, refusal=str(refusal))
-    return _Answer(truth, float(np.mean(found)), float(np.mean(np.square(found))))
+    return _Answer(truth, float(np.mean(errors)), float(np.mean(np.square(errors))))
 
 
 def _accuracies(answers: Sequence[Mapping[str, _Answer]]) -> dict[str, Accuracy]:

@@ -23,12 +23,13 @@ WHOLES = {
     "delay": "sensor delay",
     "comparison": "comparison of the forces",
 }
-BY_FORCE = (
-    "loops", "breakaway", "stiffness", "contact_damping", "transition", "coupled", "cause", "presliding",
-)  # fmt: skip
+BY_FORCE = ("loops", "breakaway", "stiffness", "contact_damping", "transition", "coupled", "cause", "presliding")
 DRIVEN = "forcing frequency"  # no matter of friction
-NOT_TRIED = Doubt("not tried on twins: rigs that never stick, that slide at one level or on a rigid contact may seem "
-                  "to do so as well", UNTRIED)  # fmt: skip
+NOT_TRIED = Doubt(
+    "not tried on twins: rigs that never stick, that slide at one level or on a rigid contact may seem "
+    "to do so as well",
+    UNTRIED,
+)
 ONSETS = ("sticks", "breakaway", "presliding")  # when it sticks, and what it does until it slips
 BY_DECREMENTS = ", by decrements"  # behind the name of a number that another method gave already
 
@@ -124,8 +125,8 @@ class Findings(Answers):
     def level(self) -> Estimate | None:
         """The sliding friction, where it is known: from the loops, or the Coulomb term of the regression."""
         loops, regression = self.results.get("loops"), self.results.get("regression")
-        told: Estimate | None = loops.level if loops is not None else regression and regression.coulomb
-        return told if told is not None and told.known else None
+        level: Estimate | None = loops.level if loops is not None else regression and regression.coulomb
+        return level if level is not None and level.known else None
 
     @property
     def coefficient(self) -> Estimate | None:
@@ -164,8 +165,8 @@ class Findings(Answers):
     @property
     def doubts(self) -> tuple[tuple[str, str], ...]:
         """The answers that are not sure as wholes, and what each says of it."""
-        told = ((name, getattr(self.results.get(key), "status", "ok")) for key, name in WHOLES.items())
-        return tuple((name, status) for name, status in told if status != "ok")
+        statuses = ((name, getattr(self.results.get(key), "status", "ok")) for key, name in WHOLES.items())
+        return tuple((name, status) for name, status in statuses if status != "ok")
 
     @property
     def untried(self) -> bool:
@@ -209,9 +210,10 @@ class Comparison(Answers):
 
     def _repr_html_(self) -> str:
         first = [
-            (each.name, next(iter(each.quoted), None) if each.level is None else each.level) for each in self.findings
+            (finding.name, next(iter(finding.quoted), None) if finding.level is None else finding.level)
+            for finding in self.findings
         ]
-        rows = [(name, *(each.cells if each is not None else ("", "", ""))) for name, each in first]
+        rows = [(name, *(leading.cells if leading is not None else ("", "", ""))) for name, leading in first]
         rows += [("together", *estimate.cells) for estimate in self.estimates]
         return html_table("Comparison", ("record", "quantity", "value", "95 % interval"), rows)
 
@@ -242,27 +244,27 @@ def record_name(record: Record) -> str:
     return "simulated record" if record.truth else "record"
 
 
-def without(found: Any, kind: str) -> Any:
+def without(result: Any, kind: str) -> Any:
     """An answer without doubts of a kind."""
 
     def left(number: Estimate) -> Estimate:
-        return replace(number, status=Status(*(each for each in doubts_of(number.status) if each.kind != kind)))
+        return replace(number, status=Status(*(doubt for doubt in doubts_of(number.status) if doubt.kind != kind)))
 
-    return _each(found, left)
+    return _with_numbers(result, left)
 
 
-def with_doubt(found: Any, doubt: Doubt) -> Any:
+def with_doubt(result: Any, doubt: Doubt) -> Any:
     """An answer with a doubt more at each of its numbers."""
-    return _each(found, lambda number: replace(number, status=Status(number.status, doubt)))
+    return _with_numbers(result, lambda number: replace(number, status=Status(number.status, doubt)))
 
 
-def _each(found: Any, change: Callable[[Estimate], Estimate]) -> Any:
+def _with_numbers(result: Any, change: Callable[[Estimate], Estimate]) -> Any:
     """An answer with each of its numbers changed, but for that of the drive."""
-    if found is None:
+    if result is None:
         return None
-    numbers = {field.name: getattr(found, field.name) for field in fields(found)}
+    numbers = {field.name: getattr(result, field.name) for field in fields(result)}
     return replace(
-        found,
+        result,
         **{
             name: change(value)
             for name, value in numbers.items()
@@ -271,11 +273,11 @@ def _each(found: Any, change: Callable[[Estimate], Estimate]) -> Any:
     )
 
 
-def flagged(found: Any, reason: Doubt | str) -> Any:
+def flagged(answer: Any, reason: Doubt | str) -> Any:
     """An answer with each of its numbers flagged that was thought to be sure; that of the drive stays sure."""
-    if isinstance(found, Estimate):
-        lesser = stands(found.status)
-        if found.name == DRIVEN or not (lesser or not found.known):
-            return found
-        return replace(found, status=Status(reason) if lesser else Status(reason, found.status))
-    return _each(found, lambda number: flagged(number, reason))
+    if isinstance(answer, Estimate):
+        lesser = stands(answer.status)
+        if answer.name == DRIVEN or not (lesser or not answer.known):
+            return answer
+        return replace(answer, status=Status(reason) if lesser else Status(reason, answer.status))
+    return _with_numbers(answer, lambda number: flagged(number, reason))

@@ -94,8 +94,8 @@ def fit_records(
     if curve is not None:
         friction = _with_friction(records[0], rig)
         return fit_curve(friction, curve=curve, contact=rig.contact, normal=_load(friction, rig)), [friction]
-    found = compare_laws(records, _oscillator(rig, system), laws=laws, calibration=calibration, progress=progress)
-    return found, list(records)
+    comparison = compare_laws(records, _oscillator(rig, system), laws=laws, calibration=calibration, progress=progress)
+    return comparison, list(records)
 
 
 def _only_curve(record: Record, *, asked: bool) -> str | None:
@@ -128,8 +128,8 @@ def _with_friction(record: Record, rig: RigSettings) -> Record:
             'name its column, as in channels={"friction": "COLUMN [N]"}, or give mass= and stiffness= '
             "(0 where there is no spring)",
         )
-    told = {name: value for name in ("damping", "damper", "contact") if (value := getattr(rig, name)) is not None}
-    return friction_force(record, mass=rig.mass, stiffness=rig.stiffness, **told)
+    stated = {name: value for name in ("damping", "damper", "contact") if (value := getattr(rig, name)) is not None}
+    return friction_force(record, mass=rig.mass, stiffness=rig.stiffness, **stated)
 
 
 def _oscillator(rig: RigSettings, system: object) -> Oscillator:
@@ -152,8 +152,8 @@ def _oscillator(rig: RigSettings, system: object) -> Oscillator:
 
 def with_stated(system: Oscillator, rig: RigSettings) -> Oscillator:
     """The oscillator with what the settings state of it in front."""
-    words = ("mass", "stiffness", "damping", "damper", "contact")
-    stated = {name: getattr(rig, name) for name in words if name in rig.model_fields_set}
+    names = ("mass", "stiffness", "damping", "damper", "contact")
+    stated = {name: getattr(rig, name) for name in names if name in rig.model_fields_set}
     stated = {n: float(v) if n in RIG_UNITS else v for n, v in stated.items() if v is not None}
     if "contact" in stated and not hasattr(system.drive, "contact"):
         if stated.pop("contact") == "base" and not isinstance(system.drive, Release):
@@ -202,7 +202,7 @@ class Prediction(Result):
     @property
     def estimates(self) -> tuple[Estimate, ...]:
         """Stops per cycle and share of the time that sticks, as measured and as predicted."""
-        return tuple(estimate for each in self.sticks for estimate in (each.per_cycle, each.share))
+        return tuple(estimate for stuck in self.sticks for estimate in (stuck.per_cycle, stuck.share))
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON."""
@@ -218,8 +218,8 @@ class Prediction(Result):
                 } for name, value in self.follows.items()
             },
             "stops": {
-                which: {"per cycle": each.per_cycle.to_dict(), "share": each.share.to_dict()}
-                for which, each in zip(("measured", "predicted"), self.sticks, strict=False)
+                which: {"per cycle": stuck.per_cycle.to_dict(), "share": stuck.share.to_dict()}
+                for which, stuck in zip(("measured", "predicted"), self.sticks, strict=False)
             },
         }  # fmt: skip
 
@@ -428,13 +428,13 @@ def _stops(record: Record, fit: LawFit, oscillator: Oscillator) -> tuple[Sticks,
     rows = slice(first, first + len(traces.time[name]))
     base = {"z": record["z"][rows]} if "z" in record else {}
     contact = getattr(oscillator.drive, "contact", None) if base else None
-    found = []
+    stops = []
     try:
         for values in (traces.measured, traces.fitted):
             motion = Record.of({name: values[name], **base}, fs=record.fs)
             for channel in motion:
                 motion = motion.with_details(channel, delay=record.channels[channel].delay)
-            found.append(find_sticks(motion, contact=contact, method="speed"))
+            stops.append(find_sticks(motion, contact=contact, method="speed"))
     except StickslipError:  # too short, or without cycles: the channels are told without
         return ()
-    return tuple(found)
+    return tuple(stops)

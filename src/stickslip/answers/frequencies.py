@@ -168,8 +168,9 @@ def time_frequency(
     name = chosen_channel(first, channel)
     options: dict[str, Any] = {
         "frequencies": parse_range(frequencies, "Hz") if isinstance(frequencies, str) else frequencies,
-        "wavelet_frequency": wavelet_frequency, "normalisation": normalisation,
-    }  # fmt: skip
+        "wavelet_frequency": wavelet_frequency,
+        "normalisation": normalisation,
+    }
     if second is None and len(first) <= LONG:
         begin, long = first, []
         wavelets = wavelet_map(first, name, **options)
@@ -182,9 +183,9 @@ def time_frequency(
             "The record is long: of the map the largest moduli of each stretch of time are kept, without ridges; "
             f"spikes and sticks are those of its first {begin.duration:.4g} s."
         ]
-    found, notes = _spikes_and_sticks(begin, name, mass, stiffness)
+    answers, notes = _spikes_and_sticks(begin, name, mass, stiffness)
     record = first if second is None else begin
-    return TimeFrequency(record_name(first), record, name, wavelets, ridges, **found, notes=(*long, *notes))
+    return TimeFrequency(record_name(first), record, name, wavelets, ridges, **answers, notes=(*long, *notes))
 
 
 def _spikes_and_sticks(
@@ -193,8 +194,8 @@ def _spikes_and_sticks(
     """What is asked beside the map, and why some of it has no answer."""
     if len(record) < LEAST:
         return {}, [f"{len(record)} samples are mapped, and too few to ask about spikes and sticks: give {LEAST}."]
-    found: dict[str, Any] = {"spikes": find_spikes(record, name)}
-    clocks = [each for each in record if name not in CHOSEN and _runs_on(record[each])]
+    answers: dict[str, Any] = {"spikes": find_spikes(record, name)}
+    clocks = [channel for channel in record if name not in CHOSEN and _runs_on(record[channel])]
     notes = [f"Channel {clock} only rises or only falls, as times do: {name} is mapped." for clock in clocks[:1]]
 
     def asked(what: str, question: Callable[[], Answer]) -> Answer | None:
@@ -204,23 +205,23 @@ def _spikes_and_sticks(
             notes.append(f"{what}: {error}")
             return None
 
-    if name == "friction" and is_measured(record, name) and any(each in record for each in ("x", "v", "theta")):
-        found["slip_ringing"] = asked("Ringing after slips", lambda: slip_ringing(record))
-        return found, notes
+    if name == "friction" and is_measured(record, name) and any(channel in record for channel in ("x", "v", "theta")):
+        answers["slip_ringing"] = asked("Ringing after slips", lambda: slip_ringing(record))
+        return answers, notes
     if record.channels[name].unit != "m/s^2":
         notes.append(f"Channel {name} is no acceleration: what the sticks tell was not asked.")
-        return found, notes
+        return answers, notes
     try:
         ringing = find_ringing(record, name, question=QUESTION, mass=mass, stiffness=stiffness)
     except EstimateError as error:
-        found["mechanism"] = Mechanism(UNTOLD, float("nan"), reason=str(error))
-        return found, notes
-    found["ringing"] = ringing
-    found["mechanism"] = mechanism_of(ringing)
-    found["transition"] = asked("Transition", lambda: transition_of(ringing, mass, stiffness))
-    if found["transition"] is not None:  # where nothing rings, nothing cuts a ring off
-        found["microslips"] = asked("Micro-slips", lambda: microslips_of(ringing))
-    return found, notes
+        answers["mechanism"] = Mechanism(UNTOLD, float("nan"), reason=str(error))
+        return answers, notes
+    answers["ringing"] = ringing
+    answers["mechanism"] = mechanism_of(ringing)
+    answers["transition"] = asked("Transition", lambda: transition_of(ringing, mass, stiffness))
+    if answers["transition"] is not None:  # where nothing rings, nothing cuts a ring off
+        answers["microslips"] = asked("Micro-slips", lambda: microslips_of(ringing))
+    return answers, notes
 
 
 def chosen_channel(record: Record, channel: str | None) -> str:
@@ -248,6 +249,6 @@ def _runs_on(values: Array) -> bool:
 
 
 def _stick(stick: Any) -> dict[str, Any]:
-    told = {key: value for key, value in vars(stick).items() if not isinstance(value, Estimate)}
-    told["wavelet_frequency"] = stick.wavelet_frequency if np.isfinite(stick.wavelet_frequency) else None
-    return {**told, **{key: value.to_dict() for key, value in vars(stick).items() if isinstance(value, Estimate)}}
+    numbers = {key: value for key, value in vars(stick).items() if not isinstance(value, Estimate)}
+    numbers["wavelet_frequency"] = stick.wavelet_frequency if np.isfinite(stick.wavelet_frequency) else None
+    return {**numbers, **{key: value.to_dict() for key, value in vars(stick).items() if isinstance(value, Estimate)}}

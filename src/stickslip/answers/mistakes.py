@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 
+from stickslip.consistent.checks import MILLISECONDS, Slip
 from stickslip.consistent.contradictions import Consistency
-from stickslip.consistent.slips import MILLISECONDS, Slip
 from stickslip.cycle.loops import Loops
 from stickslip.record.record import Record
 from stickslip.rig.settings import RigSettings
@@ -50,14 +50,14 @@ def _late(record: Record, rig: RigSettings, loops: Loops | None) -> Slip | None:
     """Milliseconds taken for seconds, of a delay that lasts longer than a cycle, or much of the record."""
     period = 1 / loops.frequency.value if loops is not None else LATEST * record.duration
     stated = {name: channel.delay for name, channel in record.channels.items()}
-    stated |= {name: told.delay for name, told in rig.sensors.items() if "delay" in told.model_fields_set}
+    stated |= {name: sensor.delay for name, sensor in rig.sensors.items() if "delay" in sensor.model_fields_set}
     far = {name: late for name, late in stated.items() if abs(late) > max(period, SHORTEST_DELAY)}
     if not far:
         return None
     late = next(iter(far.values()))
     cycles = f" ({abs(late) / period:.3g} cycles of the motion)" if loops is not None else ""
-    words = f"the delay of {' and '.join(far)}, {late:.4g} s{cycles}, is in ms, not in s"
-    return Slip(words, delays={name: MILLISECONDS * late for name, late in far.items()})
+    mistake = f"the delay of {' and '.join(far)}, {late:.4g} s{cycles}, is in ms, not in s"
+    return Slip(mistake, delays={name: MILLISECONDS * late for name, late in far.items()})
 
 
 def missing(record: Record, rig: RigSettings) -> tuple[str, ...]:
@@ -89,8 +89,8 @@ def mistakes_of_decay(
         The likeliest first.
     """
     if channel == "theta" and swing > HALF_TURN:
-        words = f"theta, which swings {swing:.3g} rad to each side, is in degrees, not in rad"
-        return (Slip(words, {channel: (channel, math.pi / 180)}),)
+        mistake = f"theta, which swings {swing:.3g} rad to each side, is in degrees, not in rad"
+        return (Slip(mistake, {channel: (channel, math.pi / 180)}),)
     return tuple(_of_frequency(frequency, mass, stiffness))
 
 

@@ -116,19 +116,23 @@ def _yields(quick: Presliding | None, trial: Trial) -> Presliding | None:
     if stiffness is not None and stiffness.value > 0:
         why, low, high = f"a contact of {stiffness} leaves less of x than a rigid one", *stiffness.interval
         value, ends, sd = 1 / stiffness.value, (1 / high, 1 / low if low > 0 else math.inf), 1 / stiffness.value**2
-        told = replace(UNTOLD, value=value, interval=ends, sd=stiffness.sd * sd, status=stiffness.status)
-        return _telling("gives way", why, told, stiffness)
+        compliance = replace(UNTOLD, value=value, interval=ends, sd=stiffness.sd * sd, status=stiffness.status)
+        return _telling("gives way", why, compliance, stiffness)
     if power is not None:
-        told = replace(UNTOLD, value=0.0, interval=(0.0, power.felt), sd=power.felt / 2, status="ok")
-        return _telling("rigid", f"a contact softer than {1 / power.felt:.3g} N/m would have been seen in x", told)
+        compliance = replace(UNTOLD, value=0.0, interval=(0.0, power.felt), sd=power.felt / 2, status="ok")
+        return _telling(
+            "rigid", f"a contact softer than {1 / power.felt:.3g} N/m would have been seen in x", compliance
+        )
     why = "a contact that gives way would not have moved x enough to be seen"
     return None if quick is None else _telling("can not be told", why)
 
 
-def _telling(verdict: str, why: str, told: Estimate | None = None, stiffness: Estimate | None = None) -> Presliding:
+def _telling(
+    verdict: str, why: str, compliance: Estimate | None = None, stiffness: Estimate | None = None
+) -> Presliding:
     """How a contact gives way, both directions alike."""
-    told = replace(UNTOLD, status=Status(why)) if told is None else told
-    forward, back = (replace(told, name=f"compliance {side}") for side in ("forward", "back"))
+    compliance = replace(UNTOLD, status=Status(why)) if compliance is None else compliance
+    forward, back = (replace(compliance, name=f"compliance {side}") for side in ("forward", "back"))
     status = "ok" if stiffness is None else stiffness.status
     return Presliding(stiffness, None, None, None, forward, back, verdict, why, status)
 
@@ -140,10 +144,10 @@ def _ask(record: Record, *, stated: StatedRig | None) -> dict[str, Estimate]:
     answers: dict[str, Estimate] = {}
     for question in ASKED:
         try:
-            found: Result = question(record, contact=stated.contact)
+            result: Result = question(record, contact=stated.contact)
         except StickslipError:  # as of the record itself: a question without an answer is left out
             continue
-        answers |= {estimate.name: estimate for estimate in found.estimates}
+        answers |= {estimate.name: estimate for estimate in result.estimates}
     return answers
 
 

@@ -20,14 +20,7 @@ from stickslip.record.flaws import constant
 from stickslip.record.record import Record, Step
 from stickslip.rig.settings import RigSettings, rig_settings
 from stickslip.signals.interpolate import without_delays
-from stickslip.signals.repair import (
-    fill_gaps,
-    fill_missing,
-    remove_drift,
-    remove_spikes,
-    repair_clock,
-    restore_clipped,
-)
+from stickslip.signals.repair import fill_gaps, fill_missing, remove_drift, remove_spikes, repair_clock, restore_clipped
 
 MOTION = ("x", "v", "theta")
 USED = ("x", "z", "v", "a", "theta", "friction", "load", "force")  # channels that a question may take
@@ -78,8 +71,8 @@ def mend(record: Record, *, repairs: Sequence[str]) -> Record:
             record = _WHOLE[word](record)
             continue
         kind, function = _PER_CHANNEL[word]
-        found = [fault.channel for fault in record.check() if fault.kind == kind and fault.channel is not None]
-        for name in [channel] if channel else dict.fromkeys(found):
+        channels = [fault.channel for fault in record.check() if fault.kind == kind and fault.channel is not None]
+        for name in [channel] if channel else dict.fromkeys(channels):
             record = function(record, name)
     return record
 
@@ -147,9 +140,9 @@ def ready(record: Record, rig: RigSettings, method: str, asked: Asked) -> Ready:
 def with_sensors(record: Record, rig: RigSettings) -> Record:
     """The record with what the settings state of its sensors, and with their log."""
     record = rig.logged(record)
-    for name, told in rig.sensors.items():
+    for name, sensor in rig.sensors.items():
         if name in record:
-            record = record.with_details(name, **told.model_dump(exclude_unset=True))
+            record = record.with_details(name, **sensor.model_dump(exclude_unset=True))
     return record
 
 
@@ -161,7 +154,7 @@ def middle(record: Record, samples: int) -> Record:
 
 def _enough(record: Record, rig: RigSettings) -> bool:
     """Whether the balance can be drawn up: one of mass and spring is found from the other where more than x is read."""
-    stated = sum(each is not None for each in (rig.mass, rig.stiffness))
+    stated = sum(number is not None for number in (rig.mass, rig.stiffness))
     return stated == 2 or (stated == 1 and not {"a", "load"}.isdisjoint(record))
 
 
@@ -194,14 +187,14 @@ def _weighed(record: Record, rig: RigSettings, asked: Asked) -> RigSettings:
     if not {"x", "load"} <= set(record) or not _base_seen(record):
         return rig
     ends = {"damper": rig.damper, "contact": rig.contact}
-    found = asked.ask(
+    constants = asked.ask(
         "Mass and stiffness",
         lambda: mass_and_stiffness(middle(record, STRETCH), damping=float(rig.damping or 0.0), **ends),
         aside=True,
     )
-    if found is None:
+    if constants is None:
         return rig
-    mass, stiffness = found
+    mass, stiffness = constants
     asked.notes.append(
         f"No mass and no stiffness were stated: {mass.value:.4g} kg and {stiffness.value:.4g} N/m are found from what "
         "the load cell feels."
@@ -233,21 +226,21 @@ def _aligned(record: Record, asked: Asked) -> tuple[Record, SensorDelay | None]:
     """The record with the delay of displacement against acceleration stated, where it was not."""
     if not {"x", "a"} <= set(record) or any(record.channels[name].delay for name in ("x", "z", "a") if name in record):
         return record, None
-    found = asked.ask("Sensor delay", lambda: sensor_delay(middle(record, STRETCH)), aside=True)
-    if found is None:
+    lag = asked.ask("Sensor delay", lambda: sensor_delay(middle(record, STRETCH)), aside=True)
+    if lag is None:
         return record, None
-    if found.gain.value < 0:
+    if lag.gain.value < 0:
         asked.notes.append(
             "The accelerometer runs against the displacement: one of the two has the wrong sign. Turn it round, as in "
             'channels={"a": "-COLUMN [m/s^2]"}.'
         )
-        return record, found
-    late = -found.delay.value
-    if found.status != "ok" and not (REPEATS in kinds(found.status) and kinds(found.status) <= {REPEATS, HIDDEN}):
-        asked.notes.append(f"The delay of x against a, {1e3 * late:.3g} ms, is not taken out: {found.status}.")
-        return record, found
-    if abs(late) < SURE * found.delay.sd:
-        return record, found
+        return record, lag
+    late = -lag.delay.value
+    if lag.status != "ok" and not (REPEATS in kinds(lag.status) and kinds(lag.status) <= {REPEATS, HIDDEN}):
+        asked.notes.append(f"The delay of x against a, {1e3 * late:.3g} ms, is not taken out: {lag.status}.")
+        return record, lag
+    if abs(late) < SURE * lag.delay.sd:
+        return record, lag
     for name in ("x", "z"):
         if name in record:
             record = record.with_details(name, delay=late)
@@ -256,17 +249,19 @@ def _aligned(record: Record, asked: Asked) -> tuple[Record, SensorDelay | None]:
         f"{late_ones} {1e3 * late:.3g} ms after a, by the phase of their lines: taken out. State what is known "
         "of the sensors' delays to have that taken instead."
     )
-    return record, found
+    return record, lag
 
 
 def _with_mounts(record: Record, comparison: ForceComparison | None, asked: Asked) -> Record:
     """The record with the mounts stated that the comparison of forces shows, where they were not."""
     differ = comparison is not None and (comparison.opposite or comparison.unlike)
-    for each in () if comparison is None or differ else comparison.resonances:
-        name = "a" if "accelerometer" in each.name else "load"
-        if "mount" in each.name and record.channels[name].mount is None:
-            record = record.with_details(name, mount=(each.frequency.value, each.damping.value))
-            asked.notes.append(f"The {each.name} is taken to ring at {each.frequency.value:.4g} Hz: {each.evidence}.")
+    for resonance in () if comparison is None or differ else comparison.resonances:
+        name = "a" if "accelerometer" in resonance.name else "load"
+        if "mount" in resonance.name and record.channels[name].mount is None:
+            record = record.with_details(name, mount=(resonance.frequency.value, resonance.damping.value))
+            asked.notes.append(
+                f"The {resonance.name} is taken to ring at {resonance.frequency.value:.4g} Hz: {resonance.evidence}."
+            )
     return record
 
 
@@ -288,8 +283,8 @@ def _doubt(record: Record, given: Record, rig: RigSettings, *, aligned: bool) ->
     ]
     if not unknown:
         return None
-    words = f"{' and '.join(unknown)} {'is' if len(unknown) == 1 else 'are'} not stated"
-    return Doubt(f"{words}: it may be wrong by some per cent, which the interval leaves out", UNSTATED, lesser=True)
+    omission = f"{' and '.join(unknown)} {'is' if len(unknown) == 1 else 'are'} not stated"
+    return Doubt(f"{omission}: it may be wrong by some per cent, which the interval leaves out", UNSTATED, lesser=True)
 
 
 def _tell_unused(rig: RigSettings, asked: Asked) -> None:
@@ -332,22 +327,22 @@ def _balanced(record: Record, rig: RigSettings, method: str, asked: Asked) -> Re
     why = "as asked"
     if method == "auto":
         method, why = chosen_method(record, rig)
-    found = asked.ask(
+    balanced = asked.ask(
         "Friction force", lambda: friction_force(record, contact=rig.contact, method=method, **_constants(rig))
     )
-    if found is None:
+    if balanced is None:
         return record
-    lost = () if found.rig is None else found.rig.lost
+    lost = () if balanced.rig is None else balanced.rig.lost
     asked.notes.append(f"Friction force: {'; '.join([f'by the method {method}', why, *lost])}.")
     for name, unit in (("mass", "kg"), ("stiffness", "N/m")):
         if getattr(rig, name) is None:
-            value = f"{getattr(found.rig, name):.4g} {unit}"
+            value = f"{getattr(balanced.rig, name):.4g} {unit}"
             asked.notes.append(f"No {name} was stated: {value} is found from how the mass slides.")
     if "z" not in record:
         asked.notes.append("There is no channel z: the spring's other end is taken to be at rest.")
     if rig.damping is None:
         asked.notes.append("No damping was stated: viscous damping of the suspension, if any, counts as friction.")
-    return found
+    return balanced
 
 
 def _by_load(record: Record, rig: RigSettings, asked: Asked) -> Record:
@@ -376,21 +371,21 @@ def _by_load(record: Record, rig: RigSettings, asked: Asked) -> Record:
 
 def _tell_per_mass(record: Record, rig: RigSettings, asked: Asked) -> None:
     """What can be said without mass, spring and load cell."""
-    found = asked.ask(
+    scaled = asked.ask(
         "Friction per mass", lambda: friction_force(record, contact=rig.contact, method="motion"), aside=True
     )
-    if found is not None:
-        level = float(np.median(np.abs(found["friction_per_mass"])))
-        asked.notes.append(f"Friction per mass: {level:.4g} m/s^2 (median); {found.history[-1].outcome}.")
+    if scaled is not None:
+        level = float(np.median(np.abs(scaled["friction_per_mass"])))
+        asked.notes.append(f"Friction per mass: {level:.4g} m/s^2 (median); {scaled.history[-1].outcome}.")
 
 
 def _by_cell(record: Record, asked: Asked) -> Record:
     """The record with its friction by the load cell alone, less what is stated of it."""
-    found = asked.ask("Friction force", lambda: friction_force(record, method="load"))
-    if found is None:
+    measured = asked.ask("Friction force", lambda: friction_force(record, method="load"))
+    if measured is None:
         return record
-    asked.notes.append(f"Friction force: {found.history[-1].outcome}.")
-    return found
+    asked.notes.append(f"Friction force: {measured.history[-1].outcome}.")
+    return measured
 
 
 def normal_load(record: Record, rig: RigSettings, name: str, notes: list[str]) -> float | None:

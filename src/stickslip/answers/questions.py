@@ -11,22 +11,13 @@ import numpy as np
 
 from stickslip.answers.findings import BY_FORCE, NOT_TRIED, ONSETS, Asked, Findings, flagged, record_name, with_doubt
 from stickslip.answers.mistakes import missing, mistakes, slipped, untrue
-from stickslip.answers.preparation import (
-    AT_ONCE,
-    CONSTANTS,
-    MOTION,
-    described,
-    middle,
-    normal_load,
-    ready,
-    unmoved,
-)
+from stickslip.answers.preparation import AT_ONCE, CONSTANTS, MOTION, described, middle, normal_load, ready, unmoved
 from stickslip.balance.balance import ALONE, Balance, pulled_slider
 from stickslip.balance.force import FUSIONS, friction_force
 from stickslip.balance.likely_contact import STRAYING
 from stickslip.balance.motion import is_measured, slid_on
+from stickslip.consistent.checks import Slip
 from stickslip.consistent.contradictions import consistency
-from stickslip.consistent.slips import Slip
 from stickslip.contact.cause import lag_or_compliance
 from stickslip.contact.contact import contact_damping, contact_stiffness
 from stickslip.contact.sliding_onset import coupled_frequency, transition_speed
@@ -128,7 +119,7 @@ def analyze(
     results = {**dict.fromkeys(names), **answers, "delay": made.delay, "comparison": made.comparison, "trial": None}
     results |= {"slips": slips, "lacking": missing(whole, rig)}
     normal = normal_load(record, rig, name, asked.notes)
-    settings = {**_stated(rig, all_of_it=bool(results["lacking"])), **_told(whole), "contact": slid}
+    settings = {**_stated(rig, all_of_it=bool(results["lacking"])), **_constants_of(whole), "contact": slid}
     return Findings(name, whole, faults, normal, tuple(asked.notes), settings, results=results)
 
 
@@ -174,7 +165,7 @@ class Question:
             all(any(name in record for name in group) for group in self.needs)
             and not any(name in record for name in self.without)
             and (not self.fused or _can_be_fused(record, again=not self.follows))
-            and (not self.derived or bool(_told(record)) or "load" in record)
+            and (not self.derived or bool(_constants_of(record)) or "load" in record)
         )
 
 
@@ -232,7 +223,7 @@ def _settings(rig: RigSettings | None, given: Mapping[str, Any]) -> RigSettings:
 
 def _can_be_fused(record: Record, *, again: bool) -> bool:
     """Whether the friction comes from all sensors together; or might have, `again`, if the record were not so long."""
-    method = _told(record).get("differentiation")
+    method = _constants_of(record).get("differentiation")
     sensors = any(is_measured(record, name) and described(record.channels[name]) for name in ("a", "load"))
     return method in FUSIONS or (
         again and method == "smoother" and len(record) > AT_ONCE and sensors and slid_on(record, None) == "ground"
@@ -247,19 +238,19 @@ def _fused(record: Record) -> Record:
     return friction_force(cut, method="fusion", **{key: getattr(cut.rig, key) for key in CONSTANTS})
 
 
-def _told(record: Record) -> dict[str, Any]:
+def _constants_of(record: Record) -> dict[str, Any]:
     """The constants and the method behind the friction force, where it comes from a balance of forces."""
     if "friction" not in record or is_measured(record, "friction"):
         return {}
     if Balance.of(record.rig) is None:
         return {}
-    told = {key.replace("method", "differentiation"): getattr(record.rig, key) for key in (*CONSTANTS, "method")}
-    return told | ({"sd": dict(record.rig.sd)} if record.rig is not None and record.rig.sd else {})
+    constants = {key.replace("method", "differentiation"): getattr(record.rig, key) for key in (*CONSTANTS, "method")}
+    return constants | ({"sd": dict(record.rig.sd)} if record.rig is not None and record.rig.sd else {})
 
 
 def _stated(rig: RigSettings, *, all_of_it: bool) -> dict[str, Any]:
     """What is stated of the sensors; and of the rig's constants, where they do not lead to a force."""
-    sensors = {name: told.model_dump(exclude_unset=True) for name, told in rig.sensors.items()}
+    sensors = {name: sensor.model_dump(exclude_unset=True) for name, sensor in rig.sensors.items()}
     constants = {key: float(getattr(rig, key)) for key in RIG_UNITS if all_of_it and getattr(rig, key) is not None}
     return {**constants, **({"sensors": sensors} if sensors else {})}
 
@@ -297,13 +288,13 @@ def doubted(
     refusals: Sequence[StickslipError],
 ) -> dict[str, Any]:
     """The answers, flagged by the gravest doubt that concerns each; `unknown` is what is not stated of the rig."""
-    told, gravest = dict(answers), dict[str, Doubt | str]()
-    contradiction = slipped(slips) or untrue(told.get("consistency"))
+    results, gravest = dict(answers), dict[str, Doubt | str]()
+    contradiction = slipped(slips) or untrue(results.get("consistency"))
     for reason, keys in _reasons(contradiction, record, unknown, refusals):
         for key in keys:
             if gravest.setdefault(key, reason) == reason:
-                told[key] = flagged(told.get(key), reason)
-    return told
+                results[key] = flagged(results.get(key), reason)
+    return results
 
 
 def _reasons(

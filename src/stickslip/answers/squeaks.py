@@ -80,11 +80,11 @@ def analyze_squeaks(
     faults = tuple(record.check())
     squeaks = find_squeaks(record, channel=channel, frequencies=band)
     asked = Asked(list(squeaks.notes))
-    others = [each for each in VIBRATING if each in record and each != squeaks.channel]
+    others = [channel for channel in VIBRATING if channel in record and channel != squeaks.channel]
     listen = partial(find_squeaks, record, frequencies=band)
     beside = [asked.ask(f"Bursts in {other}", partial(listen, channel=other)) for other in others]
     loops = None
-    if "friction" in record and any(each in record for each in ("x", "v", "theta")):
+    if "friction" in record and any(channel in record for channel in ("x", "v", "theta")):
         loops = asked.ask("Friction over the cycle", partial(friction_loops, record, contact=contact))
     else:
         asked.notes.append("No friction beside a motion is recorded: how it changes with speed can not be told.")
@@ -96,7 +96,7 @@ def analyze_squeaks(
         joined = asked.ask("Coupling", partial(coupling, record, squeaks=squeaks, lever=lever))
     results = {
         "squeaks": squeaks,
-        "beside": tuple(each for each in beside if each is not None),
+        "beside": tuple(squeaks_of for squeaks_of in beside if squeaks_of is not None),
         "loops": loops,
         "coupling": joined,
         "spectra": spectra,
@@ -253,7 +253,7 @@ def compare_squeaks(findings: Sequence[Findings]) -> Comparison:
     (('wet, 6.13 N',), 'falls')
     """
     require_several(findings)
-    conditions = tuple(_condition(each) for each in findings)
+    conditions = tuple(_condition(finding) for finding in findings)
     squeaking = tuple(condition.name for condition in conditions if condition.squeaks)
     results = {"conditions": conditions, "verdicts": tuple(_verdicts(conditions)), "squeaking": squeaking}
     return Comparison(tuple(findings), results=results)
@@ -263,7 +263,7 @@ def _condition(findings: Findings) -> Condition:
     squeaks, loops, record = findings.squeaks, findings.loops, findings.record
     heard = squeaks.of("squeak", "squeal")
     levels = [burst.level for burst in heard if np.isfinite(burst.level)]
-    path = next((each for each in ("x", "theta") if each in record), None)
+    path = next((channel for channel in ("x", "theta") if channel in record), None)
     return Condition(
         name=findings.name, normal=findings.normal, forcing=squeaks.forcing,
         stroke=float(np.nanmax(record[path]) - np.nanmin(record[path])) / 2 if path else float("nan"),
@@ -281,24 +281,26 @@ def _verdicts(conditions: Sequence[Condition]) -> list[str]:
     quiet, untold = _answering(conditions, "does not squeak"), _answering(conditions, "can not be told")
     creaking = _answering(conditions, "creaks")
     if not loud and not untold:
-        return ["No condition squeaks.", *(f"{words}." for words in _say(creaking, "creaks", "creak"))]
+        return ["No condition squeaks.", *(f"{sentence}." for sentence in _say(creaking, "creaks", "creak"))]
     heard = [
         *_say(_answering(conditions, "squeaks"), "squeaks", "squeak"),
         *_say(_answering(conditions, "squeals"), "squeals", "squeal"),
         *_say(creaking, "creaks", "creak"),
         *_say(quiet, "does not squeak", "do not squeak"),
     ]
-    told = [f"{'; '.join(heard)}."] if heard else []
-    told += [f"Whether {words} can not be told." for words in _say(untold, "squeaks", "squeak")]
-    falling = [each for each in quiet if each.trend == "falls"]
+    verdicts = [f"{'; '.join(heard)}."] if heard else []
+    verdicts += [f"Whether {sentence} can not be told." for sentence in _say(untold, "squeaks", "squeak")]
+    falling = [condition for condition in quiet if condition.trend == "falls"]
     if loud and falling:
-        too = " too" if all(each.trend == "falls" for each in loud) else ""
-        told.append(
+        too = " too" if all(condition.trend == "falls" for condition in loud) else ""
+        verdicts.append(
             f"Friction falls with speed in {_names(falling)}{too}, and nothing squeaks there: a falling friction "
             "alone is not enough."
         )
-    rising = [each for each in loud if each.trend == "rises"]
-    return told + [f"{words} though friction rises with speed." for words in _say(rising, "squeaks", "squeak")]
+    rising = [condition for condition in loud if condition.trend == "rises"]
+    return verdicts + [
+        f"{sentence} though friction rises with speed." for sentence in _say(rising, "squeaks", "squeak")
+    ]
 
 
 def _answering(conditions: Sequence[Condition], answer: str) -> list[Condition]:

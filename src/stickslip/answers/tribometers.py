@@ -38,7 +38,8 @@ def analyze_tribometer(
     Returns
     -------
     Findings
-        Its results: ``tribometer``, and ``static``, the coefficient at breakaway, or a note of why it is not told.
+        Its results: ``tribometer``, ``wear_in`` where it is told, and ``static``, the coefficient at breakaway, or a
+        note of why it is not told.
 
     Raises
     ------
@@ -65,7 +66,7 @@ def analyze_tribometer(
     found = friction_coefficients(record, normal=normal, frequency=frequency)
     away = asked.ask("Breakaway", partial(breakaway, record), aside=True)
     static = asked.ask("The static coefficient", partial(_static, found, away), aside=True) if away else None
-    results = {"tribometer": found, "static": static}
+    results = {"tribometer": found, "static": static, "wear_in": found.wear_in}
     load = "measured" if found.measured else f"{found.load.value:.4g} N, stated"
     return Findings(
         record_name(record), record, faults, notes=tuple(asked.notes), settings={"normal load": load}, results=results

@@ -133,9 +133,13 @@ class Rig(Balance):
 def known_constants(record: Record, **given: Any) -> dict[str, Any]:
     """The rig's constants as numbers, and its damper: as given, or as the friction was found with."""
     stated = {} if record.rig is None else record.rig.constants
-    told = {name: value for name, value in given.items() if value is not None}
-    numbers = {name: Estimate.stated(name, told[name], unit).value for name, unit in RIG_UNITS.items() if name in told}
-    return {**stated, **told, **numbers}
+    constants = {name: value for name, value in given.items() if value is not None}
+    numbers = {
+        name: Estimate.stated(name, constants[name], unit).value
+        for name, unit in RIG_UNITS.items()
+        if name in constants
+    }
+    return {**stated, **constants, **numbers}
 
 
 def paths(

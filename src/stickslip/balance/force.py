@@ -147,7 +147,7 @@ def friction_force(
         methods = ", ".join((*METHODS, *FUSIONS, *THESIS))
         raise EstimateError(f"method = '{method}'", f"the friction is found by one of {methods}", "choose one of them")
     record = as_measured(record)
-    asked, method = method, method if "load" in record else INSTEAD.get(method, method)
+    requested, method = method, method if "load" in record else INSTEAD.get(method, method)
     require_change(record, "v", "a", "load", question=FRICTION)
     unknown = [name for name, value in (("mass", mass), ("stiffness", stiffness)) if value is None]
     constants = {"mass": mass, "stiffness": stiffness, "damping": damping, **dict.fromkeys(unknown, 1.0)}
@@ -158,15 +158,15 @@ def friction_force(
         return _weighed(record, rig)
     if unknown:
         return _completed(record, rig, unknown, method, bandwidth)
-    return _known(record, rig, method, asked, bandwidth)
+    return _known(record, rig, method, requested, bandwidth)
 
 
-def _known(record: Record, rig: Rig, method: str, asked: str, bandwidth: float | str | None) -> Record:
+def _known(record: Record, rig: Rig, method: str, requested: str, bandwidth: float | str | None) -> Record:
     """The friction force on a mass whose rig is known, by the method; another was `asked` where a channel lacks."""
     if method in FUSIONS:
-        return _fused(record, rig, method, asked)
+        return _fused(record, rig, method, requested)
     if method in THESIS:
-        return _balanced(record, rig, method, asked)
+        return _balanced(record, rig, method, requested)
     return _smoothed(record, rig, method, bandwidth)
 
 
@@ -203,7 +203,7 @@ def _punctual(record: Record) -> Record:
     return without_delays(record, *used, question=FRICTION, samples=LEAST)
 
 
-def _balanced(record: Record, rig: Rig, method: str, asked: str) -> Record:
+def _balanced(record: Record, rig: Rig, method: str, requested: str) -> Record:
     """The thesis's F, or F1: the balance of the forces as read, or its five-point average."""
     record = _punctual(record)
     derive = Filter("five-point", record.fs, 0.0)
@@ -214,16 +214,16 @@ def _balanced(record: Record, rig: Rig, method: str, asked: str) -> Record:
         force += last(derive.apply(record[name], terms))
         variance += (averaged_gain(len(record), derive, terms, last) * noise) ** 2
     notes = [
-        *_lacking(record, asked, ("a", "load") if asked != method else ("a",)),
+        *_lacking(record, requested, ("a", "load") if requested != method else ("a",)),
         *rig.words(record, "five-point", 0.0, one_filter=False),
         "averaged over five points" if method == "F1" else "as read",
     ]
     return with_friction(with_motion(record, derive), force, np.sqrt(variance), StatedRig(method, **asdict(rig)), notes)
 
 
-def _lacking(record: Record, asked: str, wanted: Sequence[str]) -> list[str]:
+def _lacking(record: Record, requested: str, wanted: Sequence[str]) -> list[str]:
     """What is lost for want of channels, for the history."""
-    return [f"{LOST[name]} ({asked} asked for)" for name in wanted if name in LOST and name not in record]
+    return [f"{LOST[name]} ({requested} asked for)" for name in wanted if name in LOST and name not in record]
 
 
 def _weighed(record: Record, rig: Rig) -> Record:
@@ -304,7 +304,7 @@ def _ratio(ratio: Estimate) -> str:
     return f"k/m = {ratio.value:.5g} +- {NORMAL_95 * ratio.sd:.2g} 1/s^2 from how it slides"
 
 
-def _fused(record: Record, rig: Rig, method: str, asked: str) -> Record:
+def _fused(record: Record, rig: Rig, method: str, requested: str) -> Record:
     """The friction force by a smoother that knows the sensors."""
     record.require("x", question=FRICTION)
     sensors = [name for name in FUSIONS[method] if name in record]
@@ -316,7 +316,7 @@ def _fused(record: Record, rig: Rig, method: str, asked: str) -> Record:
     fusion = fuse(record, rig, sensors)
     swinging = [f"{name} on a mount of {mount[0]:g} Hz" for name in sensors if (mount := record.channels[name].mount)]
     notes = [
-        *_lacking(record, asked, FUSIONS[asked]),
+        *_lacking(record, requested, FUSIONS[requested]),
         f"{', '.join(sensors)} together by a Kalman smoother",
         ", ".join(swinging) or "no mounts stated",
         *fusion.lost,

@@ -162,8 +162,8 @@ def sensor_delay(
 def _fit(pairs: Sequence[Pair], mount: tuple[float, float] | None) -> tuple[Alignment, Alignment, list[Alignment]]:
     """The fit that the pairs support, the one whose mount is free, and those of other delays."""
     shortest, *others = likely_delays(pairs, mount)
-    held, free = align(pairs, shortest.delay, mount=mount), align(pairs, shortest.delay, free=True)
-    return free if _is_firm(free, held) else held, free, others
+    fixed, free = align(pairs, shortest.delay, mount=mount), align(pairs, shortest.delay, free=True)
+    return free if _is_firm(free, fixed) else fixed, free, others
 
 
 def _alike(pair: Alignment) -> bool:
@@ -213,14 +213,14 @@ def _restored(record: Record, name: str) -> Array:
     return np.asarray(values + leaked - np.mean(leaked))
 
 
-def _is_firm(free: Alignment, held: Alignment) -> bool:
+def _is_firm(free: Alignment, fixed: Alignment) -> bool:
     """Whether the record tells the mount."""
     gain, damped, squared = free.theta[1:]
     wide, steps = CHANCE * free.sd([0, 0, 1, 0]), np.diff(free.lines.turn)
     narrowest = 2 * squared * float(np.min(steps[steps > 0], initial=math.inf))  # else a disturbance of one line
     damps = damped > -wide and damped + wide > narrowest
     moves = abs(gain) > FAINT * free.sd([0, 1, 0, 0])  # else what rings is not what moves
-    better = (held.misfit - free.misfit) / free.widening
+    better = (fixed.misfit - free.misfit) / free.widening
     return bool(squared > 0 and damps and moves and free.sd([0, 0, 0, 1]) < 2 * FIRM * squared and better > NEEDED)
 
 

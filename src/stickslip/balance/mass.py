@@ -82,10 +82,13 @@ def stiffness_per_mass(
     ratios = np.array([fit.coefficients[0] for fit in fits])
     sd = math.hypot(float(np.mean([fit.sd[0] for fit in fits])), float(ratios.std(ddof=1)))
     return Estimate.normal(
-        "stiffness over mass", ratios.mean(), sd=sd, unit="1/s^2",
+        "stiffness over mass",
+        ratios.mean(),
+        sd=sd,
+        unit="1/s^2",
         method="least squares on the acceleration while it slides",
         status="ok" if ratios.mean() > 0 else "negative: a sensor has the wrong sign",
-    )  # fmt: skip
+    )
 
 
 def mass_and_stiffness(

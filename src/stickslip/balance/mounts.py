@@ -231,8 +231,11 @@ def acceleration_of_mass(
     if known and (swings or noise > LOUD):
         return _fused(record, rig, question)
     if swings and mount is not None:
-        return Acceleration(record, f"{channel} stands on a mount of {mount[0]:g} Hz, whose ringing is in it: give x, "
-                                    "z, mass and stiffness to have it taken out")  # fmt: skip
+        return Acceleration(
+            record,
+            f"{channel} stands on a mount of {mount[0]:g} Hz, whose ringing is in it: give x, "
+            "z, mass and stiffness to have it taken out",
+        )
     return Acceleration(record, _mount_seen(record, channel) or _too_loud(channel, noise))
 
 

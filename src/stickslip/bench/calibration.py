@@ -115,7 +115,7 @@ def calibrate(
         known, read = values, np.array([hold.level for hold in holds])
         design = np.column_stack([known, np.ones(len(known))])
         weight_sd = np.array([hold.sd for hold in holds])
-    fit, sd, left, quantile = _line(design, read, weight_sd)
+    fit, sd, residual, quantile = _line(design, read, weight_sd)
     gain_sd = math.hypot(sd[0], reference_sd * fit[0])
     if not abs(fit[0]) > 3 * sd[0]:
         raise EstimateError(
@@ -125,14 +125,19 @@ def calibrate(
         )
     method = f"{len(read)} {'steps between levels' if leaks else 'levels'} against known values"
     gain = Estimate.normal(f"gain of {channel}", fit[0], sd=gain_sd, unit="1", method=method, quantile=quantile)
-    zero = None if leaks else Estimate.normal(
-        f"zero of {channel}", fit[1], sd=sd[1], unit=unit, method=method, quantile=quantile
-    )  # fmt: skip
-    largest = float(np.abs(left).max() / np.ptp(fit[0] * known))
+    zero = (
+        None
+        if leaks
+        else Estimate.normal(f"zero of {channel}", fit[1], sd=sd[1], unit=unit, method=method, quantile=quantile)
+    )
+    largest = float(np.abs(residual).max() / np.ptp(fit[0] * known))
     linearity = Estimate.normal(
-        f"deviation of {channel} from a straight line", largest,
-        sd=float(weight_sd.max() / np.ptp(fit[0] * known)), unit="1", method=method,
-    ).within(0.0)  # fmt: skip
+        f"deviation of {channel} from a straight line",
+        largest,
+        sd=float(weight_sd.max() / np.ptp(fit[0] * known)),
+        unit="1",
+        method=method,
+    ).within(0.0)
     bent = [Doubt(f"{channel} is off a straight line by {100 * largest:.2g} % of the range", "bent")]
     return Calibration(channel, gain, zero, linearity, known, read, Status(*bent * (largest > BENT)))
 
@@ -152,11 +157,11 @@ def _line(design: Array, read: Array, read_sd: Array) -> tuple[Array, Array, Arr
     The scatter may by chance be less than what noise alone leaves of a level: then that counts.
     """
     fit = np.linalg.lstsq(design, read)[0]
-    left = read - design @ fit
+    residual = read - design @ fit
     freedom = max(1, len(read) - design.shape[1])
-    scatter, chance = math.sqrt(float(left @ left) / freedom), math.sqrt(float(np.mean(read_sd**2)))
+    scatter, chance = math.sqrt(float(residual @ residual) / freedom), math.sqrt(float(np.mean(read_sd**2)))
     sd = max(scatter, chance) * np.sqrt(np.diag(np.linalg.inv(design.T @ design)))
-    return np.asarray(fit, dtype=float), sd, left, student(float(freedom))
+    return np.asarray(fit, dtype=float), sd, residual, student(float(freedom))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -224,11 +229,14 @@ def spring_by_weights(
     # an even interval of the logarithm: a stiffness is never below zero
     part = math.hypot(compliance.spread / compliance.value, gain_sd)
     stiffness = Estimate(
-        "spring stiffness", 1 / compliance.value,
+        "spring stiffness",
+        1 / compliance.value,
         (math.exp(-1.96 * part) / compliance.value, math.exp(1.96 * part) / compliance.value),
-        part / compliance.value, "N/m", f"displacement under {len(calibration.levels)} weights",
+        part / compliance.value,
+        "N/m",
+        f"displacement under {len(calibration.levels)} weights",
         checks=(f"off a straight line by {100 * calibration.linearity.value:.2g} %",),
-    )  # fmt: skip
+    )
     return SpringByWeights(
         replace(stiffness, status=calibration.status), calibration.reference, calibration.levels, calibration.status
     )

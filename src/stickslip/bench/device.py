@@ -424,7 +424,7 @@ def devices() -> tuple[Found, ...]:
     >>> [found.missing for found in devices() if found.kind == "sim"]
     ['']
     """
-    return tuple(map(_found, DRIVERS))
+    return tuple(map(_driver, DRIVERS))
 
 
 def _there(package: str) -> bool:
@@ -435,7 +435,7 @@ def _there(package: str) -> bool:
         return False
 
 
-def _found(kind: str) -> Found:
+def _driver(kind: str) -> Found:
     module = driver(kind)
     about = str(module.__doc__).partition("\n")[0]
     if module.NEEDS and not _there(module.NEEDS):

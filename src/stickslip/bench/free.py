@@ -124,9 +124,11 @@ def free_vibration(
             doubts.append(Doubt(f"the phase of {name} is not told: {error}", lesser=True))
             continue
         delays[name], phases[name] = _lead(delay, name, decay.frequency, unsure.get(name, 0.0))
-    ratio = replace(old.damping_ratio, name="damping ratio by decrement") if old else decay.damping_ratio.unknown(
-        "the decrement method is refused"
-    )  # fmt: skip
+    ratio = (
+        replace(old.damping_ratio, name="damping ratio by decrement")
+        if old
+        else decay.damping_ratio.unknown("the decrement method is refused")
+    )
     return FreeVibration(
         decay.frequency, decay.damping_ratio, ratio, decay.dry_displacement, phases, delays,
         _inertia(record, decay) if "load" in record else None, Status(*doubts),
@@ -148,16 +150,21 @@ def _inertia(record: Record, decay: DecayFit) -> Estimate:
     value = math.copysign(abs(ratio), ratio.real)  # the displacement may be late
     gains = math.hypot(*(record.channels[name].gain_sd for name in ("x", "load")))
     return Estimate.normal(
-        "mass before the load cell", value, sd=math.hypot(sd / (turn**2 * abs(x)), gains * value), unit="kg",
+        "mass before the load cell",
+        value,
+        sd=math.hypot(sd / (turn**2 * abs(x)), gains * value),
+        unit="kg",
         method="what the cell reads in the free vibration, over the acceleration",
-    ).within(0.0)  # fmt: skip
+    ).within(0.0)
 
 
 def _amplitude(design: Array, inverse: Array, values: Array) -> tuple[complex, float]:
     """Complex amplitude of a decaying oscillation in a channel, and the deviation of its real part."""
     fit = inverse @ (design.T @ values)
-    left = values - design @ fit
-    sd = math.sqrt(float(inverse[0, 0]) * float(left @ left) / len(left) * max(1.0, correlation_time(left)))
+    residual = values - design @ fit
+    sd = math.sqrt(
+        float(inverse[0, 0]) * float(residual @ residual) / len(residual) * max(1.0, correlation_time(residual))
+    )
     return complex(fit[0], fit[1]), sd
 
 
@@ -191,7 +198,7 @@ def _lead(delay: SensorDelay, name: str, frequency: Estimate, unsure: float) -> 
         status=late.status, checks=late.checks,
     )  # fmt: skip
     # any free vibration repeats itself: of the delays a period apart the shortest is meant
-    lead = replace(lead, status=Status(*(each for each in doubts_of(lead.status) if each.kind != REPEATS)))
+    lead = replace(lead, status=Status(*(doubt for doubt in doubts_of(lead.status) if doubt.kind != REPEATS)))
     turn = 2 * math.pi * frequency.value
     return lead, lead.scaled(turn, "rad", f"phase by which {name} leads x")
 
@@ -300,8 +307,8 @@ def best_constants(
         raise EstimateError("neither a mass nor a spring", "a frequency tells their ratio alone", "weigh one of them")
     rows = [([1.0, 0.0], mass) for mass in masses] + [([0.0, 1.0], spring) for spring in springs]
     design = np.array([row for row, _ in rows] + [[-1.0, 1.0]])
-    read = np.array([math.log(each.value) for _, each in rows] + [2 * math.log(2 * math.pi * frequency.value)])
-    sd = np.array([each.spread / each.value for _, each in rows] + [2 * frequency.spread / frequency.value])
+    read = np.array([math.log(estimate.value) for _, estimate in rows] + [2 * math.log(2 * math.pi * frequency.value)])
+    sd = np.array([estimate.spread / estimate.value for _, estimate in rows] + [2 * frequency.spread / frequency.value])
     sd = np.maximum(sd, 1e-9)
     fit = np.linalg.lstsq(design / sd[:, None], read / sd)[0]
     cover = np.sqrt(np.diag(np.linalg.inv((design / sd[:, None]).T @ (design / sd[:, None]))))
@@ -380,8 +387,8 @@ def onto_stick(record: Record, *, mass: Constant, stiffness: Constant) -> OntoSt
     """
     weight, spring = Estimate.stated("mass", mass, "kg"), Estimate.stated("stiffness", stiffness, "N/m")
     record.require_clean("x", "a", question=STICKS, samples=100)
-    found, begin = _rung(record, weight, _stop(record))
-    coupled = min(found.resonances, key=lambda resonance: (COUPLED not in resonance.name, resonance.frequency.spread))
+    ringing, begin = _rung(record, weight, _stop(record))
+    coupled = min(ringing.resonances, key=lambda resonance: (COUPLED not in resonance.name, resonance.frequency.spread))
     turn, of_mass = (2 * math.pi * coupled.frequency.value) ** 2, weight.value
     value = of_mass * turn - spring.value
     sd = math.hypot(
@@ -392,7 +399,7 @@ def onto_stick(record: Record, *, mass: Constant, stiffness: Constant) -> OntoSt
     ).within(0.0)
     names = ("coupled frequency", "damping ratio of the coupled mode")
     frequency, damping = (replace(e, name=n) for e, n in zip((coupled.frequency, coupled.damping), names, strict=True))
-    return OntoStick(frequency, damping, contact, begin, found, Status(found.status))
+    return OntoStick(frequency, damping, contact, begin, ringing, Status(ringing.status))
 
 
 def _stop(record: Record) -> int:

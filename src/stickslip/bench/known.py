@@ -47,8 +47,8 @@ class Known:
 
     def of(self, step: str, kind: type[Any]) -> Any:
         """The result of a step, or None."""
-        found = self.results.get(step)
-        return found if isinstance(found, kind) else None
+        result = self.results.get(step)
+        return result if isinstance(result, kind) else None
 
     def having(self, step: str, result: Result) -> Known:
         """With one more result."""
@@ -60,19 +60,19 @@ class Known:
     def mounts(self) -> dict[str, Resonance | tuple[float, float]]:
         """What the sensors stand on, by channel: as a tap found it, else as stated."""
         known: dict[str, Resonance | tuple[float, float]] = {
-            name: told.mount for name, told in self.rig.sensors.items() if told.mount is not None
+            name: sensor.mount for name, sensor in self.rig.sensors.items() if sensor.mount is not None
         }
         tap = self.of("tap", ImpactTest)
         for channel, name in STANDS_ON.items():
-            for each in tap.resonances if tap is not None else ():
-                if each.name == name:
-                    known[channel] = each
+            for resonance in tap.resonances if tap is not None else ():
+                if resonance.name == name:
+                    known[channel] = resonance
         return known
 
     def gain(self, channel: str) -> Estimate | None:
         """Reading over truth of a channel, where it was calibrated."""
-        found = [self.of(step, Calibration) for step, name in CALIBRATIONS.items() if name == channel]
-        return next((each.gain for each in found if each is not None), None)
+        calibrations = [self.of(step, Calibration) for step, name in CALIBRATIONS.items() if name == channel]
+        return next((calibration.gain for calibration in calibrations if calibration is not None), None)
 
     def zero(self, channel: str) -> float:
         """What a channel reads at rest; 0 where that was not asked."""
@@ -83,18 +83,18 @@ class Known:
 
     def corrected(self, record: Record) -> Record:
         """A record with zeros taken off and gains set right, as far as they are known; their doubt in ``gain_sd``."""
-        samples, told = dict(record.samples), {}
+        samples, applied = dict(record.samples), {}
         for name in record:
             gain, zero = self.gain(name), self.zero(name)
             if gain is None and not zero:
                 continue
             samples[name] = (record[name] - zero) / (gain.value if gain else 1.0)
-            told[name] = {"zero": zero, "gain": gain.value if gain else 1.0}
+            applied[name] = {"zero": zero, "gain": gain.value if gain else 1.0}
             if gain:
                 record = record.with_details(name, gain_sd=gain.spread / abs(gain.value))
-        if not told:
+        if not applied:
             return record
-        return record.with_samples(samples, Step("corrected", told, "zero and gain by commissioning"))
+        return record.with_samples(samples, Step("corrected", applied, "zero and gain by commissioning"))
 
     # ---- constants
 
@@ -119,7 +119,7 @@ class Known:
         if self.rig.mass is None or self.rig.stiffness is None:
             return None
         pair = (("mass", self.rig.mass, "kg"), ("spring stiffness", self.rig.stiffness, "N/m"))
-        mass, spring = (Estimate.stated(*each) for each in pair)
+        mass, spring = (Estimate.stated(*arguments) for arguments in pair)
         return MassAndSpring(mass, spring, "ok")
 
     def require_constants(self) -> MassAndSpring:
@@ -160,18 +160,18 @@ class Known:
 
     def settings(self) -> dict[str, Any]:
         """What ``rig.toml`` is to say, as plain data: stated before, and found now."""
-        told = self.rig.model_dump(exclude_unset=True)
+        settings = self.rig.model_dump(exclude_unset=True)
         known, damping = self.constants, self.damping
         if known is not None:
-            told |= {"mass": _pm(known.mass), "stiffness": _pm(known.stiffness)}
+            settings |= {"mass": _pm(known.mass), "stiffness": _pm(known.stiffness)}
         if damping is not None:
-            told["damping"] = _pm(damping)
+            settings["damping"] = _pm(damping)
         if channels := self._channels():
-            told["channels"] = {**told.get("channels", {}), **channels}
+            settings["channels"] = {**settings.get("channels", {}), **channels}
         sensors = self._sensors()
         if sensors:
-            told["sensors"] = {**told.get("sensors", {}), **sensors}
-        return told
+            settings["sensors"] = {**settings.get("sensors", {}), **sensors}
+        return settings
 
     def _channels(self) -> dict[str, str]:
         """The channel map with zeros and gains."""
@@ -185,26 +185,26 @@ class Known:
         return made
 
     def _sensors(self) -> dict[str, dict[str, Any]]:
-        told: dict[str, dict[str, Any]] = {}
+        tables: dict[str, dict[str, Any]] = {}
         rest, free = self.of("rest", AtRest), self.of("free", FreeVibration)
         for name, sensor in rest.sensors.items() if rest is not None else ():
             gain = self.gain(name)
-            told.setdefault(name, {})["noise"] = _short(sensor.noise.value / abs(gain.value if gain else 1.0))
+            tables.setdefault(name, {})["noise"] = _short(sensor.noise.value / abs(gain.value if gain else 1.0))
         for name, mount in self.mounts.items():
             pair = mount if isinstance(mount, tuple) else (mount.frequency.value, mount.damping.value)
-            told.setdefault(name, {})["mount"] = [f"{pair[0]:.5g} Hz", _short(pair[1])]
+            tables.setdefault(name, {})["mount"] = [f"{pair[0]:.5g} Hz", _short(pair[1])]
         late = free.delays.get("a") if free is not None else None
         if late is not None:
-            told.setdefault("x", {})["delay"] = f"{late.value:.5g} s"
+            tables.setdefault("x", {})["delay"] = f"{late.value:.5g} s"
             modal = self.of("sweep", ModalFit)
             if modal is not None:
-                told.setdefault("z", {})["delay"] = f"{late.value - modal.delay.value:.5g} s"
+                tables.setdefault("z", {})["delay"] = f"{late.value - modal.delay.value:.5g} s"
         if free is not None and free.inertia is not None and free.inertia.interval[0] > 0:
-            told.setdefault("load", {})["inertia"] = f"{free.inertia.value:.5g} kg"
+            tables.setdefault("load", {})["inertia"] = f"{free.inertia.value:.5g} kg"
         leak = self.of("discharge", DischargeTest)
         if leak is not None and math.isfinite(leak.time_constant.value):
-            told.setdefault("load", {})["discharge"] = f"{leak.time_constant.value:.5g} s"
-        return told
+            tables.setdefault("load", {})["discharge"] = f"{leak.time_constant.value:.5g} s"
+        return tables
 
     def toml(self) -> str:
         """The text of ``rig.toml``; read back, it is what :meth:`settings` says.
@@ -223,7 +223,7 @@ class Known:
         stick = self.of("stick", OntoStick)
         if stick is None:
             return []
-        return [f"# {each}" for each in (stick.frequency, stick.stiffness)]
+        return [f"# {estimate}" for estimate in (stick.frequency, stick.stiffness)]
 
 
 def _channel(stated: str, zero: float, gain: Estimate | None) -> str:

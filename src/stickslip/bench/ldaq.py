@@ -116,18 +116,18 @@ def build(name: str, settings: Mapping[str, Any], folder: Path) -> Source:
     given = checked(_Settings, settings, source=f"devices.{name}")
     base = vendors("LDAQ.acquisition_base").BaseAcquisition
     module, _, wanted = given.acquisition.rpartition(".")
-    found: Any = None
+    source: Any = None
     if re.fullmatch(r"[A-Za-z]\w*(\.[A-Za-z]\w*)*", given.acquisition) and module:
         try:
-            found = getattr(importlib.import_module(f"LDAQ.{module}"), wanted, None)
+            source = getattr(importlib.import_module(f"LDAQ.{module}"), wanted, None)
         except ImportError as error:
             raise ModelError(
                 f"LDAQ.{module} can not be imported ({error})", "it is a part of LDAQ", "install it"
             ) from error
-    if not (isinstance(found, type) and issubclass(found, base)):
+    if not (isinstance(source, type) and issubclass(source, base)):
         raise ModelError(
             f"acquisition = {given.acquisition!r}",
             "it is one of LDAQ's sources",
             'write "dewesoft.DewesoftAcquisition"',
         )
-    return Source(found(**given.arguments), inputs(given.channels, unit="V"), name)
+    return Source(source(**given.arguments), inputs(given.channels, unit="V"), name)

@@ -189,17 +189,17 @@ class March:
             rows = slice(first, len(times) if last else int(np.searchsorted(times, leg.end)))
             if rows.start >= rows.stop:
                 continue
-            found = self.labels(leg.run).get(label)
-            if found is not None:  # a base that stands still is at 0
+            labelled = self.labels(leg.run).get(label)
+            if labelled is not None:  # a base that stands still is at 0
                 local = np.clip(times[rows] - leg.begin, 0.0, leg.run.duration)
-                out[rows] = leg.run.sample(local, (found[0],))[0][found[1]]
+                out[rows] = leg.run.sample(local, (labelled[0],))[0][labelled[1]]
         return out
 
     def breaks(self, first: float, last: float) -> Array:
         """Instants in (first, last) at which the acceleration may jump."""
         starts = [leg.begin + leg.run.starts for leg in self.legs if leg.begin < last and leg.end > first]
-        found = np.concatenate(starts) if starts else np.empty(0)
-        return found[(found > first) & (found < last)]
+        instants = np.concatenate(starts) if starts else np.empty(0)
+        return instants[(instants > first) & (instants < last)]
 
     @staticmethod
     def labels(run: Trajectory) -> dict[str, tuple[str, int, str]]:

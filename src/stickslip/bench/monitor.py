@@ -149,12 +149,12 @@ class Monitor:
             return []
         marks = (row > middle + HIGH * span).astype(np.int8) - (row < middle - HIGH * span)
         known = np.flatnonzero(marks)
-        found = []
+        rows = []
         for at in known[np.append(True, np.diff(marks[known]) != 0)[: len(known)]].tolist():
             if marks[at] > 0 and self.above is False:
-                found.append(first + at)
+                rows.append(first + at)
             self.above = bool(marks[at] > 0)
-        return found
+        return rows
 
     def _rows(self, first: int, last: int) -> Array | None:
         """Samples of all channels from one counter to another."""
@@ -183,17 +183,17 @@ class Monitor:
 
     def _flaws(self, channels: Mapping[str, Array], last: Array, period: float) -> list[Flaw]:
         """What is wrong with each sensor in the last cycles."""
-        found = []
+        flaws = []
         for one, cycle in zip(self.device.inputs, last, strict=True):
             noise = noise_of(cycle)
             known = self.quiet[one.name]
             flaw = _flaw(one, cycle, noise, float(np.median(known)) if known else math.nan)
             if flaw is None and len(known) < 3:
                 known.append(noise)
-            found += [flaw] if flaw else []
-        broken = {flaw.channel for flaw in found}
+            flaws += [flaw] if flaw else []
+        broken = {flaw.channel for flaw in flaws}
         sound = {name: values for name, values in channels.items() if name not in broken}
-        return found + _late(sound, self.device.inputs, self.constants, (period, self.device.fs))
+        return flaws + _late(sound, self.device.inputs, self.constants, (period, self.device.fs))
 
 
 def noise_of(values: Array) -> float:
@@ -240,8 +240,8 @@ def _late(
     x, noise = lines["x"]
     lag, error = -float(np.angle(-(omega**2) * x / a)) / omega, math.hypot(noise / abs(x), sd / abs(a)) / omega
     lag += expected["a"]
-    found = _judged("x", lag - expected["x"], error, fs)
-    lag = lag if found else expected["x"]
+    flaws = _judged("x", lag - expected["x"], error, fs)
+    lag = lag if flaws else expected["x"]
     whole = "z" in channels or not any(one.name == "z" for one in inputs)
     if whole and "load" in channels and {"mass", "stiffness"} <= set(constants):
         mass, stiffness, turn = constants["mass"], constants["stiffness"], 1j * omega
@@ -254,8 +254,8 @@ def _late(
         if abs(due) > CLEAR * abs(spring):
             own = math.hypot(mass * sd, stiffness * noise) / abs(due) / omega
             error = math.hypot(own, error * abs(spring) / abs(due), lines["load"][1] / abs(lines["load"][0]) / omega)
-            found += _judged("load", -float(np.angle(lines["load"][0] / due)) / omega - expected["load"], error, fs)
-    return found
+            flaws += _judged("load", -float(np.angle(lines["load"][0] / due)) / omega - expected["load"], error, fs)
+    return flaws
 
 
 def _judged(name: str, lag: float, error: float, fs: float) -> list[Flaw]:

@@ -62,8 +62,8 @@ class Unit:
     def model(self) -> str:
         """Product and serial number, where the unit can be asked."""
         try:
-            found = vendors("nidaqmx").system.Device(self.device)
-            return f"{found.product_type}, serial {found.serial_num:X}"
+            unit = vendors("nidaqmx").system.Device(self.device)
+            return f"{unit.product_type}, serial {unit.serial_num:X}"
         except Exception as error:  # noqa: BLE001  the driver raises its own, and an unit may not be there yet
             return f"{self.device} ({str(error).partition(chr(10))[0]})"
 
@@ -93,8 +93,8 @@ class Task:
                 self.task.ai_channels.add_ai_voltage_chan(
                     f"{device.device}/{one.terminal}", min_val=-volts, max_val=volts
                 )
-            held, mode = round(HELD * device.fs), kinds.AcquisitionType.CONTINUOUS
-            self.task.timing.cfg_samp_clk_timing(device.fs, sample_mode=mode, samps_per_chan=held)
+            buffered, mode = round(HELD * device.fs), kinds.AcquisitionType.CONTINUOUS
+            self.task.timing.cfg_samp_clk_timing(device.fs, sample_mode=mode, samps_per_chan=buffered)
             self.reader = vendors("nidaqmx.stream_readers").AnalogMultiChannelReader(self.task.in_stream)
             self.task.start()
         except self.ni.errors.DaqError as error:

@@ -246,7 +246,7 @@ def _about(
     """The description of a record to be."""
     ranges = {one.name: one.limit for one in device.inputs if math.isfinite(one.limit)}
     serials = {one.name: one.serial for one in device.inputs if one.serial}
-    told = {
+    arguments = {
         "device": device.name,
         "kind": device.kind,
         "model": device.model,
@@ -258,7 +258,7 @@ def _about(
     }
     channels = {one.name: one.channel for one in device.inputs}
     blank = Record(
-        {name: np.zeros(1) for name in channels}, channels, device.fs, start, (Step("acquire", told),), log=log
+        {name: np.zeros(1) for name in channels}, channels, device.fs, start, (Step("acquire", arguments),), log=log
     )
     scales = [one.scale for one in device.inputs]
     return {**record_to_metadata(blank), "type": kind.newbyteorder("<").str, "scales": scales}
@@ -519,10 +519,10 @@ class _Head:
                 run.began, at = block.clock - (block.after - block.first) / fs, block.first
         elif self.row is not None:
             values = block.samples[self.row] * self.device.inputs[self.row].scale
-            found = trigger.row(values, self.last)
+            row = trigger.row(values, self.last)
             self.last = float(values[-1])
-            if found is not None:
-                at = block.first + found
+            if row is not None:
+                at = block.first + row
                 run.began = block.clock - (block.after - at) / fs
         if at is None and run.began is not None and self.row is None:
             at = block.after - (block.clock - run.began) * fs  # as good as the time at which blocks come

@@ -74,11 +74,11 @@ class Replay:
     @cached_property
     def inputs(self) -> tuple[Input, ...]:
         """Its channels, with what is stated of their sensors."""
-        found = []
+        measured = []
         for one in self.record.channels.values():
             stated = {name: getattr(one, name) for name in DETAILS if name not in ("sensitivity", "quantity")}
-            found.append(Input(one.name, one.unit, sensitivity=one.sensitivity, terminal=one.source, details=stated))
-        return tuple(found)
+            measured.append(Input(one.name, one.unit, sensitivity=one.sensitivity, terminal=one.source, details=stated))
+        return tuple(measured)
 
     def open(self) -> Playing:
         """Begin to play."""

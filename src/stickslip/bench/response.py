@@ -153,7 +153,7 @@ def _stepped(
         whole = max(1, math.floor((stands[-1] - begin) / PIECES * tone / fs)) / tone * fs  # whole periods
         edges = (begin + np.round(whole * np.arange(PIECES + 1))).astype(int)
         parts = [slice(a, min(b, len(u))) for a, b in itertools.pairwise(edges) if a < len(u)]
-        amplitudes = np.array([[np.mean(each[part] * turn[part]) for each in (u, y)] for part in parts]).T
+        amplitudes = np.array([[np.mean(samples[part] * turn[part]) for samples in (u, y)] for part in parts]).T
         rows.append((tone, *(np.mean(a * np.conj(b)) for a, b in _pairs(amplitudes))))
     frequency, uu, yy, uy = (np.array(column) for column in zip(*rows, strict=True))
     coherence = np.clip(np.abs(uy) ** 2 / (uu.real * yy.real), 0.0, 1.0)
@@ -272,9 +272,10 @@ def modal_fit(
     """
     if channels[0] not in INPUTS or damper not in ("ground", "base"):
         raise EstimateError(
-            f"input {channels[0]}, damper {damper}", "the input is z or force, the damper ends on ground or base",
+            f"input {channels[0]}, damper {damper}",
+            "the input is z or force, the damper ends on ground or base",
             "name them as channels= and damper=",
-        )  # fmt: skip
+        )
     record.require_clean(*channels, question=MODAL, samples=200)
     record = without_delays(record, *channels, question=MODAL)
     lines = _Lines.of(record, channels, damper)
@@ -288,11 +289,11 @@ def modal_fit(
     doubt = Doubt(
         f"the answer leaves {power:.2g} times the noise: more than one mass on one spring, or friction", "model"
     )
-    found = _told(lines, fit.x, cover, given, Status(*[doubt] * (power > UNEXPLAINED)))
-    return replace(found, response=_seen(record, channels))
+    modal = _modal_of(lines, fit.x, cover, given, Status(*[doubt] * (power > UNEXPLAINED)))
+    return replace(modal, response=_response_of(record, channels))
 
 
-def _seen(record: Record, channels: tuple[str, str]) -> FrequencyResponse | None:
+def _response_of(record: Record, channels: tuple[str, str]) -> FrequencyResponse | None:
     try:
         return frequency_response(record, channels=channels)
     except StickslipError:
@@ -376,7 +377,7 @@ class _Lines:
         return np.concatenate([residual.real, residual.imag])
 
 
-def _told(lines: _Lines, p: Array, cover: Array, given: dict[str, Estimate], status: str) -> ModalFit:
+def _modal_of(lines: _Lines, p: Array, cover: Array, given: dict[str, Estimate], status: str) -> ModalFit:
     method = f"{len(lines.turn)} lines, errors in both channels"
 
     def of(name: str, value: float, gradient: Sequence[float], unit: str, extra: float = 0.0) -> Estimate:

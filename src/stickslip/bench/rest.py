@@ -72,7 +72,9 @@ class AtRest(Result):
     @property
     def estimates(self) -> tuple[Estimate, ...]:
         """Zero, noise and drift of each."""
-        return tuple(each for sensor in self.sensors.values() for each in (sensor.zero, sensor.noise, sensor.drift))
+        return tuple(
+            estimate for sensor in self.sensors.values() for estimate in (sensor.zero, sensor.noise, sensor.drift)
+        )
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON."""
@@ -123,30 +125,30 @@ def _sensor(name: str, record: Record) -> SensorAtRest:
     count = quantisation_step(values)
     time = (np.arange(len(values)) - (len(values) - 1) / 2) / record.fs
     slope = float(time @ values / (time @ time))
-    left = values - values.mean() - slope * time
-    worth = len(values) / max(1.0, correlation_time(left))
+    residual = values - values.mean() - slope * time
+    worth = len(values) / max(1.0, correlation_time(residual))
     of = f"{len(values)} samples at rest"
-    zero_sd, freedom = mean_uncertainty(left)
-    level, noise = _noise(values - slope * time, left, count, worth)
+    zero_sd, freedom = mean_uncertainty(residual)
+    level, noise = _noise(values - slope * time, residual, count, worth)
     zero = Estimate.normal(
         f"zero of {name}", level, sd=zero_sd, unit=unit, method=f"mean of {of}", quantile=student(freedom)
     )
-    sd, slope_freedom = mean_uncertainty(time * left / float(np.mean(time**2)))
+    sd, slope_freedom = mean_uncertainty(time * residual / float(np.mean(time**2)))
     drift = Estimate.normal(
         f"drift of {name}", slope, sd=sd, unit=f"{unit}/s", method=f"slope of {of}", quantile=student(slope_freedom)
     )
     spread = noise[1] if math.isfinite(noise[1]) else 0.0
-    told = Estimate.normal(
+    rounded = Estimate.normal(
         f"noise of {name}", noise[0], sd=spread, unit=unit, method=f"likelihood of the counts of {of}" if count else of
     ).within(0.0)
     if not noise[0] or not math.isfinite(noise[1]):
-        told = Estimate(told.name, 0.0, (0.0, count / 2 or 0.0), count / 4, unit, f"{of} stand on one count")
-    return SensorAtRest(name, zero, drift, told, count, _status(name, values, left, worth, drift))
+        rounded = Estimate(rounded.name, 0.0, (0.0, count / 2 or 0.0), count / 4, unit, f"{of} stand on one count")
+    return SensorAtRest(name, zero, drift, rounded, count, _status(name, values, residual, worth, drift))
 
 
-def _noise(values: Array, left: Array, count: float, worth: float) -> tuple[float, tuple[float, float]]:
+def _noise(values: Array, residual: Array, count: float, worth: float) -> tuple[float, tuple[float, float]]:
     """Level, and deviation of the noise with its own; the second is infinite where only a bound is known."""
-    level, sd = float(values.mean()), float(left.std())
+    level, sd = float(values.mean()), float(residual.std())
     if not count or sd > COARSE * count:
         return level, (sd, sd / math.sqrt(2 * max(1.0, worth - 2)))
     counts, times = np.unique(np.round(values / count), return_counts=True)
@@ -178,13 +180,13 @@ def _rounded(
     return level + count * float(best[0]), (noise, noise / math.sqrt(bend) if bend > 0 else math.inf)
 
 
-def _status(name: str, values: Array, left: Array, worth: float, drift: Estimate) -> str:
-    blocks = left[: len(left) // 20 * 20].reshape(20, -1).mean(axis=1)
-    expected = left.std() / math.sqrt(max(1.0, len(left) / 20))
+def _status(name: str, values: Array, residual: Array, worth: float, drift: Estimate) -> str:
+    blocks = residual[: len(residual) // 20 * 20].reshape(20, -1).mean(axis=1)
+    expected = residual.std() / math.sqrt(max(1.0, len(residual) / 20))
     doubts: list[Doubt | str] = []
     if np.ptp(values) == 0:
         doubts.append(Doubt(f"{name} reads one number throughout: is it plugged in?", "dead"))
-    elif np.abs(blocks).max() > MOVES * expected and worth < len(left) / 20:
+    elif np.abs(blocks).max() > MOVES * expected and worth < len(residual) / 20:
         doubts.append(Doubt(f"{name} swings slowly: the rig moves, or its sensor warms up", "moves"))
     if drift.known and not drift.includes(0.0):
         doubts.append(Doubt(f"{name} drifts", "drifts", lesser=True))
@@ -296,18 +298,19 @@ def _fitted(time: Array, blocks: Array, before: Rows, after: Rows, at: float, un
     noise = max(float(np.std(np.diff(y[~behind]))) / math.sqrt(2), 1e-12 * abs(high - zero))
     if abs(high - zero) < LOUD * noise:
         raise EstimateError(
-            f"a step of {high - zero:.3g} {unit} in noise of {noise:.2g} {unit}", f"{DISCHARGE} needs a step {LOUD:g} "
-            "times as high as the noise", "put a heavier weight on",
-        )  # fmt: skip
+            f"a step of {high - zero:.3g} {unit} in noise of {noise:.2g} {unit}",
+            f"{DISCHARGE} needs a step {LOUD:g} times as high as the noise",
+            "put a heavier weight on",
+        )
     span = float(t[behind][-1] - t[behind][0])
     begin = np.array(
         [zero, high - zero, max(1e-3 / span, math.log(abs(high - zero) / max(noise, abs(y[-1] - zero))) / span)]
     )
     solve: Any = least_squares
     fit = solve(lambda p: (model(p) - y) / noise, begin, x_scale=[noise, abs(begin[1]), 1 / span])
-    left = y - model(fit.x)
-    factor = _correlated(left[behind])
-    sd = factor * float(np.std(left)) / noise * np.sqrt(np.diag(np.linalg.inv(fit.jac.T @ fit.jac)))
+    residual = y - model(fit.x)
+    factor = _correlated(residual[behind])
+    sd = factor * float(np.std(residual)) / noise * np.sqrt(np.diag(np.linalg.inv(fit.jac.T @ fit.jac)))
     quantile = student(max(3.0, len(y) / factor**2 - 3))
     rate, rate_sd = float(fit.x[2]), float(sd[2])
     return DischargeTest(
@@ -319,10 +322,10 @@ def _fitted(time: Array, blocks: Array, before: Rows, after: Rows, at: float, un
     )
 
 
-def _correlated(left: Array) -> float:
+def _correlated(residual: Array) -> float:
     """By how much the mean of the residual is less sure than of white noise; 1 at least."""
-    white = float(left.std()) / math.sqrt(len(left))
-    return max(1.0, mean_uncertainty(left)[0] / white) if white > 0 else 1.0
+    white = float(residual.std()) / math.sqrt(len(residual))
+    return max(1.0, mean_uncertainty(residual)[0] / white) if white > 0 else 1.0
 
 
 def _time_constant(rate: float, reach: float, span: float) -> Estimate:

@@ -73,10 +73,10 @@ class RunList(BaseModel):
     def toml(self) -> str:
         """As the text of a file that ``stickslip acquire --runs`` reads."""
         lines = ["# Runs to record: stickslip acquire --device NAME --runs THIS.toml --output FOLDER"]
-        for each in self.run:
-            lines += ["", "[[run]]", f'name = "{each.name}"', f"frequency = {each.frequency!r}  # Hz"]
-            lines += [f"amplitude = {each.amplitude!r}", f"seconds = {each.seconds!r}", f'on = "{each.on}"']
-            lines += [f'why = "{each.why}"'] if each.why else []
+        for run in self.run:
+            lines += ["", "[[run]]", f'name = "{run.name}"', f"frequency = {run.frequency!r}  # Hz"]
+            lines += [f"amplitude = {run.amplitude!r}", f"seconds = {run.seconds!r}", f'on = "{run.on}"']
+            lines += [f'why = "{run.why}"'] if run.why else []
         return "\n".join(lines) + "\n"
 
 
@@ -200,19 +200,19 @@ def next_runs(
         raise EstimateError(f"{len(laws)} laws", "a run is chosen to tell two laws apart", "give those that are left")
     if not noise > 0 or count < 1:
         raise ModelError(f"noise = {noise}, count = {count}", "both are positive", "correct them")
-    shaker, found = shaker or Shaker(), []
+    shaker, proposals = shaker or Shaker(), []
     for frequency in _frequencies(laws, shaker):
         top = _amplitude(laws, shaker, frequency)
         for share in SHARES:
             motion = (frequency, _round(share * top))
-            if motion[1] > 0 and all(_apart(motion, each) for each in done):
+            if motion[1] > 0 and all(_apart(motion, other) for other in done):
                 bound = shaker.bound(frequency) if share == 1.0 and top >= 0.99 * shaker.largest(frequency) else ""
-                found += _told(laws, motion, noise, largest, bound)
-    if not found:
+                proposals += _proposals(laws, motion, noise, largest, bound)
+    if not proposals:
         raise EstimateError(
             "no motion of the base is left to try", "the shaker has to move the mass", "check its limits"
         )
-    return _several(sorted(found, key=lambda each: -each.separation), count)
+    return _several(sorted(proposals, key=lambda proposal: -proposal.separation), count)
 
 
 def run_list(proposals: Sequence[Proposal], *, seconds: float = 20.0) -> RunList:
@@ -228,12 +228,15 @@ def run_list(proposals: Sequence[Proposal], *, seconds: float = 20.0) -> RunList
     return RunList(
         run=tuple(
             Run(
-                name=f"next-{number}", frequency=proposal.frequency, amplitude=proposal.amplitude, seconds=seconds,
+                name=f"next-{number}",
+                frequency=proposal.frequency,
+                amplitude=proposal.amplitude,
+                seconds=seconds,
                 why=proposal.why,
             )
             for number, proposal in enumerate(proposals, start=1)
         )
-    )  # fmt: skip
+    )
 
 
 def _frequencies(laws: Mapping[str, Oscillator], shaker: Shaker) -> list[float]:
@@ -246,7 +249,7 @@ def _frequencies(laws: Mapping[str, Oscillator], shaker: Shaker) -> list[float]:
             f"the mass moves below {high:.3g} Hz",
             "use another",
         )
-    return [_round(each) for each in np.geomspace(low, high, FREQUENCIES)]
+    return [_round(frequency) for frequency in np.geomspace(low, high, FREQUENCIES)]
 
 
 def _amplitude(laws: Mapping[str, Oscillator], shaker: Shaker, frequency: float) -> float:
@@ -269,13 +272,13 @@ def _apart(one: tuple[float, float], other: tuple[float, float]) -> bool:
 def _several(ranked: Sequence[Proposal], count: int) -> tuple[Proposal, ...]:
     """The best ones that differ from each other."""
     chosen: list[Proposal] = []
-    for each in ranked:
-        if all(_apart((each.frequency, each.amplitude), (c.frequency, c.amplitude)) for c in chosen):
-            chosen.append(each)
+    for proposal in ranked:
+        if all(_apart((proposal.frequency, proposal.amplitude), (c.frequency, c.amplitude)) for c in chosen):
+            chosen.append(proposal)
     return tuple(chosen[:count])
 
 
-def _told(
+def _proposals(
     laws: Mapping[str, Oscillator], motion: tuple[float, float], noise: float, largest: float, bound: str
 ) -> list[Proposal]:
     """What a motion tells; nothing where a law can not be simulated or the mass leaves the sensor's range."""
@@ -288,9 +291,9 @@ def _told(
         return []
     names = list(laws)
     pairs = [(a, b) for number, a in enumerate(names) for b in names[number + 1 :]]
-    told = {(a, b): min(_left(answers, effects, a, b), _left(answers, effects, b, a)) / noise for a, b in pairs}
-    pair = min(told, key=lambda each: told[each])
-    return [Proposal(*motion, told[pair], bound, pair)]
+    separations = {(a, b): min(_left(answers, effects, a, b), _left(answers, effects, b, a)) / noise for a, b in pairs}
+    pair = min(separations, key=lambda pair: separations[pair])
+    return [Proposal(*motion, separations[pair], bound, pair)]
 
 
 def _steady(system: Oscillator, motion: tuple[float, float]) -> Array:

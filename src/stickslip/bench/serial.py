@@ -116,11 +116,11 @@ class OpenPort(Listening):
 
     def _take(self, line: bytes) -> None:
         """One line: its numbers with its counter; a damaged one is a sample that was lost."""
-        words = SEPARATOR.split(line.strip())
+        cells = SEPARATOR.split(line.strip())
         device, at = self.device, self.next
         try:
-            values = [float(words[column]) for column in self.columns]
-            counted = int(words[device.counter - 1]) if device.counter else None
+            values = [float(cells[column]) for column in self.columns]
+            counted = int(cells[device.counter - 1]) if device.counter else None
         except (ValueError, IndexError):
             self.next += 1
             return

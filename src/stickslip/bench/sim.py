@@ -277,25 +277,25 @@ class SimStream:
             if there >= size or time.monotonic() >= until:
                 break
             time.sleep(min(max(0.0, (size - there) / self.rate), max(0.0, until - time.monotonic())))
-        held = round(BUFFER * self.device.fs)
-        if there > held:
-            self.sent += there - held
+        buffered = round(BUFFER * self.device.fs)
+        if there > buffered:
+            self.sent += there - buffered
         return max(0, min(there, 10 * size))
 
 
-def _driven(signal: Signal, times: Array, held: Shaken) -> tuple[Drive, Array]:
+def _driven(signal: Signal, times: Array, shaken: Shaken) -> tuple[Drive, Array]:
     """What moves an output after a ramp over `times`, and what it would do, or be, during the ramp."""
     if signal is None:
-        return held, np.zeros(len(times))
+        return shaken, np.zeros(len(times))
     if not isinstance(signal, Tone):
         samples = np.asarray(signal, dtype=np.float64)
-        return replace(held, samples=samples), np.full(len(times), samples[0])
+        return replace(shaken, samples=samples), np.full(len(times), samples[0])
     turn = math.tau * signal.frequency
     first = signal.amplitude * np.cos(turn * times + signal.phase)
     phase = math.remainder(turn * float(times[-1]) + signal.phase, math.tau)
-    if held.on == "force":
+    if shaken.on == "force":
         return HarmonicForce(signal.amplitude, signal.frequency, phase), first
-    return HarmonicBase(signal.amplitude, signal.frequency, phase, held.contact), first
+    return HarmonicBase(signal.amplitude, signal.frequency, phase, shaken.contact), first
 
 
 def _smooth(share: Array) -> Array:

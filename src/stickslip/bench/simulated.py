@@ -131,37 +131,37 @@ class SimulatedBench:
         """True values, by the names that the steps give their estimates; "STEP: NAME" where a step's own differs."""
         system, law = self.system, self.system.law
         w = math.sqrt(system.stiffness / system.mass)
-        told = {
+        truth = {
             "mass": system.mass, "spring stiffness": system.stiffness, "damping of the suspension": system.damping,
             "viscous damping": system.damping, "natural frequency": w / math.tau,
             "damping ratio": system.damping / (2 * w * system.mass), "dry friction displacement": 0.0,
         }  # fmt: skip
-        told["damping ratio by decrement"] = told["damping ratio"]
+        truth["damping ratio by decrement"] = truth["damping ratio"]
         loaded = w * math.sqrt(system.mass / self._loaded.mass)
-        told |= {
+        truth |= {
             "added: natural frequency": loaded / math.tau,
             "added: damping ratio": system.damping / (2 * loaded * self._loaded.mass),
         }
-        told["added: damping ratio by decrement"] = told["added: damping ratio"]
+        truth["added: damping ratio by decrement"] = truth["added: damping ratio"]
         if isinstance(law, CompliantContact):
             stiff, damping = system.stiffness + law.stiffness, system.damping + law.damping
-            told["coupled frequency"] = math.sqrt(stiff / system.mass) / math.tau
-            told["contact stiffness"] = law.stiffness
-            told["kinetic friction"] = law.kinetic
-            told["damping ratio of the coupled mode"] = damping / (2 * math.sqrt(stiff * system.mass))
-            told["frequency of the coupled contact"] = told["coupled frequency"]
-            told["damping ratio of the coupled contact"] = told["damping ratio of the coupled mode"]
+            truth["coupled frequency"] = math.sqrt(stiff / system.mass) / math.tau
+            truth["contact stiffness"] = law.stiffness
+            truth["kinetic friction"] = law.kinetic
+            truth["damping ratio of the coupled mode"] = damping / (2 * math.sqrt(stiff * system.mass))
+            truth["frequency of the coupled contact"] = truth["coupled frequency"]
+            truth["damping ratio of the coupled contact"] = truth["damping ratio of the coupled mode"]
         sensors = {sensor.channel: sensor for sensor in self.rig.sensors}
         for name, sensor in sensors.items():
-            told |= _truth_of(name, sensor)
+            truth |= _truth_of(name, sensor)
         if {"x", "a"} <= sensors.keys():
             late = sensors["x"].lag - sensors["a"].lag
-            told |= {"lead of a over x": late, "phase by which a leads x": w * late}
-            told["added: phase by which a leads x"] = loaded * late
+            truth |= {"lead of a over x": late, "phase by which a leads x": w * late}
+            truth["added: phase by which a leads x"] = loaded * late
         if {"x", "z"} <= sensors.keys():
-            told["delay of the displacement behind the input"] = sensors["x"].lag - sensors["z"].lag
-            told["gain of the displacement over that of the base"] = 1.0  # once both are calibrated
-        return told
+            truth["delay of the displacement behind the input"] = sensors["x"].lag - sensors["z"].lag
+            truth["gain of the displacement over that of the base"] = 1.0  # once both are calibrated
+        return truth
 
     @property
     def _contact(self) -> CompliantContact:
@@ -283,13 +283,13 @@ def _levels(levels: Sequence[float], hold: float, time: Array) -> Array:
 def _truth_of(name: str, sensor: Sensor) -> dict[str, float]:
     """What is true of one sensor."""
     noise = math.hypot(sensor.noise.white, sensor.noise.band)
-    told = {f"gain of {name}": sensor.gain, f"noise of {name}": noise, f"zero of {name}": sensor.digitiser.offset}
-    told[f"drift of {name}"] = 0.0
+    truth = {f"gain of {name}": sensor.gain, f"noise of {name}": noise, f"zero of {name}": sensor.digitiser.offset}
+    truth[f"drift of {name}"] = 0.0
     mount = {"a": "accelerometer", "load": "load cell"}.get(name)
     if mount and sensor.mount:
-        told[f"frequency of the mount of the {mount}"] = sensor.mount.frequency
-        told[f"damping ratio of the mount of the {mount}"] = sensor.mount.damping
+        truth[f"frequency of the mount of the {mount}"] = sensor.mount.frequency
+        truth[f"damping ratio of the mount of the {mount}"] = sensor.mount.damping
     if name == "load":
-        told["discharge time constant"] = sensor.discharge
-        told["mass before the load cell"] = sensor.mount.mass if sensor.mount else 0.0
-    return told
+        truth["discharge time constant"] = sensor.discharge
+        truth["mass before the load cell"] = sensor.mount.mass if sensor.mount else 0.0
+    return truth

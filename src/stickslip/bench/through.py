@@ -8,10 +8,10 @@ from pathlib import Path
 
 import numpy as np
 
-from stickslip.answers.comparison import compare
 from stickslip.answers.decays import analyze_decay
 from stickslip.answers.findings import Comparison, Findings
 from stickslip.answers.fits import fit_records
+from stickslip.answers.many import compare
 from stickslip.answers.questions import analyze
 from stickslip.answers.squeaks import analyze_squeaks, compare_squeaks
 from stickslip.bench.recording import Wanted, acquire
@@ -134,7 +134,7 @@ def tour(folder: str | Path, *, seed: int = 1, fast: bool = False, progress: Tel
     FormatError
         The folder can not be written.
     """
-    folder, tell = Path(folder), progress or (lambda words, share: None)
+    folder, tell = Path(folder), progress or (lambda stage, share: None)
     records = folder / "records"
     records.mkdir(parents=True, exist_ok=True)
     bench = SimulatedBench(thesis_oscillator(), hidden_rig(seed), FS, seed)
@@ -145,7 +145,7 @@ def tour(folder: str | Path, *, seed: int = 1, fast: bool = False, progress: Tel
         rig=noted,
         steps=STEPS,
         truth=bench.truth,
-        progress=lambda words, n: tell(f"commissioning: {words}", 0.02 * n),
+        progress=lambda stage, n: tell(f"commissioning: {stage}", 0.02 * n),
     )
     (folder / "rig.toml").write_text(done.known.toml(), encoding="utf-8")
     rig = read_rig(folder / "rig.toml")
@@ -194,9 +194,9 @@ def _acquired(device: Sim, path: Path, seconds: float, rig: RigSettings) -> None
 def _laws(driven: Sequence[Record], rig: RigSettings) -> LawComparison:
     """Which law, by a part of the sticking run and of one that slides."""
     parts = [record.between(SETTLE, SETTLE + OF_LAWS) for record in [driven[k] for k in OF]]
-    found, _ = fit_records(parts, rig=rig, laws=LAWS)
-    assert isinstance(found, LawComparison)
-    return found
+    comparison, _ = fit_records(parts, rig=rig, laws=LAWS)
+    assert isinstance(comparison, LawComparison)
+    return comparison
 
 
 def _next(laws: LawComparison, rig: RigSettings) -> tuple[Proposal, ...]:

@@ -89,11 +89,11 @@ def analyze(
     folder = output or default_folder(groups)
     if places.wanted(groups):
         chosen = click.get_current_context().get_parameter_source("twins") is not click.core.ParameterSource.DEFAULT
-        asked = {"method": method, "twins": twins if chosen else 0}
-        answer_many("analyze", groups, rig, asked, places, folder=folder, output=output, **shown)
+        query = {"method": method, "twins": twins if chosen else 0}
+        answer_many("analyze", groups, rig, query, places, folder=folder, output=output, **shown)
         return
     with progress(2 * len(groups) + 1) as tell:
-        found, refused = answers(
+        all_findings, refused = answers(
             groups,
             rig,
             lambda record: ss.analyze(record, rig=rig, method=method),
@@ -101,33 +101,33 @@ def analyze(
             of_parts=lambda parts, say: ss.answers.analyze_blocks(parts, rig=rig, method=method, progress=say),
         )
 
-        def told(findings: list[Findings]) -> Findings | Comparison:
+        def together(findings: list[Findings]) -> Findings | Comparison:
             return with_left_out(ss.compare(findings) if len(findings) > 1 else findings[0], refused)
 
         tell("drawing and writing", 2 * len(groups))
-        results, written = _sure(found, twins, told, folder if output or not as_json else None, tell)
+        results, written = _sure(all_findings, twins, together, folder if output or not as_json else None, tell)
     name_left_out(refused)
     show(results, written, **shown)
 
 
 def _sure(
-    found: list[Findings],
+    all_findings: list[Findings],
     twins: int,
-    told: Callable[[list[Findings]], Findings | Comparison],
+    together: Callable[[list[Findings]], Findings | Comparison],
     folder: Path | None,
     tell: Callable[..., None],
     **context: Any,
 ) -> tuple[Findings | Comparison, Path | None]:
     """The results, tried on twins and written; the quick ones are written first, and stay where that is interrupted."""
     if not twins:
-        results = told(found)
+        results = together(all_findings)
         return results, folder and ss.publish(results, folder=folder, **context)
     from concurrent.futures import ThreadPoolExecutor
 
     with ThreadPoolExecutor(1) as beside:  # drawn here, while other processes look for the twins
-        quick = None if folder is None else beside.submit(ss.publish, told(found), folder=folder, **context)
+        quick = None if folder is None else beside.submit(ss.publish, together(all_findings), folder=folder, **context)
         try:
-            results = told([_tried(findings, twins, tell) for findings in found])
+            results = together([_tried(findings, twins, tell) for findings in all_findings])
             tell("drawing and writing")
             return results, None if quick is None else ss.publish(results, folder=quick.result(), **context)
         except KeyboardInterrupt:
@@ -140,14 +140,14 @@ def _sure(
 def _tried(findings: Findings, twins: int, tell: Callable[..., None]) -> Findings:
     """The answers as their twins leave them; with a note of why, where the record has no twin."""
 
-    def asked(share: float) -> None:
+    def show_share(share: float) -> None:
         tell(f"trying the answers of {findings.name} on twins, {100 * share:.0f} %")
 
     if findings.contradiction:  # the rig that it would be tried on is not the one that wrote the record
         return findings
-    asked(0.0)
+    show_share(0.0)
     try:
-        return ss.tried(findings, twins=twins, processes=processors(), progress=asked)
+        return ss.tried(findings, twins=twins, processes=processors(), progress=show_share)
     except ss.errors.EstimateError as error:
         return replace(findings, notes=(*findings.notes, f"Twins: {error}"))
 
@@ -174,7 +174,7 @@ def demo(output: Path, as_json: bool, everything: bool, twins: int) -> None:
         constants = {name: record.truth[name] for name in ("mass", "stiffness", "damping")}
         findings = ss.analyze(record, **constants)
         tell("drawing and writing", 2)
-        results, written = _sure([findings], twins, lambda found: found[0], output, tell, form="csv")
+        results, written = _sure([findings], twins, lambda parts: parts[0], output, tell, form="csv")
     show(results, written, as_json=as_json, everything=everything)
 
 

@@ -30,17 +30,21 @@ Source = Callable[["BenchStep"], "Record | None"]
 @click.command()
 @click.argument("files", nargs=-1, metavar="[STEP=FILE]...")
 @click.option(
-    "--device", "name", metavar="NAME",
+    "--device",
+    "name",
+    metavar="NAME",
     help="What measures: a table [devices.NAME] of the configuration, or a kind of device. sim needs no hardware.",
-)  # fmt: skip
+)
 @click.option("--config", type=click.Path(path_type=Path), metavar="RIG.TOML", help="What is known of the rig already.")
 @click.option("--step", "steps", multiple=True, metavar="NAME", help="Only this step. Repeatable.")
 @click.option("--again", multiple=True, metavar="NAME", help="Record this step anew. Repeatable.")
 @click.option("--seed", type=click.IntRange(min=0), default=1, show_default=True, help="Of a simulated rig's noise.")
 @click.option(
-    "--output", type=click.Path(path_type=Path), metavar="DIR",
+    "--output",
+    type=click.Path(path_type=Path),
+    metavar="DIR",
     help="Folder of records, rig.toml and report; commission unless given, none where files are named.",
-)  # fmt: skip
+)
 @click.option("--list", "listed", is_flag=True, help="Print the steps, and what to do at each.")
 @click.option("--json", "as_json", is_flag=True, help="Print the results as JSON and nothing else.")
 @all_option
@@ -67,7 +71,7 @@ def commission(
         return
     config: Path | None = options["config"]
     rig = ss.rig.read_rig(config) if config else ss.rig.rig_settings({})
-    given = dict(_given(file) for file in files)
+    given = dict(_step_and_file(file) for file in files)
     if given and not options["steps"]:
         chosen = [step for step in bench.STEPS if step.name in given]
     folder = output or (None if given or as_json else Path("commission"))
@@ -84,7 +88,7 @@ def commission(
         say(f"Settings: {folder / 'rig.toml'}")
 
 
-def _given(text: str) -> tuple[str, Path]:
+def _step_and_file(text: str) -> tuple[str, Path]:
     """A step and the file that answers it."""
     name, file = pair(text, "STEP=FILE")
     return bench.step_named(name).name, groups_of(file)[0][0]
@@ -176,13 +180,18 @@ TRIGGER = re.compile(r"\s*(\w+)\s*([<>])\s*(\S+)\s*")
     "--before", type=click.FloatRange(min=0), default=0.0, metavar="S", help="Time before the trigger that is kept."
 )
 @click.option(
-    "--drive", "drives", multiple=True, metavar='"OUTPUT=AMPLITUDE@HZ"',
+    "--drive",
+    "drives",
+    multiple=True,
+    metavar='"OUTPUT=AMPLITUDE@HZ"',
     help='Move an output by a tone meanwhile, in SI: "base=0.65e-3@2.5". Repeatable.',
-)  # fmt: skip
+)
 @click.option(
-    "--runs", type=click.Path(path_type=Path), metavar="RUNS.TOML",
+    "--runs",
+    type=click.Path(path_type=Path),
+    metavar="RUNS.TOML",
     help="Record every run of a list, as bench next writes it, each with its own tone; --output names their folder.",
-)  # fmt: skip
+)
 @click.option(
     "--output",
     required=True,
@@ -254,9 +263,9 @@ def _trigger(text: str | None, before: float) -> bench.Trigger | None:
         if before:
             raise click.BadParameter("what is kept before a trigger needs one", param_hint="--before")
         return None
-    found = TRIGGER.fullmatch(text)
+    match = TRIGGER.fullmatch(text)
     try:
-        return bench.Trigger(found[1], float(found[3]), found[2] == ">", before)  # type: ignore[index]
+        return bench.Trigger(match[1], float(match[3]), match[2] == ">", before)  # type: ignore[index]
     except (TypeError, ValueError):
         raise click.BadParameter(f"'{text}' is not CHANNEL>LEVEL or CHANNEL<LEVEL", param_hint="--trigger") from None
 
@@ -299,9 +308,9 @@ def devices(config: Path | None, as_json: bool) -> None:
     named = ss.rig.read_rig(config).devices if config else {}
     mine = {name: bench.find_device(name, named, folder=config.parent if config else None) for name in named}
     if as_json:
-        told = {kind.kind: {"about": kind.about, "there": [*kind.there], "missing": kind.missing} for kind in kinds}
+        about = {kind.kind: {"about": kind.about, "there": [*kind.there], "missing": kind.missing} for kind in kinds}
         named_so = {name: {"kind": one.kind, "model": one.model, "fs": one.fs} for name, one in mine.items()}
-        say_json({"kinds": told, "named": named_so})
+        say_json({"kinds": about, "named": named_so})
         return
     for name, one in mine.items():
         inputs = ", ".join(f"{entry.name} [{entry.unit}]" for entry in one.inputs)
@@ -336,10 +345,10 @@ def tour(fast: bool, seed: int, output: Path, as_json: bool, everything: bool) -
     report = output / "report"
     usable(click.get_current_context(), None, report)  # type: ignore[arg-type]
     with progress(100) as tell:
-        found = bench.tour(output, seed=seed, fast=fast, progress=lambda words, share: tell(words, 100 * share))
+        done = bench.tour(output, seed=seed, fast=fast, progress=lambda stage, share: tell(stage, 100 * share))
         tell("drawing and writing", 95)
-        written = ss.publish(found, folder=report)
-    show(found, written, as_json=as_json, everything=everything)
+        written = ss.publish(done, folder=report)
+    show(done, written, as_json=as_json, everything=everything)
 
 
 @simulated_bench.command("next")

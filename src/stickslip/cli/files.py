@@ -67,11 +67,11 @@ def datasets(name: str | None, everything: bool) -> None:
         for path in ss.datasets.fetch(name).files:
             say(path)
         return
-    sets = [ss.datasets.info(each) for each in ss.datasets.names()]
+    sets = [ss.datasets.info(key) for key in ss.datasets.names()]
     if everything:
         say("\n\n".join(map(str, sets)))
         return
-    rows = [(each.name, each.title, each.licence) for each in sets]
+    rows = [(entry.name, entry.title, entry.licence) for entry in sets]
     say("\n".join(aligned(("name", "record set", "licence"), rows)))
     say("\nMore with --all, or of one: stickslip datasets NAME")
 
@@ -116,11 +116,11 @@ def init(files: tuple[str, ...], yes: bool, output: Path, force: bool, **options
     guesses = [] if stated.channels else ss.rig.guess_columns(record)
     _show(groups[0], record, guesses)
     if not yes:
-        guesses = [_asked(guess) for guess in guesses]
-    told = _settings(options, stated, guesses, {} if yes else _constants(options, record, guesses))
-    rig = ss.rig.rig_settings(told, source="the answers")
+        guesses = [_confirmed(guess) for guess in guesses]
+    settings = _settings(options, stated, guesses, {} if yes else _constants(options, record, guesses))
+    rig = ss.rig.rig_settings(settings, source="the answers")
     try:
-        output.write_text("\n".join(_toml(told, groups[0])) + "\n", encoding="utf-8")
+        output.write_text("\n".join(_toml(settings, groups[0])) + "\n", encoding="utf-8")
     except OSError as error:
         raise click.BadParameter(f"'{output}' can not be written ({error.strerror})", param_hint="--output") from error
     for line in _after(groups, rig, output):
@@ -134,7 +134,8 @@ def _show(files: Sequence[Path], record: Record, guesses: Sequence[Guess]) -> No
     say(" + ".join(map(str, files)))
     say(f"{len(record)} samples at {record.fs:.6g} Hz, {record.duration:.4g} s.")
     rows = [
-        (guess.column, guess.unit + ("" if guess.stated else " ?"), guess.spanned, _words(guess)) for guess in guesses
+        (guess.column, guess.unit + ("" if guess.stated else " ?"), guess.spanned, _description(guess))
+        for guess in guesses
     ]
     for line in aligned(("column", "unit", "span", "taken for"), rows) if rows else ():
         say(line)
@@ -145,8 +146,8 @@ def _show(files: Sequence[Path], record: Record, guesses: Sequence[Guess]) -> No
         f"{guess.column}: taken for {guess.channel} by its unit alone." for guess in guesses if "alone" in guess.why
     ]
     faults = [spoken(fault) for fault in record.check() if fault.kind != "unit"]
-    for words in (*suspicious, *faults):
-        for line in wrapped(words, "! "):
+    for sentence in (*suspicious, *faults):
+        for line in wrapped(sentence, "! "):
             say(line)
 
 
@@ -154,20 +155,22 @@ def _unsure(guess: Guess) -> bool:
     return not guess.stated and bool(guess.unit) and guess.unit != "1"
 
 
-def _words(guess: Guess) -> str:
+def _description(guess: Guess) -> str:
     return f"{guess.channel}, {guess.words}" if guess.channel else guess.words
 
 
 # ---- what is asked
 
 
-def _asked(guess: Guess) -> Guess:
+def _confirmed(guess: Guess) -> Guess:
     """The column as the user calls it."""
     say()
     channel = click.prompt(
-        f"{guess.column}: {', '.join(ASKED)}, or {NONE} to leave it out", default=guess.channel or NONE,
-        value_proc=_a_channel, err=False,
-    )  # fmt: skip
+        f"{guess.column}: {', '.join(ASKED)}, or {NONE} to leave it out",
+        default=guess.channel or NONE,
+        value_proc=_a_channel,
+        err=False,
+    )
     if channel == NONE:
         return replace(guess, channel="")
     unit = guess.unit if guess.stated else click.prompt("  its unit", default=guess.unit or USUAL.get(channel, "1"))
@@ -183,16 +186,18 @@ def _a_channel(text: str) -> str:
 def _constants(options: Mapping[str, Any], record: Record, guesses: Sequence[Guess]) -> dict[str, str]:
     """Mass, spring, damper and what the mass slides on, where no option states them; nothing of what is not known."""
     say()
-    told: dict[str, str] = {}
-    for name, words in CONSTANTS.items():
+    constants: dict[str, str] = {}
+    for name, question in CONSTANTS.items():
         if options[name] is None:
-            answer = click.prompt(f"{words}; Enter if not known", default="", show_default=False, value_proc=_a(name))
-            told |= {name: answer} if answer else {}
+            answer = click.prompt(
+                f"{question}; Enter if not known", default="", show_default=False, value_proc=_a(name)
+            )
+            constants |= {name: answer} if answer else {}
     if any(guess.channel == "z" for guess in guesses):
-        for name, words in (("contact", "What does the mass slide on"), ("damper", "What does the damper end on")):
+        for name, question in (("contact", "What does the mass slide on"), ("damper", "What does the damper end on")):
             if options[name] is None:
-                told[name] = click.prompt(words, type=click.Choice(["ground", "base"]), default="ground")
-    return told
+                constants[name] = click.prompt(question, type=click.Choice(["ground", "base"]), default="ground")
+    return constants
 
 
 def _a(name: str) -> Callable[[str], str]:
@@ -220,12 +225,12 @@ def _settings(
     return {**known, **given, **answers, **({"channels": channels} if channels else {})}
 
 
-def _toml(told: Mapping[str, Any], files: Sequence[Path]) -> Iterator[str]:
+def _toml(settings: Mapping[str, Any], files: Sequence[Path]) -> Iterator[str]:
     """Plain values first, then the tables."""
     yield f"# The rig of {' + '.join(path.name for path in files)}, as stickslip init wrote it. A bare number is in SI."
     yield '# State how sure a constant is as in mass = "2.42 ± 0.02 kg", and a gain as in a = "acc [g] ± 1 %".'
-    tables = {key: value for key, value in told.items() if isinstance(value, Mapping)}
-    yield from (f"{key} = {_value(value)}" for key, value in told.items() if key not in tables)
+    tables = {key: value for key, value in settings.items() if isinstance(value, Mapping)}
+    yield from (f"{key} = {_value(value)}" for key, value in settings.items() if key not in tables)
     for key, table in tables.items():
         plain = {name: value for name, value in table.items() if not isinstance(value, Mapping)}
         if plain:
@@ -251,8 +256,8 @@ def _after(groups: Sequence[Sequence[Path]], rig: RigSettings, output: Path) -> 
             read(group, rig.model_copy(update={"rows": f"0:{LOOKED_AT}", "repair": ()}))
         except ss.StickslipError as error:
             complain(f"{' + '.join(map(str, group))} is not like the first: {spoken(error)}")
-    for words in _wrong(groups[0], rig):
-        yield from wrapped(words, "! ")
+    for sentence in _wrong(groups[0], rig):
+        yield from wrapped(sentence, "! ")
     config = "" if output == Path(RIG_FILE) else f" --config {output}"
     yield f"Next: stickslip analyze {'+'.join(map(str, groups[0]))}{config}"
 
@@ -260,9 +265,9 @@ def _after(groups: Sequence[Sequence[Path]], rig: RigSettings, output: Path) -> 
 def _wrong(files: Sequence[Path], rig: RigSettings) -> Iterator[str]:
     """What the record says against what was stated."""
     try:
-        found: Findings = ss.analyze(read(files, rig), rig=rig)
+        findings: Findings = ss.analyze(read(files, rig), rig=rig)
     except ss.StickslipError as error:
         yield spoken(error)
         return
-    if found.contradiction or found.results["lacking"]:
-        yield spoken(ss.summary(found).answer)
+    if findings.contradiction or findings.results["lacking"]:
+        yield spoken(ss.summary(findings).answer)

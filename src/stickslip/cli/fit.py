@@ -74,14 +74,14 @@ def fit(
     _require_one_question(groups, curve, asked=laws is not None or system is not None)
     folder = output or (None if as_json else default_folder(groups, "fit"))
     names = laws.split(",") if laws is not None else None
-    words = f"{len(names) if names else 'six'} laws"
+    count = f"{len(names) if names else 'six'} laws"
     with progress(3) as tell:
         tell("reading", 0)
         records = [read(group, rig) for group in groups]
         tell("fitting", 1)
         result, records = ss.answers.fit_records(
             records, rig=rig, curve=curve, laws=names, system=_oscillator(system), calibration=calibration,
-            progress=lambda share: tell(f"fitting and comparing {words}, {share:.0%}", 1 + share),
+            progress=lambda share: tell(f"fitting and comparing {count}, {share:.0%}", 1 + share),
         )  # fmt: skip
         tell("drawing and writing", 2)
         written = ss.publish(result, folder=folder, record=records) if folder else None
@@ -107,9 +107,11 @@ def _oscillator(file: Path | None) -> object:
 @click.argument("files", nargs=-1, required=True, metavar="FILES...")
 @constants_options("Oscillating mass in kg; that of LAW unless given.")
 @click.option(
-    "--plain/--no-plain", default=True, show_default=True,
+    "--plain/--no-plain",
+    default=True,
+    show_default=True,
     help="Fit Coulomb friction and a damper to each record, to stand beside a richer law.",
-)  # fmt: skip
+)
 @result_options("FILE-predicted")
 @reading_options
 def predict(
@@ -139,9 +141,12 @@ def predict(
         return ss.answers.predict(record, oscillator, rig=rig, plain=plain)
 
     with progress(2 * len(groups) + 1) as tell:
-        found, refused = answers(groups, rig, ask, tell)
-        parts, notes = [part for each in found for part in each.parts], [f"Left out: {error}" for error in refused]
-        results = replace(found[0], parts=tuple(parts), notes=tuple(notes))
+        predictions, refused = answers(groups, rig, ask, tell)
+        parts, notes = (
+            [part for prediction in predictions for part in prediction.parts],
+            [f"Left out: {error}" for error in refused],
+        )
+        results = replace(predictions[0], parts=tuple(parts), notes=tuple(notes))
         tell("drawing and writing", 2 * len(groups))
         written = ss.publish(results, folder=folder) if folder else None
     name_left_out(refused)

@@ -11,7 +11,8 @@ import click
 
 import stickslip as ss
 from stickslip.cli.options import together
-from stickslip.cli.records import checksum, names_of, read
+from stickslip.cli.records import answers as answers_of
+from stickslip.cli.records import checksum, name_left_out, names_of, read, with_left_out
 from stickslip.cli.show import show
 from stickslip.cli.terminal import progress
 
@@ -85,8 +86,8 @@ def ask_many(
         Task(question, tuple(group), tuple(names), "+".join(map(checksum, group)), rig, options)
         for group, names in zip(groups, names_of(groups), strict=True)
     ]
-    asked = {"question": question, "rig": rig.model_dump(), "options": dict(options), "version": ss.__version__}
-    with ss.answers.Kept(_kept(folder), asked) as kept:
+    query = {"question": question, "rig": rig.model_dump(), "options": dict(options), "version": ss.__version__}
+    with ss.answers.Kept(_kept(folder), query) as kept:
         left = list({task.key: task for task in reversed(tasks) if task.key not in kept.rows}.values())[::-1]
         answers = ss.answers.spread(answered, tasks=left, engine=places.engine, workers=places.workers)
         for done, row in enumerate(answers, start=len(tasks) - len(left) + 1):
@@ -105,7 +106,7 @@ def answer_many(
     question: str,
     groups: Sequence[Sequence[Path]],
     rig: RigSettings,
-    asked: Mapping[str, Any],
+    query: Mapping[str, Any],
     places: Places,
     *,
     folder: Path,
@@ -114,12 +115,37 @@ def answer_many(
 ) -> None:
     """Ask all records, write what was found into `folder` (not of JSON alone), show it, forget what was kept of it."""
     with progress(len(groups)) as tell:
-        batch = ask_many(question, groups, rig, asked, places, folder=folder, tell=tell)
+        batch = ask_many(question, groups, rig, query, places, folder=folder, tell=tell)
     written = ss.publish(batch, folder=folder) if output or not shown["as_json"] else None
     if places.table is not None:
         ss.story.write_table(batch, places.table)
     _kept(folder).unlink(missing_ok=True)
     show(batch, written, **shown)
+
+
+def answer_all(
+    question: str,
+    groups: Sequence[Sequence[Path]],
+    rig: RigSettings,
+    query: Mapping[str, Any],
+    places: Places,
+    *,
+    compare: Callable[[Any], Any],
+    folder: Path,
+    output: Path | None,
+    **shown: bool,
+) -> None:
+    """Ask all records: many are a row each, few have each a part of the page, and are compared."""
+    if places.wanted(groups):
+        answer_many(question, groups, rig, query, places, folder=folder, output=output, **shown)
+        return
+    with progress(2 * len(groups) + 1) as tell:
+        findings, refused = answers_of(groups, rig, lambda record: ASK[question](record, rig, **query), tell)
+        tell("drawing and writing", 2 * len(groups))
+        results = with_left_out(compare(findings) if len(findings) > 1 else findings[0], refused)
+        written = ss.publish(results, folder=folder) if output or not shown["as_json"] else None
+    name_left_out(refused)
+    show(results, written, **shown)
 
 
 def _rows(tasks: Sequence[Task], kept: Mapping[str, Row]) -> Iterator[Row]:
@@ -145,10 +171,10 @@ def answered(task: Task) -> Row:
     name = " + ".join(task.names)
     try:
         record = read(task.files, task.rig, task.names)
-        found = ASK[task.question](record, task.rig, **task.options)
+        findings = ASK[task.question](record, task.rig, **task.options)
         return ss.answers.Row(
-            name, task.key, ss.summary(found).answer, found.quoted, found.level, found.normal,
-            picture=PICTURES[task.question](found),
+            name, task.key, ss.summary(findings).answer, findings.quoted, findings.level, findings.normal,
+            picture=PICTURES[task.question](findings),
         )  # fmt: skip
     except ss.errors.ModelError:
         raise
@@ -157,22 +183,23 @@ def answered(task: Task) -> Row:
 
 
 def _analyzed(record: Record, rig: RigSettings, *, method: str, twins: int) -> Any:
-    found = ss.analyze(record, rig=rig, method=method)
-    if not twins or found.contradiction:
-        return found
+    findings = ss.analyze(record, rig=rig, method=method)
+    if not twins or findings.contradiction:
+        return findings
     try:
-        return ss.tried(found, twins=twins)
+        return ss.tried(findings, twins=twins)
     except ss.errors.EstimateError as error:
-        return replace(found, notes=(*found.notes, f"Twins: {error}"))
+        return replace(findings, notes=(*findings.notes, f"Twins: {error}"))
 
 
-def _decayed(record: Record, rig: RigSettings, **asked: Any) -> Any:
-    return ss.analyze_decay(record, **asked)
+def _decayed(record: Record, rig: RigSettings, **query: Any) -> Any:
+    return ss.analyze_decay(record, **query)
 
 
-def _squeaked(record: Record, rig: RigSettings, **asked: Any) -> Any:
-    findings = ss.analyze_squeaks(record, contact=rig.contact, **asked)
-    return replace(findings, normal=rig.normal_load(findings.name) or findings.normal)
+def _squeaked(record: Record, rig: RigSettings, **query: Any) -> Any:
+    findings = ss.analyze_squeaks(record, contact=rig.contact, **query)
+    loads = (rig.normal_load(part) for part in (*findings.name.split(" + "), findings.name))
+    return replace(findings, normal=next((load for load in loads if load is not None), findings.normal))
 
 
 ASK: dict[str, Callable[..., Any]] = {"analyze": _analyzed, "decay": _decayed, "squeak": _squeaked}
@@ -180,22 +207,22 @@ ASK: dict[str, Callable[..., Any]] = {"analyze": _analyzed, "decay": _decayed, "
 Picture = tuple[list[float], list[float]]
 
 
-def _loop(found: Any) -> Picture:
+def _loop(findings: Any) -> Picture:
     """Friction over the displacement, for some cycles of the middle."""
-    record = found.record
+    record = findings.record
     if "friction" not in record or "x" not in record:
-        return _trace(found)
+        return _trace(findings)
     count = len(record)
-    if found.loops is not None:
-        count = min(count, round(SHOWN * record.fs / found.loops.frequency.value))
+    if findings.loops is not None:
+        count = min(count, round(SHOWN * record.fs / findings.loops.frequency.value))
     first = (len(record) - count) // 2
     return _thinned(record["x"][first : first + count], record["friction"][first : first + count])
 
 
-def _trace(found: Any) -> Picture:
+def _trace(findings: Any) -> Picture:
     """The channel that was asked over the time."""
-    record = found.record
-    channel = found.settings.get("channel") or next(iter(record))
+    record = findings.record
+    channel = findings.settings.get("channel") or next(iter(record))
     return _thinned(record.time, record[channel if channel in record else next(iter(record))])
 
 

@@ -2,25 +2,27 @@
 
 from __future__ import annotations
 
+import importlib
 from typing import Any
 
 import click
 
 import stickslip as ss
-from stickslip.cli.analyze import analyze, demo, impact
-from stickslip.cli.bench import acquire, commission, devices, simulated_bench
-from stickslip.cli.files import check, convert, datasets, init
-from stickslip.cli.fit import fit, predict
-from stickslip.cli.joint import joint
-from stickslip.cli.lab import lab
-from stickslip.cli.rig import rig
-from stickslip.cli.simulate import bifurcation, dither, simulate, stability, sweep
 from stickslip.cli.terminal import compiling, complain, mended, say, spoken
-from stickslip.cli.thesis import thesis
-from stickslip.cli.tribometer import tribometer
-from stickslip.cli.vibrations import decay, squeak, wavelet
 from stickslip.errors import INTERRUPTED, INTERRUPTION
 
+COMMANDS = {  # by the file that they stand in
+    "analyze": ("analyze", "demo", "impact"),
+    "bench": ("acquire", "commission", "devices", "simulated_bench"),
+    "files": ("check", "convert", "datasets", "init"),
+    "fit": ("fit", "predict"),
+    "joint": ("joint",),
+    "rig": ("rig",),
+    "simulate": ("bifurcation", "dither", "lab", "simulate", "stability", "sweep"),
+    "thesis": ("thesis",),
+    "tribometer": ("tribometer",),
+    "vibrations": ("decay", "squeak", "wavelet"),
+}
 ARGUMENTS = "stickslip.arguments"  # the key under which the context keeps what was typed
 
 
@@ -74,32 +76,6 @@ def main() -> None:
     """
 
 
-for _command in (
-    acquire,
-    analyze,
-    simulated_bench,
-    bifurcation,
-    check,
-    commission,
-    convert,
-    datasets,
-    decay,
-    demo,
-    dither,
-    devices,
-    fit,
-    impact,
-    init,
-    joint,
-    lab,
-    predict,
-    rig,
-    simulate,
-    squeak,
-    stability,
-    sweep,
-    thesis,
-    tribometer,
-    wavelet,
-):
-    main.add_command(_command)
+for _file, _names in COMMANDS.items():
+    for _name in _names:
+        main.add_command(getattr(importlib.import_module(f"stickslip.cli.{_file}"), _name))

@@ -127,13 +127,13 @@ def _fitting(pattern: str, folder: Path = Path()) -> list[Path]:
 
 def require_fits(normal: Sequence[str], groups: Sequence[Sequence[Path]]) -> None:
     """Refuse a load stated for files that are not there: it is a typing error."""
-    told = names_of(groups)
-    known = [name for names in told for name in (*names, " + ".join(names))]
+    titles = names_of(groups)
+    known = [name for names in titles for name in (*names, " + ".join(names))]
     known += [name for group in groups for name in (*(path.name for path in group), name_of(group))]
     for load in normal:
         pattern, separator, _ = load.partition("=")
         if separator and not fnmatch.filter(known, pattern.strip()):
-            called = ", ".join(" + ".join(names) for names in told[:3]) + (", ..." if len(told) > 3 else "")
+            called = ", ".join(" + ".join(names) for names in titles[:3]) + (", ..." if len(titles) > 3 else "")
             raise click.BadParameter(f"no file fits '{pattern.strip()}': called {called}", param_hint="--normal")
 
 
@@ -144,14 +144,14 @@ def name_of(files: Sequence[Path]) -> str:
 def names_of(groups: Sequence[Sequence[Path]]) -> list[list[str]]:
     """What the files of each record are called: their names, with as many folders before as tell records apart."""
     paths = [tuple(path.absolute() for path in group) for group in groups]
-    told = {each: tuple(path.name for path in each) for each in paths}
-    for depth in range(2, max((len(path.parts) for each in paths for path in each), default=0)):
-        often = Counter(told.values())
-        told = {
-            each: tuple("/".join(path.parts[-depth:]) for path in each) if often[names] > 1 else names
-            for each, names in told.items()
+    titles = {paths_of: tuple(path.name for path in paths_of) for paths_of in paths}
+    for depth in range(2, max((len(path.parts) for paths_of in paths for path in paths_of), default=0)):
+        often = Counter(titles.values())
+        titles = {
+            paths_of: tuple("/".join(path.parts[-depth:]) for path in paths_of) if often[names] > 1 else names
+            for paths_of, names in titles.items()
         }
-    return [list(told[each]) for each in paths]
+    return [list(titles[paths_of]) for paths_of in paths]
 
 
 def default_folder(groups: Sequence[Sequence[Path]], ending: str = "stickslip") -> Path:
@@ -166,7 +166,7 @@ def folder_after(file: Path, ending: str) -> Path:
 
 def read(files: Sequence[Path], rig: RigSettings, names: Sequence[str] = ()) -> Record:
     """The record, its files called by their names or by those given."""
-    record = ss.read_record(_paths(files), rows=rig.row_range(), **_told(rig))
+    record = ss.read_record(files, rows=rig.row_range(), **rig.reading())
     return rig.logged(ss.answers.mend(_with_source(record, files, names), repairs=rig.repair))
 
 
@@ -182,17 +182,9 @@ def read_parts(
     if rig.rows or rig.repair:
         yield read(files, rig, names)
         return
-    told = {**_told(rig), **({} if size is None else {"size": size})}
-    for part in ss.read_blocks(_paths(files), **told):
+    options = {**rig.reading(), **({} if size is None else {"size": size})}
+    for part in ss.read_blocks(files, **options):
         yield rig.logged(_with_source(part, files, names))
-
-
-def _paths(files: Sequence[Path]) -> Any:
-    return files[0] if len(files) == 1 else list(files)
-
-
-def _told(rig: RigSettings) -> dict[str, Any]:
-    return {key: getattr(rig, key) or None for key in ("channels", "fs", "units", "time", "delimiter", "decimal")}
 
 
 def _folder(path: Path) -> dict[str, str]:
@@ -256,7 +248,7 @@ def answers(
 
     With `of_parts` a long record is asked part by part, and a sentence is told of each.
     """
-    found: list[Answer] = []
+    results: list[Answer] = []
     refused: list[ss.StickslipError] = []
     for number, (group, names) in enumerate(zip(groups, names_of(groups), strict=True)):
         with collected(refused, group, names):
@@ -264,13 +256,13 @@ def answers(
             tell(f"reading {name}", 2 * number)
             if of_parts is not None and is_long(group):
                 say = functools.partial(_say, tell, f"analysing {name}", 2 * number)
-                found.append(of_parts(read_parts(group, rig, PART, names), say))
+                results.append(of_parts(read_parts(group, rig, PART, names), say))
                 continue
             record = read(group, rig, names)
             tell(f"checking and analysing {name}", 2 * number + 1)
-            found.append(ask(record))
-    if found:
-        return found, refused
+            results.append(ask(record))
+    if results:
+        return results, refused
     if len(refused) == 1:
         raise refused[0]
     name_left_out(refused)
@@ -279,8 +271,8 @@ def answers(
     )
 
 
-def _say(tell: Callable[[str, float], None], what: str, done: float, words: str) -> None:
-    tell(f"{what}, {words}", done)
+def _say(tell: Callable[[str, float], None], what: str, done: float, state: str) -> None:
+    tell(f"{what}, {state}", done)
 
 
 def with_left_out(results: Findings | Comparison, refused: Sequence[ss.StickslipError]) -> Findings | Comparison:

@@ -111,7 +111,7 @@ def measure(case: str, output: Path | None, as_json: bool, everything: bool, pla
     wanted = wanted_case(case, **{key: options.pop(key) for key in ("duration", "cycles", "changes")})
     bench = _bench(options.pop("preset"), options.pop("sensors"))
     folder = output or (None if as_json else folder_name(wanted, "plan" if plan else "rig"))
-    needs = [pair(each, "--need") for each in options.pop("need")]
+    needs = [pair(need, "--need") for need in options.pop("need")]
     if needs and not plan:
         raise click.BadParameter("what is needed is asked of a plan; add --plan", param_hint="--need")
     form, config = options.pop("form"), options.pop("config")
@@ -193,7 +193,7 @@ def join(first: str, second: str, output: Path | None, as_json: bool, everything
     if len(groups) != 2:
         raise click.BadParameter(f"{len(groups)} records; two are joined", param_hint="FIRST SECOND")
     seconds = None if shift is None else float(ss.Estimate.stated("offset", shift, "s"))
-    shared = None if on is None else tuple(each.strip() for each in on.split(","))
+    shared = None if on is None else tuple(channel.strip() for channel in on.split(","))
     with progress(2) as tell:
         tell("reading", 0)
         a, b = (

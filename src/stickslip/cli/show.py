@@ -22,9 +22,9 @@ FAINT: Mapping[str, Any] = {"dim": True}
 PLURALS = {"quantity": "quantities"}
 
 
-def print_json(told: Mapping[str, Any]) -> None:
+def print_json(results: Mapping[str, Any]) -> None:
     """Results for a machine, which begin as results.json does: with what made them."""
-    say_json({"program": "stickslip", "version": ss.__version__, **told})
+    say_json({"program": "stickslip", "version": ss.__version__, **results})
 
 
 def show(result: Any, written: Path | None, *, as_json: bool, everything: bool = False, **context: Any) -> None:
@@ -46,8 +46,8 @@ def _print_short(story: Story) -> None:
     """At most MOST_LINES lines: the answer, the rows that lead, their cautions, and what else there is."""
     in_tables = sum(len(table.rows) for table in story.tables if not table.folded)
     rows, lines = story.lines[: MOST_ROWS - min(in_tables, OF_TABLES)], []
-    told = [] if story.lines or story.tables else story.others  # without rows the sentences are all
-    for text in (*story.opening, *told, *(f"{part.title}: {part.answer}" for part in story.parts[:MOST_PARTS])):
+    sentences = [] if story.lines or story.tables else story.others  # without rows the sentences are all
+    for text in (*story.opening, *sentences, *(f"{part.title}: {part.answer}" for part in story.parts[:MOST_PARTS])):
         lines += _lines(text)
     lines += [*_remedy(story), *_numbers(story, rows)]
     left, hidden = MOST_ROWS - len(rows), 0
@@ -58,14 +58,14 @@ def _print_short(story: Story) -> None:
     cautions: list[Caution] = []
     lines.append("")
     for caution in story.concerned(rows):
-        words = _caution(story, caution)
-        if len(lines) + len(words) <= MOST_LINES - END:
-            lines += words
+        caution_lines = _caution(story, caution)
+        if len(lines) + len(caution_lines) <= MOST_LINES - END:
+            lines += caution_lines
             cautions.append(caution)
     _print(story.title, lines)
     more = {
         "quantity": len(story.lines) - len(rows), "row": hidden, "caution": len(story.notices) - len(cautions),
-        "sentence": len(story.others) - len(told), "note": len(story.notes),
+        "sentence": len(story.others) - len(sentences), "note": len(story.notes),
         "record": max(0, len(story.parts) - MOST_PARTS),
     }  # fmt: skip
     counted = [
@@ -79,7 +79,9 @@ def _print_all(story: Story) -> None:
     """Everything that the page tells in words, each sentence once."""
     lines = [line for text in story.headline for line in _lines(text)]
     lines += [*_remedy(story), *_numbers(story, story.lines), ""]
-    said = {str(each) for each in (*story.headline, *story.notices)} | {notice.reason for notice in story.notices}
+    said = {str(sentence) for sentence in (*story.headline, *story.notices)} | {
+        notice.reason for notice in story.notices
+    }
     lines += [line for caution in story.notices for line in _caution(story, caution)]
     lines += [line for fault in story.faults or () if fault not in said for line in _lines(fault, "- ")]
     for table in story.tables:

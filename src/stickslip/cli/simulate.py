@@ -1,8 +1,10 @@
-"""stickslip simulate, sweep, stability, bifurcation, dither: what a system does, asked of its equations"""
+"""stickslip simulate, sweep, stability, bifurcation, dither, lab: what a system does, asked of its equations."""
 
 from __future__ import annotations
 
 import itertools
+import secrets
+import webbrowser
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -124,24 +126,24 @@ def sweep(file: Path, engine: str, store: Path | None, output: Path | None, as_j
     \b
     stickslip sweep grid.toml --engine threads --store map.zarr --output maps
     """
-    asked = ss.maps.read_sweep(file)
+    plan = ss.maps.read_sweep(file)
     place = store if store is not None else file.with_suffix(".zarr")
-    found = ss.sweep(
-        asked.case.system,
-        asked.grid,
-        measures=asked.measures,
-        cycles=asked.cycles,
-        settle=asked.settle,
-        start=asked.case.start,
+    atlas = ss.sweep(
+        plan.case.system,
+        plan.grid,
+        measures=plan.measures,
+        cycles=plan.cycles,
+        settle=plan.settle,
+        start=plan.case.start,
         engine=engine,
         store=place,
     )
-    story, whole = ss.summary(found), found.attrs["status"] == "complete"
-    written = ss.publish(found, folder=output, system=asked.case.system) if output is not None else None
+    story, whole = ss.summary(atlas), atlas.attrs["status"] == "complete"
+    written = ss.publish(atlas, folder=output, system=plan.case.system) if output is not None else None
     if as_json:
         print_json({**story.data(), "store": str(place)})
         raise SystemExit(0 if whole else INTERRUPTED)
-    show(found, written, as_json=False, everything=everything)
+    show(atlas, written, as_json=False, everything=everything)
     say(f"Map: {place}")
     if not whole:
         say("Call again to go on.")
@@ -273,6 +275,50 @@ def _answer(
     folder = output or (None if as_json else folder_name(case, what))
     with progress(1) as tell:
         tell(f"{what} of {case.name}", 0)
-        found = ask()
-        written = ss.publish(found, folder=folder) if folder else None
-    show(found, written, as_json=as_json, everything=everything)
+        answer = ask()
+        written = ss.publish(answer, folder=folder) if folder else None
+    show(answer, written, as_json=as_json, everything=everything)
+
+
+PORT = 8723
+
+
+@click.command()
+@click.option(
+    "--port", type=click.IntRange(0, 65535), default=PORT, show_default=True, help="Where it listens; 0: any."
+)
+@click.option(
+    "--config", type=click.Path(path_type=Path), metavar="RIG.TOML", help="The rig whose devices are watched."
+)
+@click.option(
+    "--records",
+    type=click.Path(path_type=Path, file_okay=False, exists=True),
+    metavar="DIR",
+    help="Where the live view records; the current folder unless given.",
+)
+@click.option("--no-browser", is_flag=True, help="Print the address alone; open no browser.")
+def lab(port: int, config: Path | None, records: Path | None, no_browser: bool) -> None:
+    """Open the lab in the browser: play with a contact, map its regimes, ask records, watch a rig as it is measured.
+
+    It runs on this machine alone, for whoever has the address that it prints; nothing leaves the machine. Ctrl-C ends
+    it.
+
+    \b
+    stickslip lab
+    stickslip lab --port 9000 --no-browser
+    """
+    from stickslip.lab import serving  # the server is imported where it is wanted
+
+    with serving.listening(port) as door:
+        token = secrets.token_urlsafe(24)
+        address = f"http://127.0.0.1:{door.getsockname()[1]}/?token={token}"
+
+        def opened(doorway: Callable[[str], Path]) -> None:
+            say(f"The lab is open at {address}\nCtrl-C ends it.")
+            if not no_browser:
+                webbrowser.open(doorway(address).as_uri())
+
+        try:
+            serving.serve(door, token=token, opened=opened, rig=config, records=records)
+        except KeyboardInterrupt:  # the server has shut down by then, and hands the signal on
+            say("The lab has ended.")

@@ -38,9 +38,9 @@ def complain(sentence: object) -> None:
     say(f"stickslip: {' '.join(str(sentence).split())}", err=True)
 
 
-def say_json(told: Mapping[str, Any]) -> None:
+def say_json(results: Mapping[str, Any]) -> None:
     """Results for a machine; what can not be printed is spelled out, which leaves it JSON of the same value."""
-    say(json.dumps(told, indent=2, ensure_ascii=False, allow_nan=False))
+    say(json.dumps(results, indent=2, ensure_ascii=False, allow_nan=False))
 
 
 def say_styled(line: str, **style: Any) -> None:
@@ -108,13 +108,13 @@ def compiling() -> Iterator[None]:
 def progress(steps: int) -> Iterator[Callable[..., None]]:
     """What is being done, on the error stream, for work that lasts; silent where nobody watches."""
     if not sys.stderr.isatty():
-        yield lambda words, done=None: None
+        yield lambda stage, done=None: None
         return
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
-    words = TextColumn("{task.description}", markup=False)  # a file may be called "[/x].csv"
-    columns = (SpinnerColumn(), words, BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
+    column = TextColumn("{task.description}", markup=False)  # a file may be called "[/x].csv"
+    columns = (SpinnerColumn(), column, BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
     bar = Progress(*columns, console=Console(stderr=True), transient=True)
     task = bar.add_task("", total=steps)
     patience = threading.Timer(PATIENCE, bar.start)
@@ -123,7 +123,7 @@ def progress(steps: int) -> Iterator[Callable[..., None]]:
     if PATIENCE <= 0:
         patience.join()
     try:
-        yield lambda words, done=None: bar.update(task, completed=done, description=printable(words), refresh=True)
+        yield lambda stage, done=None: bar.update(task, completed=done, description=printable(stage), refresh=True)
     finally:
         patience.cancel()
         bar.stop()
@@ -163,14 +163,14 @@ _SPOKEN = (
 CAUSES = {MISSTATED: ("--delimiter", "--decimal"), TOO_SHORT: ("--rows",)}
 
 
-def spoken(words: object) -> str:
+def spoken(sentence: object) -> str:
     """A sentence with the options of the command line for what it says of Python."""
 
     def repair(call: re.Match[str]) -> str:
         word = REPAIRS.get(call[1])
         return call[0] if word is None else f"--repair {word}" + (f":{call[2]}" if call[2] else "")
 
-    text = re.sub(r"\bfill_gaps\(record\) and fill_missing\(record\)", "--repair gaps,missing", str(words))
+    text = re.sub(r"\bfill_gaps\(record\) and fill_missing\(record\)", "--repair gaps,missing", str(sentence))
     text = re.sub(r'\b(\w+)\(record(?:, "(\w+)")?\)', repair, text)
     for said, option in _SPOKEN:
         text = re.sub(said, option, text)
@@ -187,9 +187,9 @@ def mended(arguments: Sequence[str], error: StickslipError) -> Iterator[str]:
 
 def _without(arguments: Sequence[str], options: Sequence[str]) -> Iterator[str]:
     """The words but these options and their values."""
-    words = iter(arguments)
-    for word in words:
+    rest = iter(arguments)
+    for word in rest:
         if word in options:
-            next(words, None)
+            next(rest, None)
         elif word.partition("=")[0] not in options:
             yield word

@@ -3,47 +3,34 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
 import stickslip as ss
-from stickslip.cli.many import Places, answer_many, many_options
+from stickslip.cli.many import Places, answer_all, many_options
 from stickslip.cli.options import contact_option, normal_option, reading_options, result_options
 from stickslip.cli.records import (
-    answers,
     default_folder,
     folder_after,
     groups_of,
-    name_left_out,
     name_of,
     read_parts,
     require_fits,
     rig_of,
-    with_left_out,
 )
 from stickslip.cli.show import show
 from stickslip.cli.terminal import progress
 
 if TYPE_CHECKING:
     from stickslip import Record
-    from stickslip.answers import Findings
 
 
 @click.command()
 @click.argument("files", nargs=-1, required=True, metavar="FILES...")
-@click.option(
-    "--mass",
-    metavar="VALUE",
-    help="Oscillating mass in kg, for the friction force; of an angle in kg m^2.",
-)
-@click.option(
-    "--stiffness",
-    metavar="VALUE",
-    help="Spring in N/m, for the friction force; of an angle in N m/rad.",
-)
+@click.option("--mass", metavar="VALUE", help="Oscillating mass in kg, for the friction force; of an angle in kg m^2.")
+@click.option("--stiffness", metavar="VALUE", help="Spring in N/m, for the friction force; of an angle in N m/rad.")
 @click.option(
     "--method",
     type=click.Choice(["all", "waveform", "thesis"]),
@@ -76,9 +63,9 @@ def decay(files: tuple[str, ...], output: Path | None, as_json: bool, everything
     stickslip decay "release_*.csv" --method thesis --json
     """
     places, shown = Places.of(options), {"as_json": as_json, "everything": everything}
-    asked = {key: options.pop(key) for key in ("method", "channel", "restoring", "mass", "stiffness")}
+    query = {key: options.pop(key) for key in ("method", "channel", "restoring", "mass", "stiffness")}
     rig = rig_of(**options)
-    if any(each.partition(":")[0] == "drift" for each in rig.repair):
+    if any(repair.partition(":")[0] == "drift" for repair in rig.repair):
         raise ss.errors.ModelError(
             "--repair drift of a free decay",
             "a drift is told from a steady oscillation, and would take what friction does for drift",
@@ -86,17 +73,9 @@ def decay(files: tuple[str, ...], output: Path | None, as_json: bool, everything
         )
     groups = [group for argument in files for group in groups_of(argument)]
     folder = output or (default_folder(groups) if len(groups) == 1 else Path("decays-stickslip"))
-    asked |= {key: getattr(rig, key) for key in ("mass", "stiffness") if asked[key] is None}
-    if places.wanted(groups):
-        answer_many("decay", groups, rig, asked, places, folder=folder, output=output, **shown)
-        return
-    with progress(2 * len(groups) + 1) as tell:
-        found, refused = answers(groups, rig, lambda record: ss.analyze_decay(record, **asked), tell)
-        tell("drawing and writing", 2 * len(groups))
-        results = with_left_out(ss.answers.compare_decays(found) if len(found) > 1 else found[0], refused)
-        written = ss.publish(results, folder=folder) if output or not as_json else None
-    name_left_out(refused)
-    show(results, written, **shown)
+    query |= {key: getattr(rig, key) for key in ("mass", "stiffness") if query[key] is None}
+    compare = ss.answers.compare_decays
+    answer_all("decay", groups, rig, query, places, compare=compare, folder=folder, output=output, **shown)
 
 
 @click.command()
@@ -107,11 +86,7 @@ def decay(files: tuple[str, ...], output: Path | None, as_json: bool, everything
 @click.option("--frequencies", metavar="LOW:HIGH", help="What is listened to in Hz; from 50 Hz up unless given.")
 @contact_option
 @normal_option
-@click.option(
-    "--lever",
-    metavar="VALUE",
-    help="Distance of the friction from the axis of torsion in m, for its work.",
-)
+@click.option("--lever", metavar="VALUE", help="Distance of the friction from the axis of torsion in m, for its work.")
 @many_options
 @result_options("FILE-squeak")
 @reading_options
@@ -142,26 +117,9 @@ def squeak(
     groups = [group for argument in files for group in groups_of(argument)]
     require_fits(options["normal"], groups)
     folder = output or Path(f"{groups[0][0].stem}-squeak" if len(groups) == 1 else "squeaks-compared")
-
-    if places.wanted(groups):
-        asked = {"channel": channel, "frequencies": frequencies, "lever": lever}
-        answer_many("squeak", groups, rig, asked, places, folder=folder, output=output, **shown)
-        return
-
-    def ask(record: Record) -> Findings:
-        findings = ss.analyze_squeaks(
-            record, channel=channel, frequencies=frequencies, contact=rig.contact, lever=lever
-        )
-        loads = (rig.normal_load(part) for part in (*findings.name.split(" + "), findings.name))
-        return replace(findings, normal=next((load for load in loads if load is not None), findings.normal))
-
-    with progress(2 * len(groups) + 1) as tell:
-        found, refused = answers(groups, rig, ask, tell)
-        results = with_left_out(ss.answers.compare_squeaks(found) if len(found) > 1 else found[0], refused)
-        tell("drawing and writing", 2 * len(groups))
-        written = ss.publish(results, folder=folder) if output or not as_json else None
-    name_left_out(refused)
-    show(results, written, **shown)
+    query = {"channel": channel, "frequencies": frequencies, "lever": lever}
+    compare = ss.answers.compare_squeaks
+    answer_all("squeak", groups, rig, query, places, compare=compare, folder=folder, output=output, **shown)
 
 
 @click.command()
@@ -170,11 +128,7 @@ def squeak(
 @click.option("--frequencies", metavar="LOW:HIGH", help="Range of the map in Hz; what the record allows unless given.")
 @click.option("--wavelet-frequency", type=float, default=4.5, show_default=True, help="How long a wavelet is.")
 @click.option("--normalisation", type=click.Choice(["energy", "amplitude"]), default="energy", show_default=True)
-@click.option(
-    "--mass",
-    metavar="VALUE",
-    help="Oscillating mass in kg, or with its unit, for the contact's stiffness.",
-)
+@click.option("--mass", metavar="VALUE", help="Oscillating mass in kg, or with its unit, for the contact's stiffness.")
 @click.option("--stiffness", metavar="VALUE", help="Spring in N/m, or with its unit, for the same.")
 @result_options("FILE-wavelet")
 @reading_options
@@ -193,14 +147,14 @@ def wavelet(
     groups = groups_of(file)
     if len(groups) != 1:
         raise click.BadParameter(f"'{file}' fits {len(groups)} records; one is mapped at a time", param_hint="FILE")
-    asked = {key: options.pop(key) for key in ("channel", "wavelet_frequency", "normalisation")}
+    query = {key: options.pop(key) for key in ("channel", "wavelet_frequency", "normalisation")}
     rig = rig_of(**options)
     folder = output or (None if as_json else folder_after(groups[0][0], "wavelet"))
     with progress(3) as tell:
         tell(f"reading {name_of(groups[0])}", 0)
         parts = _told_of(read_parts(groups[0], rig), tell)
-        asked |= {"mass": rig.mass, "stiffness": rig.stiffness}
-        findings = ss.answers.time_frequency(parts, frequencies=frequencies, **asked)
+        query |= {"mass": rig.mass, "stiffness": rig.stiffness}
+        findings = ss.answers.time_frequency(parts, frequencies=frequencies, **query)
         tell("drawing and writing", 2)
         written = ss.publish(findings, folder=folder) if folder else None
     show(findings, written, as_json=as_json, everything=everything)

@@ -18,10 +18,14 @@ from stickslip.balance.motion import is_measured, require_change, stretches
 from stickslip.consistent.checks import (
     FAILS,
     HOLDS,
+    ONE_SLIP,
     UNTOLD,
     Check,
+    Slip,
     compared,
     judged,
+    mixups,
+    slip_check,
     untold,
 )
 from stickslip.consistent.forced_checks import (
@@ -36,7 +40,6 @@ from stickslip.consistent.forced_checks import (
     zero_off,
 )
 from stickslip.consistent.sliding_balance import Stated, stated_checks, what_fails
-from stickslip.consistent.slips import ONE_SLIP, Slip, mixups, slip_check
 from stickslip.errors import EstimateError
 from stickslip.estimate import Constant, Result, plain
 from stickslip.record.check import find_clipping
@@ -227,8 +230,8 @@ def range_checks(record: Record, names: Sequence[str]) -> list[Check]:
         if not mask.any() and cut is None:
             continue
         top = float(np.abs(record[name]).max())
-        held = f"{name} is held at the end of its range in {int(mask.sum())} of {len(mask)} samples"
-        sentence = held if cut is None else cut.message
+        message = f"{name} is held at the end of its range in {int(mask.sum())} of {len(mask)} samples"
+        sentence = message if cut is None else cut.message
         checks.append(
             Check(f"range of {name}", top, top, record.channels[name].unit, math.inf, FAILS, sentence.rstrip("."))
         )

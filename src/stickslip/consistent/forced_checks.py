@@ -11,9 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stickslip.balance.mass import Complex, Lines, find_lines, response_of
-from stickslip.consistent.checks import APART, FAILS, HOLDS, UNTOLD, Check, compared, judged, untold
+from stickslip.consistent.checks import APART, FAILS, HOLDS, UNTOLD, Amplitudes, Check, Slip, compared, judged, untold
 from stickslip.consistent.sliding_balance import Slider
-from stickslip.consistent.slips import Amplitudes, Slip
 from stickslip.record.channels import Channel
 from stickslip.record.record import RIG_UNITS, Record
 from stickslip.statistics import mean_uncertainty
@@ -352,8 +351,8 @@ def stops_check(seen: Seen) -> Check:
     k, m = seen.rig["stiffness"], seen.rig["mass"]
     z = abs(complex(seen.strongest("z").mean()))
     amplitude, rests = _mean_cycle(seen)
-    left = k * seen.channels["z"] - seen.drag
-    source = seen.work(seen.channels.get("load", left))
+    residual = k * seen.channels["z"] - seen.drag
+    source = seen.work(seen.channels.get("load", residual))
     friction = float(source.mean()) / (4 * amplitude)
     if friction <= 0:
         return untold(name, "energy runs the wrong way")

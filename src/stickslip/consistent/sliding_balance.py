@@ -207,9 +207,12 @@ def _sd(of: Callable[[Values], float], numbers: Mapping[str, _Number]) -> float:
 
 def _slider(values: Values) -> Slider:
     return Slider(
-        values["mass"], values["stiffness"], 2 * math.pi * values["forcing frequency"], values.get("damping", 0.0),
+        values["mass"],
+        values["stiffness"],
+        2 * math.pi * values["forcing frequency"],
+        values.get("damping", 0.0),
         values.get("contact stiffness", math.inf),
-    )  # fmt: skip
+    )
 
 
 def _centre(numbers: Mapping[str, _Number]) -> dict[str, float]:

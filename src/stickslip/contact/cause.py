@@ -316,25 +316,27 @@ def _answer(fit: _Fit, against: Estimate | None, record: Record) -> Cause:
     unsure = DAMPED * passage if best[1] > fit.least else fit.blur / fit.fs
     lag = _lag(lags / fit.fs, best[0] / fit.fs, unsure, fit.fs, against)
     give = _give(gives, best[1])
-    left = (fits[0][2], fits[1][2], fits[2][2], fits[3][2])
+    residuals = (fits[0][2], fits[1][2], fits[2][2], fits[3][2])
     spread = float(np.std(fit.force[fit.inside]))
-    is_late = not lag.includes(0.0) and (1.0 if against else WORSE) * left[3] < left[2]
-    is_soft = give.value > fit.least and give.interval[0] > 0 and WORSE * left[3] < left[1]
-    cause = _named(left, spread, is_late=is_late, is_soft=is_soft, held=against is not None)
+    is_late = not lag.includes(0.0) and (1.0 if against else WORSE) * residuals[3] < residuals[2]
+    is_soft = give.value > fit.least and give.interval[0] > 0 and WORSE * residuals[3] < residuals[1]
+    cause = _named(residuals, spread, is_late=is_late, is_soft=is_soft, held=against is not None)
     contact = _likely(record) if cause == "contact compliance" else None
     stiffness = contact.stiffness if contact else _stiffness(fit.level(*best[:2]), give) if is_soft else None
     give = _give_of(contact) if contact else give
     unstated = fit.channel.name == "load" and fit.channel.mount is None
     mimicked = abs(lag.value) / passage if is_soft and passage else math.nan
     seen = give.value if is_soft else None, mimicked if is_late else math.nan
-    reason = _reason(left, spread, lag, *seen)
+    reason = _reason(residuals, spread, lag, *seen)
     status = "the load cell's mount is not stated: its own delay counts as negative lag" if unstated else "ok"
-    return Cause(cause, reason, lag, give, stiffness, mimicked, left, status)
+    return Cause(cause, reason, lag, give, stiffness, mimicked, residuals, status)
 
 
-def _named(left: tuple[float, float, float, float], spread: float, *, is_late: bool, is_soft: bool, held: bool) -> str:
+def _named(
+    residuals: tuple[float, float, float, float], spread: float, *, is_late: bool, is_soft: bool, held: bool
+) -> str:
     """The cause, or that it can not be told: from what each leaves; `held` is a lag that the accelerometer tells."""
-    neither, lagging, _, both = left
+    neither, lagging, _, both = residuals
     good = math.sqrt(EXPLAINED) * spread
     if is_soft:
         certain = both < good
@@ -346,8 +348,8 @@ def _named(left: tuple[float, float, float, float], spread: float, *, is_late: b
     return names[is_late, is_soft] if certain else CAUSES[-1]
 
 
-def _reason(left: tuple[float, ...], spread: float, lag: Estimate, give: float | None, mimicked: float) -> str:
-    neither, lagging, soft, both = left
+def _reason(residuals: tuple[float, ...], spread: float, lag: Estimate, give: float | None, mimicked: float) -> str:
+    neither, lagging, soft, both = residuals
     sentence = (
         f"of the friction's {spread:.3g} N (rms) a rigid contact read without lag leaves {neither:.3g} N unexplained, "
         f"a lag alone {lagging:.3g} N, a contact that gives way {soft:.3g} N, "

@@ -152,10 +152,12 @@ def microslips_of(ringing: Ringing) -> MicroSlips:
             events.append(MicroSlip(ringing.time(window, begin), (end - begin) / ringing.fs, number))
     astray, shortest = not_one_mode(ringing), _shortest_seen(ringing, variance)
     per_stick = mean_of_cycles(
-        "micro-slips per stick", [float(count) for count in counts], unit="1",
+        "micro-slips per stick",
+        [float(count) for count in counts],
+        unit="1",
         method="cuts between rings of one mode, by dynamic programming",
         checks=(f"those are counted that last {1e3 * shortest:.2g} ms or longer",) if math.isfinite(shortest) else (),
-    ).within(0.0)  # fmt: skip
+    ).within(0.0)
     blurred = "without a load cell whose mount is stated, one may be missed or seen twice" if ringing.blurred else ""
     usual = sum(count == int(np.median(counts)) for count in counts) / len(counts)
     uneven = "sticks differ in their number: noise, or a swing that is near to slip, may hide or make one"

@@ -307,10 +307,13 @@ def _exact(
     doubt[3:, 3:] = fitted.covariance
     centre = math.log(fitted.stiffness.value), fitted.damping.value
     return _propagated(
-        "contact", lambda values: _set_going(values, rig), np.array([*known, *centre]), doubt,
+        "contact",
+        lambda values: _set_going(values, rig),
+        np.array([*known, *centre]),
+        doubt,
         "motion after the turn on the fitted contact",
         ("with the friction and the pull found at the turns; errors of the mass and of gains go into it",),
-    )  # fmt: skip
+    )
 
 
 def _set_going(known: Array, rig: Balance) -> float:
@@ -377,16 +380,16 @@ def _amplitude(displacement: Array) -> tuple[float, float]:
     """Half the range of a mean cycle by its first harmonics, and its standard deviation by what they leave."""
     spectrum = np.fft.rfft(displacement)
     smooth = np.fft.irfft(np.where(np.arange(len(spectrum)) <= HARMONICS, spectrum, 0.0), len(displacement))
-    left = float(np.std(displacement - smooth))
-    return float(np.ptp(smooth)) / 2, left * math.sqrt((2 * HARMONICS + 1) / len(displacement))
+    residual = float(np.std(displacement - smooth))
+    return float(np.ptp(smooth)) / 2, residual * math.sqrt((2 * HARMONICS + 1) / len(displacement))
 
 
 def _stops(loops: Loops, branches: Sequence[Branch], peak: float) -> str:
     """Whether the contact holds for too long for harmonic sliding, in words."""
     speeds = [float(branch.speed[-1]) for branch in branches]
-    held = math.asin(min(1.0, float(np.mean(speeds)) / peak)) / math.pi  # of half a cycle
+    stuck = math.asin(min(1.0, float(np.mean(speeds)) / peak)) / math.pi  # of half a cycle
     measured = float(np.median(np.abs(loops.velocity)) / np.max(np.abs(loops.velocity)))
-    if held < STOPPED and measured > 0.5:  # of a sine it is 0.71
+    if stuck < STOPPED and measured > 0.5:  # of a sine it is 0.71
         return "ok"
     return "it stops between its turns: the equation is for harmonic sliding, the rest for the turns out of sliding"
 

@@ -219,14 +219,14 @@ def levels_of(
     """Magnitude of the friction to one side, per cycle; NaN where a cycle does not slide that way."""
     chosen = sliding & (sign * motion.velocity > 0)
     levels = np.full(count, np.nan)
-    held = np.flatnonzero(np.bincount(label[chosen], minlength=count))
+    filled = np.flatnonzero(np.bincount(label[chosen], minlength=count))
     values, weights, cycle = sign * friction[chosen], np.abs(motion.velocity[chosen]), label[chosen]
     order = np.lexsort((values, cycle))
     values, weights, cycle = values[order], weights[order], cycle[order]
-    starts, ends = (np.searchsorted(cycle, held, side=side) for side in ("left", "right"))
+    starts, ends = (np.searchsorted(cycle, filled, side=side) for side in ("left", "right"))
     total = np.concatenate([[0.0], np.cumsum(weights)])
     middle = np.searchsorted(total, (total[starts] + total[ends]) / 2) - 1
-    levels[held] = values[np.clip(middle, starts, ends - 1)]
+    levels[filled] = values[np.clip(middle, starts, ends - 1)]
     return levels
 
 
@@ -255,9 +255,12 @@ def _slope(friction: Array, motion: Motion, sliding: NDArray[np.bool_], label: N
     spread = math.sqrt(float(power.sum()) / len(speed)) / float(speed.mean())
     per_speed = "N s/m" if motion.unit == "m" else "N m s/rad"
     slope = mean_of_cycles(
-        "slope of friction against speed", slopes, unit=per_speed, method="least squares per cycle, mean of cycles",
+        "slope of friction against speed",
+        slopes,
+        unit=per_speed,
+        method="least squares per cycle, mean of cycles",
         checks=(f"sliding speed varies by {100 * spread:.0f} % about its mean",),
-    )  # fmt: skip
+    )
     if spread < LEAST_SPREAD:
         steady = Doubt("the sliding speed hardly varies: no slope can be told", NO_SLOPE)
         return replace(slope, status=Status(steady))

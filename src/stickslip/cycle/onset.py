@@ -207,13 +207,13 @@ def _borne(record: Record, strokes: Strokes) -> _Borne:
 
 def _strays(rested: Sequence[Stroke], strokes: Strokes, fs: float) -> float:
     """How far the mass moves with its load in the middle of its sticks, in deviations of its displacement's noise."""
-    held = [stroke.displacement[: stroke.slip] for stroke in rested if stroke.slip >= 2 * LEAST]
-    if not held:
+    rests = [stroke.displacement[: stroke.slip] for stroke in rested if stroke.slip >= 2 * LEAST]
+    if not rests:
         return 0.0
-    quarters = [np.array_split(stretch, 4) for stretch in held]
+    quarters = [np.array_split(stretch, 4) for stretch in rests]
     if np.median([last.mean() - first.mean() for first, *_, last in quarters]) < 0:
         return 0.0  # against its load something else moves, slowly
-    strays = [float(np.std(stretch[len(stretch) // 4 : 3 * len(stretch) // 4])) for stretch in held]
+    strays = [float(np.std(stretch[len(stretch) // 4 : 3 * len(stretch) // 4])) for stretch in rests]
     reach = float(np.median([np.ptp(stroke.displacement) for stroke in rested]))
     return float(np.median(strays)) / max(noise_level(strokes.motion.displacement, fs), FINEST * reach)
 
@@ -269,8 +269,8 @@ def _by_peak(record: Record, strokes: Strokes) -> _Borne:
 
 def _used(record: Record, method: str) -> list[str]:
     """The sensors behind a friction that a method found, without its displacements."""
-    asked = ("load",) if method == ALONE else FUSIONS.get(method, ("a",))
-    return [name for name in ("load", "a") if name in asked and is_measured(record, name)]
+    sensors = ("load",) if method == ALONE else FUSIONS.get(method, ("a",))
+    return [name for name in ("load", "a") if name in sensors and is_measured(record, name)]
 
 
 def _unstated(record: Record, method: str) -> str:

@@ -69,20 +69,20 @@ def overlapping(parts: Record | Iterable[Record], *, seconds: float = 60.0, over
         raise EstimateError(
             f"stretches of {seconds} s that overlap by {overlap} s", "lengths are positive", "pass seconds"
         )
-    held: Record | None = None
+    gathered: Record | None = None
     first = math.nan
     for part in [parts] if isinstance(parts, Record) else parts:
         if part.stamps is not None:
             part.require_clean(question="a record in parts")
-        held = part if held is None else _joined(held, part)
-        first = held.start if math.isnan(first) else first
-        while held.start + held.duration >= first + seconds + max(overlap, TOGETHER * seconds):
-            yield Stretch(held.rows(0, _row(held, first + seconds + overlap)), first, first + seconds)
+        gathered = part if gathered is None else _joined(gathered, part)
+        first = gathered.start if math.isnan(first) else first
+        while gathered.start + gathered.duration >= first + seconds + max(overlap, TOGETHER * seconds):
+            yield Stretch(gathered.rows(0, _row(gathered, first + seconds + overlap)), first, first + seconds)
             first += seconds
-            held = held.rows(max(0, _row(held, first - overlap)))
-    if held is None:
+            gathered = gathered.rows(max(0, _row(gathered, first - overlap)))
+    if gathered is None:
         raise RecordError("no parts of a record", "one at least is needed", "check the file")
-    yield Stretch(held, first, held.start + held.duration)
+    yield Stretch(gathered, first, gathered.start + gathered.duration)
 
 
 def _row(record: Record, time: float) -> int:

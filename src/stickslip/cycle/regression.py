@@ -205,8 +205,8 @@ def _bandwidth(record: Record, name: str, sources: dict[str, tuple[Array, int]],
         return width
     values, order = sources["a"]
     best = _best(values, record.fs, order).bandwidth
-    held = WIDER * _holding(record[name], record.fs)
-    return max(min(held, best, 0.2 * record.fs), 10 * record.fs / len(record))
+    widest = WIDER * _holding(record[name], record.fs)
+    return max(min(widest, best, 0.2 * record.fs), 10 * record.fs / len(record))
 
 
 def _holding(values: Array, fs: float) -> float:

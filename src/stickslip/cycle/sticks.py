@@ -401,10 +401,10 @@ def _event(kind: str, begin: tuple[float, float], end: tuple[float, float], whol
 
 def _share_of(events: tuple[StickEvent, ...], cycles: Cycles, motion: Motion) -> Estimate:
     """Share of each cycle's time in which the contact holds; a micro-slip is taken off the stick it lies in."""
-    held = _time_in(("stick", "microstick"), events, cycles, motion) - _time_in(("microslip",), events, cycles, motion)
+    stuck = _time_in(("stick", "microstick"), events, cycles, motion) - _time_in(("microslip",), events, cycles, motion)
     return mean_of_cycles(
         "stuck share of the time",
-        held / np.diff(cycles.edges),
+        stuck / np.diff(cycles.edges),
         unit="1",
         method="mean of cycles; the contact holds from where the velocity turns to where the friction reaches its "
         "limit, a micro-slip within a stick taken off",

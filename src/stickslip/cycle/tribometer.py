@@ -15,7 +15,7 @@ from stickslip.errors import ModelError, RecordError
 from stickslip.estimate import NORMAL_95, Constant, Doubt, Estimate, Result, Status
 from stickslip.record.record import Record, require_record
 from stickslip.signals.interpolate import without_delays
-from stickslip.statistics import correlation_time, mean_of_cycles, student
+from stickslip.statistics import FEW_CYCLES, correlation_time, mean_of_cycles, student
 
 Array = NDArray[np.float64]
 
@@ -25,6 +25,7 @@ FEWEST = 20  # cycles, from which on a wear-in is looked for
 SURELY = 6.0  # deviations of its size: of 750 even series, alike by up to 0.9 from cycle to cycle, none came to 4.7
 SHORTEST = 2.0  # cycles that a wear-in lasts at least: shorter it is one odd value
 TIMES = 60  # tried
+SETTLED = 5.0  # times its length, after which 0.7 % of a wear-in are left
 WEARING = "wearing"  # kind of doubt: the coefficient still changes
 DEFINITIONS = {  # of the coefficient, beside what each is of a cycle
     "plateau": "median while it slides, weighed by the way",
@@ -119,7 +120,7 @@ def friction_coefficients(
     Each is the mean of the cycles, its interval Student's t on the scatter between them, which knows that neighbours
     are alike, and on what the load and the force's gain are known to. A wear-in is
     ``final + change exp(-n / cycles)``, by least squares over the plateaus; it is told where an even coefficient would
-    not look so, and then the definitions are of the cycles after three times its length, where as many as that remain.
+    not look so, and then the definitions are of the cycles after five times its length, where eight remain.
 
     Parameters
     ----------
@@ -305,8 +306,8 @@ def _first_guess(number: Array, values: Array) -> tuple[float, float, float]:
 
 def _steady(wear_in: WearIn | None, count: int) -> int:
     """The first cycle after the wear-in; the first of all where too few would remain."""
-    after = 0 if wear_in is None else math.ceil(3 * wear_in.cycles.value)
-    return after if after <= count // 2 else 0
+    after = 0 if wear_in is None else math.ceil(SETTLED * wear_in.cycles.value)
+    return after if count - after >= FEW_CYCLES else 0
 
 
 def _doubts(wear_in: WearIn | None, steady: int, count: int) -> list[Doubt]:

@@ -24,7 +24,7 @@ from stickslip.decay.noise import Noise, Objective, extreme, minimise, solve
 from stickslip.decay.profile import last_swing
 from stickslip.decay.release import RingDown
 from stickslip.decay.waveform import Blocks
-from stickslip.decay.which_motion import SWING, DecayMotion, choice_of, told, whichever
+from stickslip.decay.which_motion import SWING, DecayMotion, choice_of, status_of, whichever
 from stickslip.errors import EstimateError
 from stickslip.estimate import Constant, Estimate, Result
 from stickslip.record.record import Step
@@ -188,7 +188,7 @@ def fit_pendulum(
     chosen = choice.chosen
     later = zero > ring_down.release
     large = (BEYOND,) if later and abs(ring_down.amplitude) >= SWING else ()
-    status = told(ring_down, "; ".join(filter(None, [*large, choice.seen_beside(*PLAIN) or lack_of_fit(chosen)])))
+    status = status_of(ring_down, "; ".join(filter(None, [*large, choice.seen_beside(*PLAIN) or lack_of_fit(chosen)])))
     fitted = chosen.fitted
     blocks, model = fitted.blocks, f"{fitted.motion.words}, spring sin x"
     kind = "white" if chosen.noise.whiteness >= COLOURED else "correlated"
@@ -319,16 +319,16 @@ class Together:
 
 def fit_together(releases: list[Release]) -> list[Together]:
     """The likeliest numbers of half cycles, and every one that differs in one release and is nearly as likely."""
-    best = _fitted(releases, tuple(int(each.fits[np.argmin(each.fits[:, 1]), 0]) for each in releases))
-    found = {best.half_cycles: best}
+    best = _fitted(releases, tuple(int(release.fits[np.argmin(release.fits[:, 1]), 0]) for release in releases))
+    fits = {best.half_cycles: best}
     for number, release in enumerate(releases):
         for n in sorted({*release.fits[:, 0].astype(int), *_neighbours(release)}):
             tried = (*best.half_cycles[:number], int(n), *best.half_cycles[number + 1 :])
-            if n >= 1 and tried not in found:
-                found[tried] = _fitted(releases, tried, best.p)
-    possible = [each for each in found.values() if math.isfinite(each.value) and each.possible(each.p)] or [best]
-    least = min(each.value for each in possible)
-    return [each for each in possible if each.value <= least + WORSE]
+            if n >= 1 and tried not in fits:
+                fits[tried] = _fitted(releases, tried, best.p)
+    possible = [fit for fit in fits.values() if math.isfinite(fit.value) and fit.possible(fit.p)] or [best]
+    least = min(fit.value for fit in possible)
+    return [fit for fit in possible if fit.value <= least + WORSE]
 
 
 def _neighbours(release: Release) -> set[int]:
@@ -341,8 +341,8 @@ def _neighbours(release: Release) -> set[int]:
 
 def _fitted(releases: list[Release], half_cycles: tuple[int, ...], start: Array | None = None) -> Together:
     places, size = [], SHARED
-    for each in releases:
-        own = 3 + each.noise.extra
+    for release in releases:
+        own = 3 + release.noise.extra
         places.append(np.r_[np.arange(SHARED), np.arange(size, size + own)])
         size += own
     fresh, farthest = np.zeros(size), np.full(size, 1.0)
@@ -355,12 +355,12 @@ def _fitted(releases: list[Release], half_cycles: tuple[int, ...], start: Array 
         weight[at] += share
         w, span = row[3], abs(row[7])
         farthest[at[:6]] = (0.1 * w, 0.1, 0.3 * span, span, 0.5 * span, 0.5 / w)
-    objectives = [each.noise.objective(n) for each, n in zip(releases, half_cycles, strict=True)]
+    objectives = [release.noise.objective(n) for release, n in zip(releases, half_cycles, strict=True)]
 
     def objective(p: Array) -> tuple[float, Array, Array]:
         total, slope, curvature = 0.0, np.zeros(size), np.zeros((size, size))
-        for each, at in zip(objectives, places, strict=True):
-            value, down, bend = each(p[at])
+        for misfit, at in zip(objectives, places, strict=True):
+            value, down, bend = misfit(p[at])
             if not math.isfinite(value):
                 return math.inf, slope, np.eye(size)
             total += value
@@ -378,8 +378,8 @@ def unlike(releases: list[Release], fits: list[Together]) -> float:
 
     if len(releases) == 1:
         return 1.0
-    alone = sum(min(each.value for each in fit_together([release])) for release in releases)
-    cost = min(each.value for each in fits) - alone
+    alone = sum(min(fit.value for fit in fit_together([release])) for release in releases)
+    cost = min(fit.value for fit in fits) - alone
     return float(chdtrc(SHARED * (len(releases) - 1), max(cost, 0.0)))
 
 
@@ -390,16 +390,16 @@ def ends_together(fits: list[Together], level: float, count: int) -> Array:
         for column, side in enumerate((-1, 1)):
             reached: list[float] = []
             beyond: list[float] = []
-            for each in fits:
-                if each.value >= level:
+            for fit in fits:
+                if fit.value >= level:
                     continue
-                p = extreme(each.objective, each.p, each.value, which, side, level)
+                p = extreme(fit.objective, fit.p, fit.value, which, side, level)
                 if p is None:
-                    aim = np.eye(len(each.p))[which]
+                    aim = np.eye(len(fit.p))[which]
                     reached.append(
-                        each.p[which] + side * math.sqrt((level - each.value) * solve(each.curvature, aim)[which])
+                        fit.p[which] + side * math.sqrt((level - fit.value) * solve(fit.curvature, aim)[which])
                     )
                 else:
-                    (reached if each.possible(p) else beyond).append(p[which])
-            answer[which, column] = side * max((side * each for each in reached or beyond), default=math.inf)
+                    (reached if fit.possible(p) else beyond).append(p[which])
+            answer[which, column] = side * max((side * end for end in reached or beyond), default=math.inf)
     return answer

@@ -170,24 +170,24 @@ def fit_candidates(names: tuple[str, ...], blocks: BlockMeans, start: Array) -> 
     while reach < end:
         first = fit_motion(MOTIONS["static"], blocks.until(float(start[5]) + reach), first).parameters
         reach *= 2
-    found = {name: fit_motion(MOTIONS[name], blocks, first) for name in ("both", "static")}
-    base = min(found.values(), key=lambda each: each.cost)
+    fitted = {name: fit_motion(MOTIONS[name], blocks, first) for name in ("both", "static")}
+    base = min(fitted.values(), key=lambda candidate: candidate.cost)
     hopeless = HOPELESS * base.cost
-    wanted = sorted((name for name in MOTIONS if name in names or name in found), key=lambda name: MOTIONS[name].size)
+    wanted = sorted((name for name in MOTIONS if name in names or name in fitted), key=lambda name: MOTIONS[name].size)
     for name in wanted:
         motion = MOTIONS[name]
-        tries = [found[name]] if name in found else []
+        tries = [fitted[name]] if name in fitted else []
         if not tries:
             tries = [fit_motion(motion, blocks, s, hopeless=hopeless) for s in _starts(motion, base)]
-        for other in found.values():
+        for other in fitted.values():
             within = set(other.motion.terms) < set(motion.terms) and other.motion.sticks_early <= motion.sticks_early
-            if within and other.cost < min(each.cost for each in tries):
+            if within and other.cost < min(candidate.cost for candidate in tries):
                 tries += [
                     fit_motion(motion, blocks, s, hopeless=hopeless)
                     for s in _shaped(motion, other.parameters.copy(), share=1e-3)
                 ]
-        found[name] = min(tries, key=lambda each: each.cost)
-    return {name: found[name] for name in wanted}
+        fitted[name] = min(tries, key=lambda candidate: candidate.cost)
+    return {name: fitted[name] for name in wanted}
 
 
 def fit_motion(
@@ -221,7 +221,7 @@ def fit_motion(
     tried = {number: _search(motion, blocks, start, number)}
     best = number
     for _ in range(TRIES):
-        best = min(tried, key=lambda each: tried[each].cost)
+        best = min(tried, key=lambda half_cycles: tried[half_cycles].cost)
         if tried[best].cost > hopeless:
             return tried[best]
         allowed = blocks.motion(tried[best].parameters)[2]
@@ -232,13 +232,13 @@ def fit_motion(
         ]
         if not new:
             break
-        for each in new:
-            tried[each] = _search(motion, blocks, tried[best].parameters, each)
+        for half_cycles in new:
+            tried[half_cycles] = _search(motion, blocks, tried[best].parameters, half_cycles)
     if motion.sticks_early:
         return tried[best]
-    own = [each for number, each in tried.items() if blocks.motion(each.parameters)[2] == number]
+    own = [candidate for number, candidate in tried.items() if blocks.motion(candidate.parameters)[2] == number]
     if own:
-        return replace(min(own, key=lambda each: each.cost), forced=False)
+        return replace(min(own, key=lambda candidate: candidate.cost), forced=False)
     return _search(motion, blocks, tried[best].parameters, None)  # on the kink itself
 
 
@@ -339,6 +339,6 @@ def _shaped(motion: Motion, start: Array, *, share: float = 1.0) -> list[Array]:
     if "stribeck_speed" not in motion.terms or start[NUMBERS["stribeck_speed"]] > 0:
         return [start]
     starts = [start.copy() for _ in STRIBECK_SPEEDS]
-    for each, ratio in zip(starts, STRIBECK_SPEEDS, strict=True):
-        each[NUMBERS["stribeck_speed"]] = ratio * speed
+    for guess, ratio in zip(starts, STRIBECK_SPEEDS, strict=True):
+        guess[NUMBERS["stribeck_speed"]] = ratio * speed
     return starts

@@ -138,12 +138,12 @@ class Candidate:
             return np.zeros(len(fitted.residual)), 0.0, 0.0
         direction = fitted.jacobian[:, fitted.motion.free.index(added)]
         others = fitted.jacobian[:, fitted.settled]
-        left = direction - others @ (np.linalg.pinv(others) @ direction)
-        power, value = float(left @ left), fitted.value(added)
+        residual = direction - others @ (np.linalg.pinv(others) @ direction)
+        power, value = float(residual @ residual), fitted.value(added)
         room = HIGHEST.get(added, math.inf) - value
         if power <= (APART * np.linalg.norm(direction)) ** 2:
             return direction, -value, room if math.isfinite(room) else 0.0
-        sd, freedom = self.noise.along(left / power)
+        sd, freedom = self.noise.along(residual / power)
         reach = student(freedom) * sd
         return direction, -min(reach, value), min(reach, room)
 
@@ -229,9 +229,9 @@ class Choice:
     def seen_beside(self, *names: str) -> str:
         """What is seen beside the motions of these names, in words; empty where one of them is not rejected."""
         tried = [candidate for candidate in self.candidates if candidate.name in names]
-        if not tried or any(each.kept for each in tried):
+        if not tried or any(tested.kept for tested in tried):
             return ""
-        best = min(tried, key=lambda each: each.fitted.motion.size)
+        best = min(tried, key=lambda tested: tested.fitted.motion.size)
         return f"{best.against} is seen beside {best.fitted.motion.words}"
 
     def candidate(self, name: str) -> Candidate:
@@ -300,14 +300,14 @@ def choose(
             "name one of them at least",
         )
     instants, data = np.asarray(times, dtype=float), np.asarray(values, dtype=float)
-    each = np.ones(len(instants)) if counts is None else np.asarray(counts, dtype=float)
+    sizes = np.ones(len(instants)) if counts is None else np.asarray(counts, dtype=float)
     most = max(len(MOTIONS[name].free) for name in candidates)
     if len(instants) < 3 * most:
         raise EstimateError(
             f"{len(instants)} samples", f"{most} parameters need three times as many", "give a longer record"
         )
-    independent = each if weights is None else np.asarray(weights, dtype=float)
-    blocks = BlockMeans(instants, data, each, independent, fs, restoring)
+    independent = sizes if weights is None else np.asarray(weights, dtype=float)
+    blocks = BlockMeans(instants, data, sizes, independent, fs, restoring)
     fits = fit_candidates(candidates, blocks, np.asarray(start, float))
     best = min(fits.values(), key=lambda fitted: fitted.cost)
     noise = Noise(best.residual, best.jacobian.shape[1], blocks.floor)
@@ -324,8 +324,10 @@ def kept_by_all(choices: Sequence[Choice]) -> tuple[str, ...]:
     tried = {
         candidate.name: [choice.candidate(candidate.name) for choice in choices] for candidate in choices[0].candidates
     }
-    kept = tuple(name for name, each in tried.items() if len(choices) * min(one.p_value for one in each) >= SIZE)
-    costs = {name: sum(one.fitted.cost for one in each) for name, each in tried.items()}
+    kept = tuple(
+        name for name, candidates in tried.items() if len(choices) * min(one.p_value for one in candidates) >= SIZE
+    )
+    costs = {name: sum(one.fitted.cost for one in candidates) for name, candidates in tried.items()}
     return kept or tuple(name for name, cost in costs.items() if cost <= NEAR**2 * min(costs.values()))
 
 
@@ -349,10 +351,10 @@ def _pooled(estimates: Sequence[Estimate]) -> tuple[float, float]:
 
 def _chosen(tried: tuple[Candidate, ...]) -> Choice:
     """The simplest candidate kept, or the nearest of all."""
-    kept = [each for each in tried if each.kept]
-    fewest = min((each.fitted.motion.size for each in kept), default=0)
-    simplest = [each for each in kept if each.fitted.motion.size == fewest] or tried
-    best = min(simplest, key=lambda each: each.fitted.cost)
+    kept = [candidate for candidate in tried if candidate.kept]
+    fewest = min((candidate.fitted.motion.size for candidate in kept), default=0)
+    simplest = [candidate for candidate in kept if candidate.fitted.motion.size == fewest] or tried
+    best = min(simplest, key=lambda candidate: candidate.fitted.cost)
     seen = f"no candidate fits: {best.against} is seen beside {best.fitted.motion.words}"
     status = lack_of_fit(best) if kept else seen
     return Choice(best.name, tried, best.whiteness, status or "ok")
@@ -463,18 +465,18 @@ def _directions(fitted: Fitted, best: Fitted) -> list[tuple[str, Array]]:
         jacobian = blocks.motion(parameters, free=(name,), half_cycles=fitted.half_cycles if dry else None)[1]
         return blocks.weighted(jacobian)[:, 0]
 
-    found = [
+    directions = [
         (name, column(name))
         for name in ("damping_ratio", "dry_displacement", "quadratic", "curvature")
         if name not in terms
     ]
     if "micro_slip" not in terms:
-        found.append(("micro_slip", column("micro_slip", exponent=EXPONENT)))
+        directions.append(("micro_slip", column("micro_slip", exponent=EXPONENT)))
     if dry and "rise" not in terms:
         speed = first_speed(fitted.parameters)
-        found += [("rise", column("rise", stribeck_speed=share * speed)) for share in STRIBECK_SPEEDS]
+        directions += [("rise", column("rise", stribeck_speed=share * speed)) for share in STRIBECK_SPEEDS]
     near = fitted.cost < HOPELESS * best.cost
     if dry and near and fitted.half_cycles > 1 and not fitted.motion.sticks_early:
         earlier = fit_motion(fitted.motion, blocks, fitted.parameters, half_cycles=fitted.half_cycles - 1)
-        found.append(("static", fitted.residual - earlier.residual))
-    return found
+        directions.append(("static", fitted.residual - earlier.residual))
+    return directions

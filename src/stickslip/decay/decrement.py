@@ -81,8 +81,8 @@ class Scatter:
 
     def __repr__(self) -> str:
         both = (self.damping_ratio, self.dry_displacement)
-        told = ", ".join(f"{each.mean():.4g} with a scatter of {each.std():.2g}" for each in both)
-        return f"Scatter(damping ratio, dry friction displacement: {told})"
+        parts = ", ".join(f"{values.mean():.4g} with a scatter of {values.std():.2g}" for values in both)
+        return f"Scatter(damping ratio, dry friction displacement: {parts})"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -232,15 +232,15 @@ def _of_one(ring_down: RingDown, form: str, location: str) -> Decrement:
         pull = float(np.mean(ex.dry(points, beta, form=form)[-last:]))
         return np.array([ex.damping_ratio(beta), _displacement(pull, beta, *motion), ex.offset(points, beta)])
 
-    found = answer(upright)
+    solution = answer(upright)
     spread = _propagated(answer, upright, sd)
-    spread[1] = math.hypot(spread[1], found[1] * _scale_sd(ring_down, frequency))
+    spread[1] = math.hypot(spread[1], solution[1] * _scale_sd(ring_down, frequency))
     scatter = _scatter(upright, ex.rate(upright, i=i, m=m, form=form), form, *motion)
     of_rate, of_dry = EQUATIONS[form]
     methods = f"equation {of_rate} over {m} half cycles", f"equation {of_dry}, mean of the last {last}"
-    damping_ratio, dry_displacement = _frictions(ring_down, found, spread, scatter, status, methods)
-    natural = frequency.scaled(1 / math.sqrt(1 - found[0] ** 2), "Hz", "natural frequency")
-    bias = _bias(ring_down, form, centre + side * found[2], spread[2], status)
+    damping_ratio, dry_displacement = _frictions(ring_down, solution, spread, scatter, status, methods)
+    natural = frequency.scaled(1 / math.sqrt(1 - solution[0] ** 2), "Hz", "natural frequency")
+    bias = _bias(ring_down, form, centre + side * solution[2], spread[2], status)
     return Decrement(
         damping_ratio,
         dry_displacement,
@@ -317,12 +317,12 @@ def _used(ring_down: RingDown, times: Array, values: Array, sd: Array, errors: A
 
 def _alternating(x: Array, errors: Array, form: str, times: Array) -> tuple[int, tuple[str, ...]]:
     """How many extremes shrink in turn by more than their errors; refused where the first half does not."""
-    found = ex.differences(x, form)
-    signs = np.sign(found) * np.where(np.arange(len(found)) % 2, -1.0, 1.0)
-    wrong = np.flatnonzero((signs != signs[0]) & (np.abs(found) > 2 * errors[: len(found)]))
+    differences = ex.differences(x, form)
+    signs = np.sign(differences) * np.where(np.arange(len(differences)) % 2, -1.0, 1.0)
+    wrong = np.flatnonzero((signs != signs[0]) & (np.abs(differences) > 2 * errors[: len(differences)]))
     if not len(wrong):
         return len(x), ()
-    count = int(wrong[0]) + len(x) - len(found)
+    count = int(wrong[0]) + len(x) - len(differences)
     when = f"{times[min(int(wrong[0]) + 1, len(x) - 1)]:.4g} s"
     if count < max(NEEDED[form], len(x) / 2):
         raise EstimateError(
@@ -337,12 +337,12 @@ def _alternating(x: Array, errors: Array, form: str, times: Array) -> tuple[int,
 
 def _best_pair(x: Array, errors: Array, form: str) -> tuple[int, int]:
     """The i and m for which the exact worst-case error of beta is least; the relative one, where errors may hide it."""
-    found = np.abs(ex.differences(x, form))
+    differences = np.abs(ex.differences(x, form))
     both = errors[2:] + errors[:-2] if form == "immune" else errors[1:] + errors[:-1]
-    off = ex.relative(both, found)
+    off = ex.relative(both, differences)
     best, chosen = math.inf, (0, 1)
-    for first in range(min(len(found) - 1, MOST)):
-        m = np.arange(1, len(found) - first)
+    for first in range(min(len(differences) - 1, MOST)):
+        m = np.arange(1, len(differences) - first)
         later = off[first + 1 :]
         alternate = ex.differences(x, form)[first + 1 :] * (-1.0) ** m * ex.differences(x, form)[first] > 0
         with np.errstate(invalid="ignore", divide="ignore"):
@@ -369,8 +369,8 @@ def _surest_dry(x: Array, sd: Array, i: int, m: int, form: str) -> int:
     tried = np.unique(np.round(np.geomspace(1, count, min(count, 12))).astype(int))
 
     def means(points: Array) -> Array:
-        each = ex.dry(points, ex.rate(points, i=i, m=m, form=form), form=form)
-        return np.array([each[-int(last) :].mean() for last in tried])
+        dry = ex.dry(points, ex.rate(points, i=i, m=m, form=form), form=form)
+        return np.array([dry[-int(last) :].mean() for last in tried])
 
     return int(tried[np.argmin(_propagated(means, x, sd))])
 
@@ -412,8 +412,8 @@ def _frequency(times: Array, values: Array, ring_down: RingDown) -> tuple[Estima
     freedom = max(1, len(at) - 2)
     share = sharp**2 / np.sum(sharp**2)
     spread = float(share @ (at - share @ at) ** 2)
-    left = math.sqrt(float(share @ (when - first - half * at) ** 2) * len(at) / freedom)
-    sd = max(left, 0.1 / ring_down.fs) / math.sqrt(len(at) * spread)
+    residual = math.sqrt(float(share @ (when - first - half * at) ** 2) * len(at) / freedom)
+    sd = max(residual, 0.1 / ring_down.fs) / math.sqrt(len(at) * spread)
     notes: tuple[str, ...] = ()
     if not ring_down.isochronous:
         longer = "longer" if ring_down.unevenness > 0 else "shorter"
@@ -436,10 +436,10 @@ def _few(count: int) -> tuple[str, ...]:
 
 
 def _scatter(x: Array, beta: float, form: str, order: int, frequency: float) -> Scatter:
-    found = ex.differences(x, form)
-    falls = found[1:] * found[:-1] < 0
-    rates = -np.log(-found[1:][falls] / found[:-1][falls]) / math.pi
-    dry = np.array([_displacement(float(each), beta, order, frequency) for each in ex.dry(x, beta, form=form)])
+    differences = ex.differences(x, form)
+    falls = differences[1:] * differences[:-1] < 0
+    rates = -np.log(-differences[1:][falls] / differences[:-1][falls]) / math.pi
+    dry = np.array([_displacement(float(force), beta, order, frequency) for force in ex.dry(x, beta, form=form)])
     return Scatter(rates / np.sqrt(1 + rates**2), dry)
 
 
@@ -466,7 +466,7 @@ def _bounds(x: Array, errors: Array, i: int, motion: tuple[int, float]) -> Bound
         pull = float(ex.dry(x, beta)[i - 1])
         psi = ex.dry_bound(x, i=i, beta=beta, dry_displacement=pull, error=error, rate_error=alpha)
         worst = (ex.rate_worst(x, i=i, m=m, error=error), ex.dry_worst(x, i=i, m=m, error=error))
-        shown = [_displacement(each, beta, *motion) for each in (pull, psi, worst[1])]
+        shown = [_displacement(force, beta, *motion) for force in (pull, psi, worst[1])]
         rows.append((m, beta, alpha, worst[0], *shown))
     table = np.array(rows).reshape(-1, 7)
     best = int(table[np.argmin(table[:, 3]), 0]) if len(table) else 0

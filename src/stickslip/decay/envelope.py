@@ -198,17 +198,21 @@ def extreme_decay(
     ring_down, sizes, numbers = _extremes(record, channel)
     signs = math.copysign(1.0, ring_down.amplitude) * (-1.0) ** numbers
     (beta, dry), (beta_sd, dry_sd) = _fitted_swings(sizes, numbers, signs, restoring)
-    told: dict[str, Any] = {
+    common: dict[str, Any] = {
         "method": f"least squares over {len(sizes)} extremes",
         "quantile": student(max(1, len(sizes) - FREE)),
     }
-    damping = Estimate.normal("damping ratio", damping_ratio(beta), sd=beta_sd / (1 + beta**2) ** 1.5, unit="1", **told)
-    displacement = Estimate.normal("dry friction displacement", dry, sd=dry_sd, unit=ring_down.unit, **told).within(0.0)
+    damping = Estimate.normal(
+        "damping ratio", damping_ratio(beta), sd=beta_sd / (1 + beta**2) ** 1.5, unit="1", **common
+    )
+    displacement = Estimate.normal("dry friction displacement", dry, sd=dry_sd, unit=ring_down.unit, **common).within(
+        0.0
+    )
     return EnvelopeDecay(
         damping,
         displacement,
-        _frequency(ring_down, damping.value, told["method"]),
-        told["method"],
+        _frequency(ring_down, damping.value, common["method"]),
+        common["method"],
         EXTREMES,
         Status(*([Doubt.few(len(sizes), "extreme")] if len(sizes) < 8 else [])),
     )
@@ -291,8 +295,8 @@ def _fitted_swings(sizes: Array, numbers: Array, signs: Array, restoring: str) -
     dry = _dry(sizes, numbers)
     scale = np.array([sizes[0], 1e-2, max(dry, 1e-3 * sizes[0]), 1e-2 * sizes[0]])
     fitted = search(left_by, [sizes[0], 1e-3, dry, 0.0], x_scale=scale, method="lm")
-    slopes, left = np.asarray(fitted.jac, dtype=float), np.asarray(fitted.fun, dtype=float)
-    covariance = np.linalg.pinv(slopes.T @ slopes) * float(left @ left) / max(1, len(sizes) - FREE)
+    slopes, residual = np.asarray(fitted.jac, dtype=float), np.asarray(fitted.fun, dtype=float)
+    covariance = np.linalg.pinv(slopes.T @ slopes) * float(residual @ residual) / max(1, len(sizes) - FREE)
     return np.asarray(fitted.x[1:3]), np.sqrt(np.diag(covariance)[1:3])
 
 

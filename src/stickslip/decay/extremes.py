@@ -50,7 +50,10 @@ def damping_ratio(beta: float) -> float:
 def frictions_seen(damping: Estimate | None, dry_friction: Estimate | None) -> str:
     """The frictions that the intervals hold apart from zero, in words."""
     both = (("viscous", damping), ("dry", dry_friction))
-    return " and ".join(word for word, each in both if each is not None and each.interval[0] > 0) or "no friction"
+    return (
+        " and ".join(word for word, friction in both if friction is not None and friction.interval[0] > 0)
+        or "no friction"
+    )
 
 
 def rate(extremes: ArrayLike, *, i: int, m: int, form: str = "immune") -> float:
@@ -61,12 +64,12 @@ def rate(extremes: ArrayLike, *, i: int, m: int, form: str = "immune") -> float:
     EstimateError
         The differences have signs that no decay gives: an extreme is missing, or lost in its error.
     """
-    found = differences(extremes, form)
+    swings = differences(extremes, form)
     first = i - 1 if form == "immune" else i
-    ratio = (-1) ** m * found[first + m] / found[first]
+    ratio = (-1) ** m * swings[first + m] / swings[first]
     if not ratio > 0:
         raise EstimateError(
-            f"the differences {found[first]:.4g} and {found[first + m]:.4g} have signs that no decay gives",
+            f"the differences {swings[first]:.4g} and {swings[first + m]:.4g} have signs that no decay gives",
             f"over {m} half cycles their sign changes {m} times",
             "an extreme is missing between them, or its error is larger than the difference: choose a smaller m",
         )
@@ -86,8 +89,8 @@ def dry(extremes: ArrayLike, beta: float, *, form: str = "immune") -> Array:
 def offset(extremes: ArrayLike, beta: float) -> float:
     """The constant that the extremes carry: what is left of ``X_i + e X_{i-1}`` where neighbours cancel x_k."""
     x, e = np.asarray(extremes, dtype=float), math.exp(-math.pi * beta)
-    each = (x[1:] + e * x[:-1]) / (1 + e)
-    return float(np.mean((each[1:] + each[:-1]) / 2))
+    centres = (x[1:] + e * x[:-1]) / (1 + e)
+    return float(np.mean((centres[1:] + centres[:-1]) / 2))
 
 
 def rate_bound(extremes: ArrayLike, *, i: int, m: int, error: float, beta: float | None = None) -> float:
@@ -100,9 +103,9 @@ def rate_bound(extremes: ArrayLike, *, i: int, m: int, error: float, beta: float
     return 2 * (1 + fade) * error / (m * math.pi * fade * abs(float(differences(extremes)[i - 1])))
 
 
-def relative(errors: Array, found: Array) -> Array:
+def relative(errors: Array, values: Array) -> Array:
     """Errors over the sizes of differences; infinite where extremes read in counts are equal, which tells nothing."""
-    return np.divide(errors, found, out=np.full_like(found, math.inf), where=found > 0)
+    return np.divide(errors, values, out=np.full_like(values, math.inf), where=values > 0)
 
 
 def rate_worst(extremes: ArrayLike, *, i: int, m: int, error: float | Array) -> float:
@@ -111,9 +114,9 @@ def rate_worst(extremes: ArrayLike, *, i: int, m: int, error: float | Array) -> 
     ``-ln((1 - 2 error / |later|) / (1 + 2 error / |earlier|)) / (m pi)``; infinite where the error may hide the later
     difference. With one error for each extreme, the two of each difference are added.
     """
-    found = np.abs(differences(extremes))
+    swings = np.abs(differences(extremes))
     errors = np.broadcast_to(np.asarray(error, dtype=float), np.shape(extremes))
-    off = relative(errors[2:] + errors[:-2], found)
+    off = relative(errors[2:] + errors[:-2], swings)
     if off[i - 1 + m] >= 1:
         return math.inf
     return -math.log((1 - off[i - 1 + m]) / (1 + off[i - 1])) / (m * math.pi)
@@ -178,19 +181,19 @@ def dry_worst(extremes: ArrayLike, *, i: int, m: int, error: float) -> float:
     """
     x = np.asarray(extremes, dtype=float)
 
-    def found(values: Array) -> float:
+    def quantity(values: Array) -> float:
         return float(dry(values, rate(values, i=i, m=m))[i - 1])
 
-    return _largest_at_corners(found, x, sorted({i - 1, i, i + 1, i + m - 1, i + m + 1}), error)
+    return _largest_at_corners(quantity, x, sorted({i - 1, i, i + 1, i + m - 1, i + m + 1}), error)
 
 
-def _largest_at_corners(found: Callable[[Array], float], x: Array, used: list[int], error: float) -> float:
-    middle, largest = found(x), 0.0
+def _largest_at_corners(quantity: Callable[[Array], float], x: Array, used: list[int], error: float) -> float:
+    middle, largest = quantity(x), 0.0
     for signs in itertools.product((-error, error), repeat=len(used)):
         moved = x.copy()
         moved[used] += signs
         try:
-            largest = max(largest, abs(found(moved) - middle))
+            largest = max(largest, abs(quantity(moved) - middle))
         except EstimateError:
             return math.inf
     return largest
@@ -211,14 +214,14 @@ def locate(ring_down: RingDown, how: str) -> tuple[Array, Array, Array, Array]:
     if how == "fit":
         turns = np.array([_turn(ring_down, number) for number in range(len(turns))])
         even = _evenly_spaced(turns, ring_down)
-        found = np.array([_fitted(ring_down, number, turn) for number, turn in enumerate(even)])
+        fits = np.array([_fitted(ring_down, number, turn) for number, turn in enumerate(even)])
     else:
-        found = np.array([_sampled(ring_down, number) for number in range(len(turns))])
-        turns = found[:, 0]
+        fits = np.array([_sampled(ring_down, number) for number in range(len(turns))])
+        turns = fits[:, 0]
     times = ring_down.first + turns / ring_down.fs
     quantised = ring_down.step if ring_down.noise < ring_down.step else 0.0
-    sd = np.sqrt(found[:, 2] ** 2 + quantised**2 / 12)
-    return times, found[:, 1], sd, found[:, 3] + quantised / 2
+    sd = np.sqrt(fits[:, 2] ** 2 + quantised**2 / 12)
+    return times, fits[:, 1], sd, fits[:, 3] + quantised / 2
 
 
 def _sampled(ring_down: RingDown, number: int) -> tuple[float, float, float, float]:
@@ -260,9 +263,9 @@ def _turn(ring_down: RingDown, number: int) -> float:
         bend = np.cos(turning * (rows - turn)) - 1
         shift = np.sin(turning * (rows - turn))
         columns = (np.ones(len(rows)), bend * (rows < turn), bend * (rows > turn), shift)
-        found = np.linalg.lstsq(np.column_stack(columns), ring_down.samples[rows], rcond=None)[0]
-        mean = (found[1] + found[2]) / 2
-        step = float(found[3] / (mean * turning)) if mean else 0.0
+        solution = np.linalg.lstsq(np.column_stack(columns), ring_down.samples[rows], rcond=None)[0]
+        mean = (solution[1] + solution[2]) / 2
+        step = float(solution[3] / (mean * turning)) if mean else 0.0
         turn += min(max(step, -0.1 * _half(ring_down)), 0.1 * _half(ring_down))
         if abs(step) < 1e-4:
             break
@@ -307,11 +310,11 @@ def _fitted(ring_down: RingDown, number: int, turn: float) -> tuple[float, float
     design = np.column_stack(columns)
     if len(rows) <= design.shape[1]:
         return _sampled(ring_down, number)
-    found = np.linalg.lstsq(design, ring_down.samples[rows], rcond=None)[0]
-    left = ring_down.samples[rows] - design @ found
+    solution = np.linalg.lstsq(design, ring_down.samples[rows], rcond=None)[0]
+    residual = ring_down.samples[rows] - design @ solution
     spread = float(np.sqrt(np.linalg.pinv(design.T @ design)[0, 0]))
-    noise = max(ring_down.noise, float(np.sqrt(left @ left / (len(rows) - design.shape[1]))))
-    return turn, float(found[0]), noise * spread, CERTAIN * noise * spread
+    noise = max(ring_down.noise, float(np.sqrt(residual @ residual / (len(rows) - design.shape[1]))))
+    return turn, float(solution[0]), noise * spread, CERTAIN * noise * spread
 
 
 def motion(times: Array, start: float, *, damping_ratio: float, dry_displacement: float, frequency: float) -> Array:

@@ -126,20 +126,24 @@ def fit_decay(
     if noise is not None and noise not in KINDS:
         raise EstimateError(f"noise = '{noise}'", f"it is one of {', '.join(KINDS)}", "choose one, or leave it out")
     records = [record] if isinstance(record, Record) else list(record)
-    found = _releases_of(records, channel)
-    ring_downs = [ring_down for each in found for ring_down in each.ring_downs]
+    groups = _releases_of(records, channel)
+    ring_downs = [ring_down for group in groups for ring_down in group.ring_downs]
     others = named(candidates)
-    motions = tuple(motion_of(each, restoring=restoring, candidates=others) for each in ring_downs) if others else ()
+    motions = (
+        tuple(motion_of(ring_down, restoring=restoring, candidates=others) for ring_down in ring_downs)
+        if others
+        else ()
+    )
     known = constants(mass, stiffness, ring_downs[0].channel)
-    history = tuple(step for each in records for step in each.history)
-    notes = tuple(dict.fromkeys(note for each in found for note in each.notes))
+    history = tuple(step for record in records for step in record.history)
+    notes = tuple(dict.fromkeys(note for group in groups for note in group.notes))
     if restoring != "linear":
         return fit_pendulum(
             ring_downs, restoring=restoring, noise=noise, motions=motions, known=known, notes=notes, history=history
         )
-    sources = [each for each, those in zip(records, found, strict=True) for _ in those.ring_downs]
+    sources = [record for record, those in zip(records, groups, strict=True) for _ in those.ring_downs]
     ring_downs = [_described(ring_down, source) for ring_down, source in zip(ring_downs, sources, strict=True)]
-    releases = [_release(each, noise) for each in ring_downs]
+    releases = [_release(ring_down, noise) for ring_down in ring_downs]
     motion = _alone(releases[0]) if len(releases) == 1 and releases[0].noise.kind == "white" else _together(releases)
     return _answer(ring_downs, releases, motion, motions, known, notes, history)
 
@@ -148,13 +152,13 @@ def _releases_of(records: list[Record], channel: str | None) -> list[Releases]:
     """The releases of each record, all of one channel."""
     if not records:
         raise EstimateError("no record", "a decay is fitted to one record at least", "pass a record, or several")
-    found = [find_releases(record, channel=channel) for record in records]
-    names = {ring_down.channel for each in found for ring_down in each.ring_downs}
+    groups = [find_releases(record, channel=channel) for record in records]
+    names = {ring_down.channel for group in groups for ring_down in group.ring_downs}
     if len(names) > 1:
         raise EstimateError(
             f"channels {', '.join(sorted(names))}", "releases are fitted together by one channel", "choose channel="
         )
-    return found
+    return groups
 
 
 def _described(ring_down: RingDown, record: Record) -> RingDown:
@@ -276,21 +280,21 @@ def _answer(
     half_cycles, likelihood = motion.candidates[0]
     motions_first = zip(releases, half_cycles, motion.motions[0], strict=True)
     fitted = [release.blocks.motion(p, n)[0] for release, n, p in motions_first]
-    choices = [each.choice for each in motions]
+    choices = [motion.choice for motion in motions]
     unlike = f"the releases do not share one friction and frequency (p = {motion.alike:.1g}): fit each alone"
     doubts = (Doubt(unlike),) if motion.alike < APART else _misfit(releases, fitted)
     status = Status(*_left_out(ring_downs), *doubts, *_seen_beside(choices))
     many = ", ".join(map(str, half_cycles))
     checks = (f"{many} half cycles" + ("" if likelihood > 0.995 else f" (likelihood {likelihood:.2f})"),)
-    noise = "; ".join(dict.fromkeys(each.noise.words for each in releases))
+    noise = "; ".join(dict.fromkeys(release.noise.words for release in releases))
     method = f"whole waveform, noise {noise}, profile likelihood"
     starts, first = [ring_down.first for ring_down in ring_downs], ring_downs[0]
     begins, far = beginning(first.held if first.order == 0 else float(motion.values[5]) > -1 / first.fs)
 
-    def estimate(index: int, words: str, unit: str, factor: float = 1.0, offset: float = 0.0) -> Estimate:
+    def estimate(index: int, label: str, unit: str, factor: float = 1.0, offset: float = 0.0) -> Estimate:
         low, high = (float(factor * end + offset) for end in motion.ends[index])
         value, spread = float(factor * motion.values[index] + offset), float(factor * motion.spread[index])
-        return Estimate(words, value, (low, high), spread, unit, method, status, checks)
+        return Estimate(label, value, (low, high), spread, unit, method, status, checks)
 
     damping, dry = estimate(1, "damping ratio", "1"), estimate(2, "dry friction displacement", length)
     spring = spring_of(known, float(motion.values[0]))
@@ -314,8 +318,8 @@ def _answer(
         noise_level=releases[0].noise.level,
         channel=name,
         ring_downs=tuple(ring_downs),
-        time=tuple(start + each.blocks.centres for start, each in zip(starts, releases, strict=True)),
-        measured=tuple(each.blocks.means for each in releases),
+        time=tuple(start + release.blocks.centres for start, release in zip(starts, releases, strict=True)),
+        measured=tuple(release.blocks.means for release in releases),
         fitted=tuple(fitted),
         status=status,
         notes=notes,
@@ -328,27 +332,27 @@ def _left_out(ring_downs: list[RingDown]) -> list[str]:
     """What of the releases is not fitted, in words."""
     cut = any(CLIPPED in ring_down.marks or not ring_down.sound.all() for ring_down in ring_downs)
     lost = any(LOST in ring_down.marks for ring_down in ring_downs)
-    return [words for words, told in ((CLIPPED, cut), (LOST, lost)) if told]
+    return [doubt for doubt, applies in ((CLIPPED, cut), (LOST, lost)) if applies]
 
 
 def _seen_beside(choices: list[Choice]) -> list[str]:
     """Of the first release that shows another motion than viscous and dry friction, which one, in words."""
-    return [words for choice in choices if (words := choice.seen_beside("both", "static"))][:1]
+    return [doubt for choice in choices if (doubt := choice.seen_beside("both", "static"))][:1]
 
 
 def _misfit(releases: list[Release], fitted: list[Array]) -> tuple[Doubt, ...]:
     """Doubt where the residual is much more than the record's own noise from block to block."""
     worst = 0.0
     for release, values in zip(releases, fitted, strict=True):
-        left = release.blocks.means - values
+        residual = release.blocks.means - values
         counted = release.noise.level if release.noise.kind == "quantised" else 0.0
         floor = max(float(roughness(release.blocks.means)), counted, 1e-12 * float(np.ptp(values)))
         if release.blocks.order < 2:
-            worst = max(worst, math.sqrt(float(left @ left) / release.blocks.freedom) / floor)
+            worst = max(worst, math.sqrt(float(residual @ residual) / release.blocks.freedom) / floor)
     if worst <= UNLIKE:
         return ()
-    words = f"the residual is {worst:.2g} times the noise: drift, or another motion (see choose_motion)"
-    return (Doubt(words, LEFT_OVER),)
+    doubt = f"the residual is {worst:.2g} times the noise: drift, or another motion (see choose_motion)"
+    return (Doubt(doubt, LEFT_OVER),)
 
 
 def _static(releases: list[Release], motion: _Motion, unit: str) -> Estimate:

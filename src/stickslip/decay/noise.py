@@ -110,8 +110,8 @@ def find_noise(blocks: Blocks, fits: Array, samples: Array, step: float, kind: s
             smooth = _refined(blocks, int(row[0]), row[3:], power)
             corner, power, _ = drift(blocks, int(row[0]), smooth)
             white = math.sqrt(float(power[-1]) / (1 + corner / frequencies(blocks)[-1]) * blocks.size)
-            words = f"white, and drift that outweighs it below {corner:.3g} Hz"
-            return Noise("coloured", white, words, lambda n: coloured(blocks, n, power))
+            label = f"white, and drift that outweighs it below {corner:.3g} Hz"
+            return Noise("coloured", white, label, lambda n: coloured(blocks, n, power))
     return Noise("white", level, "white", lambda n: white_noise(blocks, n, least))
 
 
@@ -179,8 +179,8 @@ def _transformed(blocks: Blocks, n: int, p: Array) -> tuple[Array, Array]:
 
     whole = blocks.total // blocks.size
     values, jacobian = blocks.motion(p, n)
-    left = dct((blocks.means - values)[:whole], norm="ortho")
-    return np.asarray(left), np.asarray(dct(jacobian[:, :whole], norm="ortho"))
+    residual = dct((blocks.means - values)[:whole], norm="ortho")
+    return np.asarray(residual), np.asarray(dct(jacobian[:, :whole], norm="ortho"))
 
 
 def frequencies(blocks: Blocks) -> Array:
@@ -197,25 +197,25 @@ def coloured(blocks: Blocks, n: int, power: Array) -> Objective:
     def objective(p: Array) -> tuple[float, Array, Array]:
         if not (abs(p[1]) < STEEPEST and p[0] > 0):
             return math.inf, np.zeros(6), np.eye(6)
-        left, jacobian = _transformed(blocks, n, p)
+        residual, jacobian = _transformed(blocks, n, p)
         weighted = jacobian / power
-        return float(left @ (left / power)), weighted @ left, weighted @ jacobian.T
+        return float(residual @ (residual / power)), weighted @ residual, weighted @ jacobian.T
 
     return objective
 
 
 def drift(blocks: Blocks, n: int, p: Array) -> tuple[float, Array, float]:
     """Corner [Hz] of the drift, the power at each cosine, and what it gains over white noise, by REML."""
-    left, jacobian = _transformed(blocks, n, p)
+    residual, jacobian = _transformed(blocks, n, p)
     tones = frequencies(blocks)
     work = np.empty((3, 6, 6))
 
     def judged(corner: float) -> tuple[float, float]:
-        cost, squares = restricted(left, jacobian, tones, corner, work)
+        cost, squares = restricted(residual, jacobian, tones, corner, work)
         return float(cost), float(squares)
 
     corners = np.geomspace(0.1 * tones[1], 2 * tones[-1], CORNERS)
-    costs = [judged(each)[0] for each in corners]
+    costs = [judged(place)[0] for place in corners]
     best = int(np.argmin(costs))
     if 0 < best < CORNERS - 1:  # a parabola through three costs
         below, here, above = costs[best - 1 : best + 2]
@@ -285,7 +285,7 @@ def add_counts(
 
 
 @compiled(**FAST)
-def restricted(left: Array, jacobian: Array, tones: Array, corner: float, work: Array) -> tuple[float, float]:
+def restricted(residual: Array, jacobian: Array, tones: Array, corner: float, work: Array) -> tuple[float, float]:
     """Minus twice the restricted log likelihood, but for a constant, of noise of power ``s^2 (1 + corner / f)``; s^2.
 
     Parameters
@@ -305,19 +305,19 @@ def restricted(left: Array, jacobian: Array, tones: Array, corner: float, work: 
         for k in range(6):
             curvature[j, k] = 0.0
     squares, power = 0.0, 0.0
-    for i in range(left.shape[0]):
+    for i in range(residual.shape[0]):
         here = 1.0 + corner / tones[i]
         power += math.log(here)
-        squares += left[i] * left[i] / here
+        squares += residual[i] * residual[i] / here
         for j in range(6):
             weighted = jacobian[j, i] / here
-            slope[j] += weighted * left[i]
+            slope[j] += weighted * residual[i]
             for k in range(j + 1):
                 curvature[j, k] += weighted * jacobian[k, i]
     for j in range(6):
         for k in range(j):
             curvature[k, j] = curvature[j, k]
-    freedom = left.shape[0] - 6
+    freedom = residual.shape[0] - 6
     if cholesky(curvature, slope, step, factor, 1e-13):
         for j in range(6):
             squares -= slope[j] * step[j]

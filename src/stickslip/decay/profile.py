@@ -234,10 +234,10 @@ def intervals(fits, kept, level, blocks, ends, work):
                     p[k] = fits[row, 3 + k]
                 n = int(fits[row, 0])
                 # which blocks an acceleration leaves out changes with the parameters: the quadratic serves there
-                found = blocks.order < 2 and extreme(
+                bounded = blocks.order < 2 and extreme(
                     p, n, which, side, level, fits[row, 1], blocks, hessian, gradient, work[:8]
                 )
-                if not found:
+                if not bounded:
                     missed += blocks.order < 2
                     for k in range(6):
                         p[k] = fits[row, 3 + k]
@@ -247,7 +247,7 @@ def intervals(fits, kept, level, blocks, ends, work):
                         aim[k] = 1.0 if k == which else 0.0
                     solve(hessian, aim, across, work[4], 1e-12)
                     p[which] += side * math.sqrt((level - fits[row, 1]) * across[which])
-                if found and last_swing(p, n)[0] < 0.0 and n > 1:
+                if bounded and last_swing(p, n)[0] < 0.0 and n > 1:
                     continue  # the motion of n - 1 half cycles goes on from here
                 if side * (p[which] - ends[which, e]) > 0.0:
                     ends[which, e] = p[which]

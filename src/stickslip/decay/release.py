@@ -173,13 +173,13 @@ class Releases:
         return Status(*self.notes)
 
     def __repr__(self) -> str:
-        told = [
+        lines = [
             f"{ring_down.release:.4g} to {ring_down.stop:.4g} s: {len(ring_down.turns)} extremes"
             f" at {ring_down.frequency:.4g} Hz from {ring_down.amplitude:.3g} {ring_down.unit}"
             + ("" if ring_down.stopped else ", still moving at the end")
             for ring_down in self.ring_downs
         ]
-        return "\n  ".join([f"{len(told)} release{'s' * (len(told) > 1)}:", *told])
+        return "\n  ".join([f"{len(lines)} release{'s' * (len(lines) > 1)}:", *lines])
 
 
 def find_releases(record: Record, *, channel: str | None = None) -> Releases:
@@ -229,39 +229,39 @@ def find_releases(record: Record, *, channel: str | None = None) -> Releases:
     unsound = np.zeros(len(values), dtype=bool)
     for first, last in clipped(values, plateaus=name != "x", step=grid):
         unsound[first : last + 1] = True
-    found = tuple(
+    released = tuple(
         _ring_down(record, name, swings, run, (noise, step), unsound, bounds_of(swings, runs, number, len(values)))
         for number, run in enumerate(runs)
     )
-    kept = _as_let_go(found)
+    kept = _as_let_go(released)
     many = (f"{len(kept)} releases in one record, each on its own",) if len(kept) > 1 else ()
-    less = len(found) - len(kept)
+    less = len(released) - len(kept)
     lost = (f"{less} short motion{'s' * (less > 1)} that something caught left out",) if less else ()
-    return Releases(kept, (*many, *lost, *dict.fromkeys(note for each in kept for note in each.notes)))
+    return Releases(kept, (*many, *lost, *dict.fromkeys(note for ring_down in kept for note in ring_down.notes)))
 
 
 def _as_let_go(ring_downs: tuple[RingDown, ...]) -> tuple[RingDown, ...]:
     """The releases, each up to where something caught it: friction holds no mass where another release went on."""
-    longest = max(ring_downs, key=lambda each: len(each.turns))
+    longest = max(ring_downs, key=lambda ring_down: len(ring_down.turns))
     if longest.order > 0 or not longest.stopped:
         return ring_downs
     turned = abs(float(longest.samples[longest.turns[-2]]) - longest.rest)
     kept = []
-    for each in ring_downs:
-        stayed = abs(float(each.samples[each.turns[-1]]) - longest.rest)
-        if each.stopped and stayed > HELD * turned + SEEN * each.noise:
-            last = int(each.turns[-2])
-            each = replace(
-                each,
-                samples=each.samples[: last + 1],
-                stop=each.first + last / each.fs,
+    for ring_down in ring_downs:
+        stayed = abs(float(ring_down.samples[ring_down.turns[-1]]) - longest.rest)
+        if ring_down.stopped and stayed > HELD * turned + SEEN * ring_down.noise:
+            last = int(ring_down.turns[-2])
+            ring_down = replace(
+                ring_down,
+                samples=ring_down.samples[: last + 1],
+                stop=ring_down.first + last / ring_down.fs,
                 stopped=False,
-                turns=each.turns[:-1],
-                sound=each.sound[:-1],
-                notes=(*each.notes, CAUGHT),
+                turns=ring_down.turns[:-1],
+                sound=ring_down.sound[:-1],
+                notes=(*ring_down.notes, CAUGHT),
             )
-        if len(each.turns) >= 4 or each is longest:
-            kept.append(each)
+        if len(ring_down.turns) >= 4 or ring_down is longest:
+            kept.append(ring_down)
     return tuple(kept)
 
 
@@ -450,8 +450,8 @@ def _flat_before(values: Array, start: int, half: float, noise: float) -> bool:
         bend = 1 - np.cos(math.pi / half * (rows - start))
         design = np.column_stack([np.ones(len(rows)), bend * (rows < start), bend * (rows > start)])
         inverse = np.linalg.inv(design.T @ design)
-        found = inverse @ design.T @ values[rows]
-        if abs(found[1]) + 2 * noise * math.sqrt(inverse[1, 1]) < BENT * abs(found[2]):
+        solution = inverse @ design.T @ values[rows]
+        if abs(solution[1]) + 2 * noise * math.sqrt(inverse[1, 1]) < BENT * abs(solution[2]):
             return True
     return False
 

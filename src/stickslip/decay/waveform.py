@@ -299,9 +299,12 @@ def _add_blocks(rows, means, z, turn, tau, step, hessian, gradient, mixed):
         z *= turn
         tau += step
     gram = (
-        (float(means.shape[0]), g01, g02, g03, g04), (g01, g11, g12, g13, g14), (g02, g12, g22, g23, g24),
-        (g03, g13, g23, g33, g34), (g04, g14, g24, g34, g44),
-    )  # fmt: skip
+        (float(means.shape[0]), g01, g02, g03, g04),
+        (g01, g11, g12, g13, g14),
+        (g02, g12, g22, g23, g24),
+        (g03, g13, g23, g33, g34),
+        (g04, g14, g24, g34, g44),
+    )
     for k in range(6):
         gradient[k] += rows[k, 0] * r0 + rows[k, 1] * r1 + rows[k, 2] * r2 + rows[k, 3] * r3 + rows[k, 4] * r4
         for j in range(5):

@@ -237,7 +237,7 @@ def _unclipped(ring_down: RingDown) -> int:
     return int(cut[-1]) + 1 if len(cut) else 0
 
 
-def told(ring_down: RingDown, worry: str) -> str:
+def status_of(ring_down: RingDown, worry: str) -> str:
     """What was left out of the record and what to beware of, or "ok"."""
     left_out = [CLIPPED] if _unclipped(ring_down) else []
     left_out += [LOST] if LOST in ring_down.marks else []
@@ -280,17 +280,17 @@ def _answer(choice: Choice, ring_down: RingDown) -> DecayMotion:
         choice.model,
         tuple((candidate.name, candidate.fitted.motion.words, candidate.verdict) for candidate in choice.candidates),
         choice,
-        told(ring_down, "" if choice.status == "ok" else choice.status),
+        status_of(ring_down, "" if choice.status == "ok" else choice.status),
         _terms(chosen, unit),
     )
 
 
 def _terms(chosen: Candidate, unit: str) -> tuple[Estimate, ...]:
     """Every term of a motion that has an interval."""
-    found = []
+    terms = []
     for parameter in chosen.fitted.motion.terms:
         name, per = TERMS[parameter]
         scale = abs(chosen.fitted.value("amplitude")) ** chosen.fitted.value("exponent")
         factor = scale if parameter == "micro_slip" else 1.0
-        found.append(chosen.estimate(parameter, name=name, unit=per.format(unit), factor=factor))
-    return tuple(each for each in found if each.sd > 0)
+        terms.append(chosen.estimate(parameter, name=name, unit=per.format(unit), factor=factor))
+    return tuple(term for term in terms if term.sd > 0)

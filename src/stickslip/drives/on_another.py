@@ -19,8 +19,8 @@ class Imposed:
     r"""The mass itself moves as a drive would move the spring's end: what a contact does under it, and no more.
 
     The friction of a motion that is known beforehand (thesis, sections 3.3 and 4.5): :math:`x(t)` is imposed, mass,
-    spring and damper play no part, and the law gives :math:`f(t)`. It takes a law of linear modes whose contact gives
-    way; one that holds the mass would hold the motion.
+    spring and damper play no part, and the law gives :math:`f(t)`. It takes a law whose contact gives way, of linear
+    modes or curved; one that holds the mass would hold the motion.
 
     Raises
     ------

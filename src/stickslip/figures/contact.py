@@ -1,16 +1,19 @@
-"""The contact: friction against displacement and velocity, sticks and slips."""
+"""The contact: friction against displacement and velocity, sticks and slips; a tribometer's over cycles and strokes."""
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from stickslip.balance.motion import contact_motion
+from stickslip.figures.plate import Plate, captioned
 from stickslip.figures.style import (
     BARS,
     BLUE,
     FAINT,
+    GREEN,
     INK,
     ORANGE,
     SHADE,
@@ -30,10 +33,12 @@ if TYPE_CHECKING:
 
     from stickslip.answers.findings import Findings
     from stickslip.contact.sliding_onset import TransitionSpeed
+    from stickslip.cycle.tribometer import Coefficients
 
 MARGIN = 0.25  # of a stick's duration, drawn on either side of it
 MOST_CYCLES = 30
 POINTS_A_CYCLE = 300
+COLOURS = {"plateau": BLUE, "by_stroke": ORANGE, "by_cycle": GREEN, "by_energy": INK}
 
 
 @styled
@@ -190,8 +195,8 @@ def plot_micro_slips(findings: Findings) -> Figure:
     """Does the contact hold all the time that it sticks? One stick, with the micro-slips in it shaded."""
     assert findings.sticks is not None
     events, record = findings.sticks.events, findings.record
-    held = record.time[0], record.time[-1]
-    inside = [event for event in events if event.kind == "microslip" and held[0] < event.time < held[1]]
+    span = record.time[0], record.time[-1]
+    inside = [event for event in events if event.kind == "microslip" and span[0] < event.time < span[1]]
     middle = inside[len(inside) // 2]
     stick = max((e for e in events if e.kind == "stick" and e.time <= middle.time), key=lambda event: event.time)
     margin = MARGIN * stick.duration
@@ -236,4 +241,43 @@ def plot_breakaway(findings: Findings, *, ax: Axes | None = None) -> Axes:
         ax.errorbar(values, places, xerr=np.abs(ends - values[:, None]).T, linestyle="none", **look)
     ax.set(yticks=[0, 1], yticklabels=["back", "forward"], ylim=(-0.5, 1.5), xlabel=axis_label("friction", unit))
     legend_above(ax, columns=3)
+    return ax
+
+
+def tribometer_plates(found: Coefficients) -> list[Plate]:
+    """The figures of a tribometer's test, in reading order."""
+    return [
+        captioned("tribometer", "coefficient", partial(plot_coefficients, found)),
+        captioned("tribometer", "triboscopy", partial(plot_triboscopy, found)),
+    ]
+
+
+@styled
+def plot_coefficients(found: Coefficients, *, ax: Axes | None = None) -> Axes:
+    """The coefficient of every cycle by each definition, and how it wears in."""
+    ax = axes_of(ax)
+    for name, values in found.of_cycles.items():
+        ax.plot(np.arange(1, len(values) + 1), values, color=COLOURS[name], linewidth=1.0, label=name.replace("_", " "))
+    if found.wear_in is not None:
+        cycle = np.arange(1, len(found.wear_in.fitted) + 1)
+        ax.plot(cycle, found.wear_in.fitted, color=INK, linewidth=1.0, linestyle="--", label="wear-in")
+    ax.set(xlabel="cycle", ylabel="friction over load")
+    legend_above(ax, columns=5)
+    return ax
+
+
+@styled
+def plot_triboscopy(found: Coefficients, *, ax: Axes | None = None) -> Axes:
+    """Friction over load at each place of the stroke, cycle after cycle, the mean of both directions."""
+    ax = axes_of(ax)
+    both = np.where(np.isnan(found.forward + found.back), np.nan, (found.forward + found.back) / 2)
+    factor, unit = (1e3, "mm") if found.unit == "m" else (1.0, found.unit)
+    low, high = np.nanquantile(both, [0.02, 0.98])
+    last = len(next(iter(found.of_cycles.values())))
+    mesh = ax.imshow(
+        both, aspect="auto", origin="lower", vmin=low, vmax=high, interpolation="nearest",
+        extent=(factor * found.position[0], factor * found.position[-1], 1, last),
+    )  # fmt: skip
+    ax.figure.colorbar(mesh, ax=ax, label="friction over load")
+    ax.set(xlabel=f"displacement [{unit}]", ylabel="cycle")
     return ax

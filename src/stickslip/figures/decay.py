@@ -80,9 +80,9 @@ def plot_identified(decay: Decay, *, release: int = 0) -> Figure:
     above.plot(*envelope(time, factor * fitted), color=ORANGE, linewidth=1.0, linestyle="--", label=label)
     above.set_ylabel(axis_label(WORDS[ring.channel], unit))
     legend_above(above, columns=2)
-    left = measured - fitted
-    small, small_unit = prefixed(left, ring.unit)
-    below.plot(*envelope(time, small * left), color=PURPLE, linewidth=0.8)
+    residual = measured - fitted
+    small, small_unit = prefixed(residual, ring.unit)
+    below.plot(*envelope(time, small * residual), color=PURPLE, linewidth=0.8)
     below.axhline(0, color=FAINT, linewidth=0.8)
     below.set(xlabel="time [s]", ylabel=axis_label("left over", small_unit))
     figure.align_ylabels([above, below])

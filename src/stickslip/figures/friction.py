@@ -259,9 +259,9 @@ def _over_records(batch: Batch, name: str) -> Plate:
 def plot_over_records(estimates: Sequence[Estimate], *, ax: Axes | None = None) -> Axes:
     """A quantity of each record with its interval."""
     ax = axes_of(ax)
-    values = np.array([each.value for each in estimates])
+    values = np.array([estimate.value for estimate in estimates])
     factor, unit = prefixed(values, estimates[0].unit)
-    ends = np.array([each.interval for each in estimates])
+    ends = np.array([estimate.interval for estimate in estimates])
     lengths = np.where(np.isfinite(ends), np.abs(ends - values[:, None]), 0.0).T
     ax.errorbar(
         np.arange(1, len(estimates) + 1), factor * values, factor * lengths, fmt="o", color=BLUE, ms=2, elinewidth=0.6

@@ -80,8 +80,8 @@ def plot_fit(result: LawComparison | LawFit, *, record: int = 0) -> Figure:
         label = f"fitted: {name_of_law}"
         ax.plot(*envelope(time[near], factor * fitted[near]), color=ORANGE, linewidth=1.0, linestyle="--", label=label)
         ax.set_ylabel(axis_label(quantity, unit, "\n"))
-        left = (measured - fitted)[near] / fit.noise[name]
-        below.plot(*envelope(time[near], left), color=colour, linewidth=0.8, label=quantity)
+        residual = (measured - fitted)[near] / fit.noise[name]
+        below.plot(*envelope(time[near], residual), color=colour, linewidth=0.8, label=quantity)
     legend_above(axes[0], columns=2)
     below.axhline(0, color=FAINT, linewidth=0.8)
     below.set(xlabel="time [s]", ylabel="left over,\ntimes the noise")

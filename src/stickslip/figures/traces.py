@@ -263,8 +263,8 @@ def plot_twin(trial: Trial, *, record: Record | None = None) -> Figure:
     """
     whole = trial.belief.record
     moved = trial.belief.moved
-    left = whole["x"] - moved
-    left = left - left.mean()
+    residual = whole["x"] - moved
+    residual = residual - residual.mean()
     rated = follows(whole["x"], moved)
     stretch = whole if record is None else record
     shown = (whole.time >= stretch.time[0]) & (whole.time <= stretch.time[-1])
@@ -274,8 +274,8 @@ def plot_twin(trial: Trial, *, record: Record | None = None) -> Figure:
     above.plot(whole.time[shown], factor * moved[shown], color=ORANGE, ls="--", label=f"twin, follows {rated:.2f} %")
     above.set_ylabel(axis_label("x", unit))
     legend_above(above, columns=2)
-    factor, unit = prefixed(left[shown], "m")
-    below.plot(whole.time[shown], factor * left[shown], color=INK, lw=0.8)
+    factor, unit = prefixed(residual[shown], "m")
+    below.plot(whole.time[shown], factor * residual[shown], color=INK, lw=0.8)
     below.axhline(0.0, color=FAINT, lw=0.8, zorder=0)
     below.set_ylabel(axis_label("left", unit))
     below.set_xlabel(axis_label("time", "s"))

@@ -308,16 +308,16 @@ def _portrait(run: Trajectory, across: Quantity, up: Quantity, ax: Axes, contact
     ax.plot(x_factor * values[0], y_factor * values[1], color=ORANGE if up[0] == "friction" else GREEN, label=label)
     marks = (("microstick", SKY, "microstick"), ("stick", BLUE, "stick"), ("flight", PURPLE, "lifted off"))
     for kind, colour, text in marks if contact is not None and contacts_of(run) else ():
-        held = np.zeros(len(times), dtype=bool)
+        shown = np.zeros(len(times), dtype=bool)
         for begin, length in stretches(run, kind, first=split, last=last, contact=contact or 0):
-            held |= (times >= begin) & (times < begin + length)
-        if not held.any():
+            shown |= (times >= begin) & (times < begin + length)
+        if not shown.any():
             continue
-        x, y = (np.where(held, factor * row, np.nan) for factor, row in zip((x_factor, y_factor), values, strict=True))
+        x, y = (np.where(shown, factor * row, np.nan) for factor, row in zip((x_factor, y_factor), values, strict=True))
         # at rest, a stick is a point of the portrait
         point = up[0] == "v" and kind == "stick" and not run.table.motion.face and len(run.labels("x")) == 1
         dot = "o" if point else ""
-        ax.plot(x, y, marker=dot, markevery=_middles(held), color=colour, linewidth=3, markersize=6, label=text)
+        ax.plot(x, y, marker=dot, markevery=_middles(shown), color=colour, linewidth=3, markersize=6, label=text)
     for line, row in ((ax.axvline, before[0]), (ax.axhline, before[1])):
         if row.min() < 0 < row.max():  # an axis far from the motion would only squeeze it
             line(0, color=FAINT, linewidth=0.8, zorder=0.5)
@@ -330,7 +330,7 @@ def _portrait(run: Trajectory, across: Quantity, up: Quantity, ax: Axes, contact
     return ax
 
 
-def _middles(held: NDArray[np.bool_]) -> list[int]:
+def _middles(shown: NDArray[np.bool_]) -> list[int]:
     """The middle of each unbroken row of True."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], held, [False]]).astype(int)))
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], shown, [False]]).astype(int)))
     return [int(middle) for middle in (edges[::2] + edges[1::2] - 1) // 2]

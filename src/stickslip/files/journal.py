@@ -80,9 +80,9 @@ class Journal:
         rows = np.ascontiguousarray(samples.T, dtype=self.type)
         self._frame(DATA, rows.tobytes(), first, clock)
 
-    def tell(self, kind: bytes, told: Mapping[str, Any], *, first: int = 0, clock: float = 0.0) -> None:
+    def tell(self, kind: bytes, contents: Mapping[str, Any], *, first: int = 0, clock: float = 0.0) -> None:
         """A mark, or how it ended."""
-        self._frame(kind, json.dumps(told).encode(), first, clock)
+        self._frame(kind, json.dumps(contents).encode(), first, clock)
 
     def sync(self) -> None:
         """Have what was written stand on the disk itself, against a failure of power."""
@@ -124,7 +124,7 @@ def read(path: Path, options: Options) -> Table:
     """Time and the channels, lost samples as NaN; its marks and its end in the history of the record."""
     about: dict[str, Any] = {}
     data: list[Frame] = []
-    told: list[tuple[Frame, Mapping[str, Any]]] = []
+    entries: list[tuple[Frame, Mapping[str, Any]]] = []
     end = 0
     for frame, contents in frames(path):
         end = frame.at + frame.length
@@ -133,7 +133,7 @@ def read(path: Path, options: Options) -> Table:
         elif frame.kind == ABOUT:
             about = parse_metadata(contents)
         else:
-            told.append((frame, parse_metadata(contents)))
+            entries.append((frame, parse_metadata(contents)))
     kind, scales = _layout(path, about)
     names = [name for name in units_told(about) if name != about["time"]]
     width = kind.itemsize * len(names)
@@ -146,8 +146,8 @@ def read(path: Path, options: Options) -> Table:
             "acquire again",
         )
     rows = int(firsts[-1] + counts[-1] - firsts[0])
-    cut = "" if any(frame.kind == DONE for frame, _ in told) else "it was not closed: what came until then is there"
-    record = _described(about, told, int(firsts[0]), rows, cut)
+    cut = "" if any(frame.kind == DONE for frame, _ in entries) else "it was not closed: what came until then is there"
+    record = _described(about, entries, int(firsts[0]), rows, cut)
     if rest := path.stat().st_size - end:
         cut = f"{cut}; its last {rest} bytes are no whole frame".removeprefix("; ")
     units, fs = units_told(record), float(about["fs"])
@@ -212,11 +212,11 @@ def _damaged(path: Path, reason: str) -> FormatError:
 
 
 def _described(
-    about: Mapping[str, Any], told: Sequence[tuple[Frame, Mapping[str, Any]]], begin: int, rows: int, cut: str
+    about: Mapping[str, Any], entries: Sequence[tuple[Frame, Mapping[str, Any]]], begin: int, rows: int, cut: str
 ) -> dict[str, Any]:
     """The description of the record, with what was marked and how it ended."""
     history = list(about.get("history", ()))
-    for frame, contents in told:
+    for frame, contents in entries:
         if frame.kind == MARK:
             time = float(about["start"]) + (frame.first - begin) / float(about["fs"])
             history.append(Step("mark", {"time": time}, str(contents.get("text", ""))).to_dict())

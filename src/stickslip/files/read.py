@@ -100,12 +100,12 @@ def read_record(
     >>> record
     Record(x [m], load [N]; 3 samples, 250 Hz, from 0 s)
     """
-    asked = _open(path, channels, fs, units, time, rows, Options(delimiter, decimal))
+    source = _open(path, channels, fs, units, time, rows, Options(delimiter, decimal))
     try:
-        return asked.whole()
+        return source.whole()
     except MemoryError as error:
         raise RecordError(
-            f"{asked.names} does not fit in memory",
+            f"{source.names} does not fit in memory",
             "a Record holds all its samples",
             "name fewer channels=, or go through the file with read_blocks()",
         ) from error

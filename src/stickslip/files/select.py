@@ -302,8 +302,8 @@ class Columns:
         if weighed and unit.si == "kg":
             self.notes.append(f"{name}: {weighed[1]} read as a mass; call the channel a or acc if it is gravity")
         assumed = stated is None and unit.si != "1"
-        words, sensitivity = described(name, unit.si), spec.sensitivity
-        return Channel(name, unit.si, words, source, sensitivity, gain_sd=spec.gain_sd, assumed=assumed), unit.scale
+        quantity, sensitivity = described(name, unit.si), spec.sensitivity
+        return Channel(name, unit.si, quantity, source, sensitivity, gain_sd=spec.gain_sd, assumed=assumed), unit.scale
 
     def _unit(self, name: str, stated: str) -> Unit:
         try:

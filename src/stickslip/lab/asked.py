@@ -18,7 +18,6 @@ if TYPE_CHECKING:
 LONG = 1 << 26  # bytes of files from which a record is asked part by part
 PART = 1 << 18  # rows of such a part
 AS_WRITTEN = "a record as it was written"
-READING = ("channels", "units", "fs", "time", "delimiter", "decimal")
 
 
 @dataclass(frozen=True)
@@ -59,7 +58,7 @@ class Asked:
     def record(self, number: int = 0) -> Record:
         """One of the records, whole, mended as asked."""
         rig, files = self.rig(number), self.records[number]
-        read = ss.read_record(_paths(files), rows=rig.row_range(), **_read_as(rig))
+        read = ss.read_record(files, rows=rig.row_range(), **rig.reading())
         return ss.answers.mend(self.named(read, files), repairs=rig.repair)
 
     def parts(self, number: int = 0) -> Iterator[Record]:
@@ -68,7 +67,7 @@ class Asked:
         if rig.rows or rig.repair or not self.is_long(number):
             yield self.record(number)
             return
-        for part in ss.read_blocks(_paths(files), size=PART, **_read_as(rig)):
+        for part in ss.read_blocks(files, size=PART, **rig.reading()):
             yield self.named(part, files)
 
     def is_long(self, number: int) -> bool:
@@ -95,14 +94,6 @@ def _renamed(step: ss.record.Step, names: Mapping[str, str]) -> ss.record.Step:
         for file in step.arguments.get("files", ())
     ]
     return dataclasses.replace(step, arguments={**step.arguments, "files": files}) if files else step
-
-
-def _paths(files: Sequence[Path]) -> Any:
-    return files[0] if len(files) == 1 else list(files)
-
-
-def _read_as(rig: RigSettings) -> dict[str, Any]:
-    return {name: getattr(rig, name) or None for name in READING}
 
 
 def on_the_page(sentence: str) -> str:

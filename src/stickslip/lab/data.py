@@ -282,15 +282,16 @@ async def limits(request: Request) -> Response:
 @described("Start an analysis", body=schema_of(Ask), answer=object_of(id="string"), status=202)
 async def ask(request: Request) -> Response:
     """Start an analysis."""
-    asked = _asked(await _body(request))
+    request_of = _question_of(await _body(request))
     data = _of(request)
-    files = [[data.uploads.get(key) for key in record] for record in asked.records]
+    files = [[data.uploads.get(key) for key in record] for record in request_of.records]
     names = {upload.path.name: upload.label for record in files for upload in record}
     question = {
-        "question": asked.question, "reading": asked.reading.model_dump(exclude_defaults=True),
-        "options": asked.options,
+        "question": request_of.question,
+        "reading": request_of.reading.model_dump(exclude_defaults=True),
+        "options": request_of.options,
         "records": [[str(upload.path) for upload in record] for record in files],
-    }  # fmt: skip
+    }
     return JSONResponse({"id": data.jobs.start(question, names=names).key}, status_code=202)
 
 
@@ -303,15 +304,15 @@ async def _body(request: Request) -> bytes:
     return bytes(body)
 
 
-def _asked(body: bytes) -> Ask:
+def _question_of(body: bytes) -> Ask:
     try:
-        asked = Ask.model_validate_json(body)
-        options = OPTIONS[asked.question].model_validate(asked.options).model_dump(exclude_defaults=True)
+        question = Ask.model_validate_json(body)
+        options = OPTIONS[question.question].model_validate(question.options).model_dump(exclude_defaults=True)
     except ValidationError as error:
         first = error.errors(include_url=False, include_context=False, include_input=False)[0]
         place = ".".join(str(part) for part in first["loc"]) or "the question"
         raise HTTPException(422, f"{place} can not be understood ({first['msg']}); correct it.") from error
-    return asked.model_copy(update={"options": options})
+    return question.model_copy(update={"options": options})
 
 
 @described("Where an analysis stands, with its answer when it is done", answer=STATUS)

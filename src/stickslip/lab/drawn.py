@@ -195,9 +195,9 @@ def _series(run: ss.solve.Trajectory, times: Array) -> tuple[list[dict[str, str]
     ]
     arrays = dict(zip((label for _, label, _ in lines), values, strict=True))
     way = arrays["x"] if "x" in arrays else run.system.tangents[0] @ values[: len(run.labels("x"))]  # type: ignore[union-attr]
-    held = {**arrays, "way": way, "slip": arrays["slip" if "slip" in arrays else "slip1"]}
+    series = {**arrays, "way": way, "slip": arrays["slip" if "slip" in arrays else "slip1"]}
     of = {"z": "x", "slip": "slip"}
-    return [{"name": label, "group": of.get(name, name), "unit": unit} for name, label, unit in lines], held
+    return [{"name": label, "group": of.get(name, name), "unit": unit} for name, label, unit in lines], series
 
 
 def _marks(run: ss.solve.Trajectory, first: float, last: float) -> tuple[dict[str, Any], Array]:

@@ -52,10 +52,10 @@ def boundary(request: Mapping[str, Any], go_on: Any) -> Answer:
 
 def first_state() -> dict[str, Any]:
     """What plays when the page opens: few cycles, so that one sees their shape."""
-    held: dict[str, Any] = json.loads(
+    state: dict[str, Any] = json.loads(
         ss.systems.export_system(ss.systems.scenario_case(FIRST).lasting(cycles=8), format="json")
     )
-    return held
+    return state
 
 
 def _part(make: Any) -> dict[str, Any]:

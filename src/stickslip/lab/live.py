@@ -87,16 +87,16 @@ class Live:
     def state(self, **more: Any) -> bytes:
         """What a page has to know first."""
         session = self.session
-        told: dict[str, Any] = {"kind": "state", "devices": self.names, "open": None, **more}
+        state: dict[str, Any] = {"kind": "state", "devices": self.names, "open": None, **more}
         if session is not None:
             device = session.device
-            told |= {"open": session.name, "model": device.model, "fs": device.fs, "failed": session.failed}
-            told["inputs"] = [
+            state |= {"open": session.name, "model": device.model, "fs": device.fs, "failed": session.failed}
+            state["inputs"] = [
                 {"name": one.name, "unit": one.unit, "limit": one.limit if math.isfinite(one.limit) else None}
                 for one in device.inputs
             ]
-            told["outputs"] = [{"name": one.name, "unit": one.unit} for one in device.outputs]
-        return frame(told)
+            state["outputs"] = [{"name": one.name, "unit": one.unit} for one in device.outputs]
+        return frame(state)
 
     def publish(self, message: bytes) -> None:
         """Send to everybody; who is behind misses the oldest."""
@@ -261,7 +261,9 @@ class Session:
         """The numbers of the last cycles, beside the reading."""
         try:
             rows, untold = bench.answers(record, self.constants)
-            plain = [[each if isinstance(each, str) or math.isfinite(each) else None for each in row] for row in rows]
+            plain = [
+                [value if isinstance(value, str) or math.isfinite(value) else None for value in row] for row in rows
+            ]
             self.tell(frame({"kind": "numbers", "rows": plain, "untold": untold}))
         finally:
             self.busy = False

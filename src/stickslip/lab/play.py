@@ -80,7 +80,7 @@ async def _parts(
     coarse = range(0, len(xs), STRIP)
     for number, begin in enumerate(coarse, start=1):
         part = xs[begin : begin + STRIP]
-        values[begin : begin + STRIP] = await _asked(socket, request, names, part, ys, want="sweep")
+        values[begin : begin + STRIP] = await _values_of(socket, request, names, part, ys, want="sweep")
         yield (
             {"level": "coarse", "done": number, "of": len(coarse)},
             {"x": part, "y": ys, "values": values[begin : begin + STRIP].ravel()},
@@ -88,10 +88,10 @@ async def _parts(
     strips = _changing(values) if request["measure"] in COUNTED else []
     for number, (i, begin, end) in enumerate(strips, start=1):
         x, y = xs[i : i + 2], ys[begin:end]
-        found = await _asked(socket, request, names, x, y, want="refine")
+        finer = await _values_of(socket, request, names, x, y, want="refine")
         yield (
             {"level": "fine", "done": number, "of": len(strips)},
-            {"x": _finer(x), "y": _finer(y), "values": found.ravel()},
+            {"x": _finer(x), "y": _finer(y), "values": finer.ravel()},
         )
 
 
@@ -122,7 +122,7 @@ def _axes(request: Mapping[str, Any]) -> tuple[list[str], list[NDArray[np.float6
     return names, values
 
 
-async def _asked(
+async def _values_of(
     socket: WebSocket, request: Mapping[str, Any], names: list[str], x: Any, y: Any, *, want: str
 ) -> NDArray[np.float64]:
     grid = {names[0]: x.tolist(), names[1]: y.tolist()}

@@ -150,8 +150,8 @@ class Thinned:
             self._kept.setdefault(name, []).append(extremes(part[name], self.width))
         while -(-self._total // self.width) > POINTS and self.width < PART:
             self.width *= 2
-            for name, held in self._kept.items():
-                self._kept[name] = [_halved(np.concatenate(held))]
+            for name, blocks in self._kept.items():
+                self._kept[name] = [_halved(np.concatenate(blocks))]
 
     def rows(self) -> Array:
         """The row of each value of :meth:`curves`: two in each stretch."""
@@ -162,8 +162,8 @@ class Thinned:
     def curves(self) -> dict[str, Array]:
         """The values of each channel, least and greatest in turn."""
         return {
-            name: np.concatenate(held).ravel() if self.width > 1 else np.concatenate(held)[:, 0]
-            for name, held in self._kept.items()
+            name: np.concatenate(blocks).ravel() if self.width > 1 else np.concatenate(blocks)[:, 0]
+            for name, blocks in self._kept.items()
         }
 
 

@@ -123,8 +123,8 @@ class Uploads:
 
 def _remove(path: Path) -> None:
     """Remove a file, and what was written beside it."""
-    for each in path.parent.glob(f"{path.name}*"):
-        each.unlink(missing_ok=True)
+    for leftover in path.parent.glob(f"{path.name}*"):
+        leftover.unlink(missing_ok=True)
 
 
 async def _in_pieces(chunks: AsyncIterator[bytes]) -> AsyncIterator[bytes]:

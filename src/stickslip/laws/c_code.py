@@ -84,9 +84,11 @@ def c_code(law: Law | CurvedLaw, formula: str) -> str:
     memory = list(law.memory)
     names = {name: f"in->{name}" for name in INPUTS} | {name: f"s->memory[{j}]" for j, name in enumerate(memory)}
     head = HEAD.format(
-        formula=remark(formula), memory=len(memory), size=max(1, len(memory)),
+        formula=remark(formula),
+        memory=len(memory),
+        size=max(1, len(memory)),
         modes=", ".join(f"{_token(mode.name)} = {number}" for number, mode in enumerate(modes)),
-    )  # fmt: skip
+    )
     parts = [head, _start(law, names), _force(modes, names), _rates(modes, memory, names), _leave(modes, names)]
     return "\n".join([*parts, _test(law, modes, memory)])
 
@@ -205,7 +207,7 @@ def _test(law: Law | CurvedLaw, modes: Modes, memory: list[str]) -> str:
             values |= moved
             force = HOLD if mode.friction is None else at(mode.friction, values)
             state = [values[name] for name in (*INPUTS, *memory)] + [force]
-            rows.append(f"    {{ {_token(mode.name)}, {', '.join(repr(float(each)) for each in state)} }}")
+            rows.append(f"    {{ {_token(mode.name)}, {', '.join(repr(float(value)) for value in state)} }}")
     inputs = len(INPUTS)
     return "\n".join([
         "#ifdef FRICTION_TEST", "#include <stdio.h>",
@@ -250,11 +252,14 @@ def python_code(law: Law | CurvedLaw, formula: str, breakaway: float | None) -> 
 
 def _function(modes: Modes, breakaway: float) -> str:
     back, _, forward = (written(mode.friction or {}) for mode in modes)
-    return "\n".join([
-        "def friction(v, hold=0.0):", "    if v == 0:",
-        f"        return min(max(hold, -{breakaway!r}), {breakaway!r})",
-        f"    return {forward} if v > 0 else {back}",
-    ])  # fmt: skip
+    return "\n".join(
+        [
+            "def friction(v, hold=0.0):",
+            "    if v == 0:",
+            f"        return min(max(hold, -{breakaway!r}), {breakaway!r})",
+            f"    return {forward} if v > 0 else {back}",
+        ]
+    )
 
 
 def _class(law: Law | CurvedLaw, modes: Modes) -> str:
@@ -281,8 +286,8 @@ def _python_rates(modes: Modes, names: Mapping[str, str]) -> list[str]:
     lines, named = ["    def rates(self, x, v, OTHERS):"], {**names, "f": "hold", "df": "hold_rate"}
     for mode in modes:
         if mode.rates:
-            told = ", ".join(f"{name!r}: {written(form, names=named)}" for name, form in mode.rates.items())
-            lines += [f"        if self.mode == {mode.name!r}:", f"            return {{{told}}}"]
+            rates = ", ".join(f"{name!r}: {written(form, names=named)}" for name, form in mode.rates.items())
+            lines += [f"        if self.mode == {mode.name!r}:", f"            return {{{rates}}}"]
     return [*lines, "        return {}", ""]
 
 

@@ -123,13 +123,13 @@ def guesses(seen: Observed) -> list[CompliantContact]:
     stiffness = np.geomspace(stiffest * SOFTEST / HARDEST, stiffest, 2 * GRID)
     tried = []
     for k, force in zip(stiffness, _elastoplastic(seen, stiffness).T, strict=True):
-        held = np.abs(force) < seen.level * (1 - 1e-9)
-        damping = share(seen.speed[held], (seen.friction - force)[held])
-        modelled = np.where(held, force + damping * seen.speed, force)
+        sticking = np.abs(force) < seen.level * (1 - 1e-9)
+        damping = share(seen.speed[sticking], (seen.friction - force)[sticking])
+        modelled = np.where(sticking, force + damping * seen.speed, force)
         # a number that is zero is not fitted: a loss that the friction does not show is begun small
         damping = max(damping, LIGHT * math.sqrt(float(k) * seen.mass))
         tried.append((seen.left(modelled), CompliantContact(seen.level, stiffness=float(k), damping=damping)))
-    return [min(tried, key=lambda each: each[0])[1]]
+    return [min(tried, key=lambda attempt: attempt[0])[1]]
 
 
 def _from_coulomb(simpler: Mapping[str, Searched]) -> list[CompliantContact]:

@@ -97,11 +97,11 @@ def formula_of(law: Any) -> str:
     """The law's friction in the names of its parameters."""
     if not _registered(law):
         return _formula_of_modes(law)
-    told: str = law.own_formula() if hasattr(law, "own_formula") else law.formula
+    formula: str = law.own_formula() if hasattr(law, "own_formula") else law.formula
     if getattr(law, "static", "") is None:  # a parameter that is not there is not named
-        told = told.replace("static", "kinetic" if hasattr(law, "kinetic") else "F(0)")
+        formula = formula.replace("static", "kinetic" if hasattr(law, "kinetic") else "F(0)")
     inner = getattr(law, "law", None)
-    return f"{told}; {formula_of(inner)}" if is_dataclass(inner) else told
+    return f"{formula}; {formula_of(inner)}" if is_dataclass(inner) else formula
 
 
 def _is_law(law: object) -> bool:
@@ -122,12 +122,12 @@ def _registered(law: object) -> bool:
 
 def _formula_of_modes(law: Law | CurvedLaw) -> str:
     """The friction of any law, as its modes have it."""
-    told = []
+    lines = []
     for mode in modes_of(law):
         rates = [f"{name}' = {written(form)}" for name, form in mode.rates.items()]
         force = "what holds the mass" if mode.friction is None else written(mode.friction)
-        told.append(f"{mode.name}: " + ", ".join([f"f = {force}", *rates]))
-    return "; ".join(told)
+        lines.append(f"{mode.name}: " + ", ".join([f"f = {force}", *rates]))
+    return "; ".join(lines)
 
 
 def _values(law: object) -> Iterator[tuple[str, Any]]:
@@ -153,7 +153,7 @@ def toml_table(heading: str, thing: object) -> str:
 
 def _toml_value(value: Any) -> str:
     if is_dataclass(value):
-        inner = ", ".join(f"{name} = {_toml_value(each)}" for name, each in _values(value))
+        inner = ", ".join(f"{name} = {_toml_value(entry)}" for name, entry in _values(value))
         return f'{{ name = "{type(value).__name__}", {inner} }}'
     if isinstance(value, str):
         return quoted(value)
@@ -230,8 +230,8 @@ def _mujoco(law: Law | CurvedLaw, joint: str = "slide") -> str:
             data = data if isinstance(data, str) else repr(float(data))
             own.append(f"    <{kind} name={quoteattr(f'{name}_{key}')} data={quoteattr(data)}/>")
         own.append("  </custom>")
-    told = remark(formula_of(law))
-    return "\n".join(["<mujocoinclude>", f"  <!-- {told} -->", f"  <!-- {where} -->", *own, "</mujocoinclude>"])
+    formula = remark(formula_of(law))
+    return "\n".join(["<mujocoinclude>", f"  <!-- {formula} -->", f"  <!-- {where} -->", *own, "</mujocoinclude>"])
 
 
 def _dcmotor(law: LuGre) -> list[str]:
@@ -283,8 +283,8 @@ def _simulink(law: Law | CurvedLaw) -> str:
         )
         lines.append(f"{type(law).__name__}.{key} = {data or _number(value)};")
     if (table := _table(law)) is not None:
-        told = "% for a 1-D Lookup Table over abs(v), clipped at its end, times sign(v); at rest up to breakaway"
-        lines.append(_strays(table, "%") + told)
+        usage = "% for a 1-D Lookup Table over abs(v), clipped at its end, times sign(v); at rest up to breakaway"
+        lines.append(_strays(table, "%") + usage)
         for key, numbers in (("breakpoints", table.speeds), ("table", table.forces)):
             lines.append(f"{type(law).__name__}.{key} = [{' '.join(map(_number, numbers))}];")
         lines.append(f"{type(law).__name__}.breakaway = {_number(table.breakaway)};")
@@ -300,5 +300,6 @@ FORMATS: dict[str, Callable[[Law | CurvedLaw], str]] = {
     "modelica": _modelica, "simulink": _simulink,
 }  # fmt: skip
 TURNING: dict[str, Callable[[Law | CurvedLaw], str]] = {
-    "mujoco": lambda law: _mujoco(law, "hinge"), "modelica": lambda law: _modelica(law, turning=True),
-}  # fmt: skip
+    "mujoco": lambda law: _mujoco(law, "hinge"),
+    "modelica": lambda law: _modelica(law, turning=True),
+}

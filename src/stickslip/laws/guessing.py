@@ -160,7 +160,7 @@ def hypotheses() -> dict[str, Hypothesis]:
     known = [
         hypothesis for law in registered().values() if hasattr(law, "hypotheses") for hypothesis in law.hypotheses()
     ]
-    return {each.name: each for each in sorted(known, key=lambda each: each.family is not RIGID)}
+    return {kind.name: kind for kind in sorted(known, key=lambda kind: kind.family is not RIGID)}
 
 
 def family_of(name: str) -> Family:

@@ -56,8 +56,9 @@ class InSeries:
         if isinstance(self.law, TimeDelay):
             raise ModelError(
                 "TimeDelay in series",
-                "a slider without mass jumps where friction of a while ago jumps",
-                "use SmoothStateVariable for a friction that lags",
+                "a lag recalls the speed of a mass, and no state tells that of a slider without one",
+                "give the slider a mass: an Oscillator of it under the lag, its spring to a HarmonicBase; or use "
+                "SmoothStateVariable for a friction that lags",
             )
         if isinstance(self.law, CurvedLaw):
             object.__setattr__(self, "rates", self._rates)  # with it, it is a curved law itself
@@ -231,8 +232,8 @@ class ElastoSlip:
         finite("width", width, unit="m", positive=True)
         if elements < 1:
             raise ModelError(f"elements = {elements}", "at least one", "raise elements=")
-        each = stiffness / elements
-        return cls([each] * elements, [each * width * (j + 0.5) / elements for j in range(elements)])
+        share = stiffness / elements
+        return cls([share] * elements, [share * width * (j + 0.5) / elements for j in range(elements)])
 
     @classmethod
     def mindlin(cls, kinetic: float, *, stiffness: float, elements: int = 12) -> ElastoSlip:
@@ -289,9 +290,9 @@ class ElastoSlip:
 
     def modes(self) -> tuple[Mode, ...]:
         """All hold; or the first j slide, to either side."""
-        held = Mode("held", "microstick", 0, self._force(0, 0), (self._yield(1, 0), self._yield(-1, 0)))
+        stuck = Mode("held", "microstick", 0, self._force(0, 0), (self._yield(1, 0), self._yield(-1, 0)))
         sliding = [self._slide(side, j) for side in (-1, 1) for j in range(1, len(self.forces) + 1)]
-        return held, *sliding
+        return stuck, *sliding
 
     def _slide(self, side: int, count: int) -> Mode:
         anchors = {f"anchor{j}": {"x": 1.0, "1": -side * self.forces[j] / self.stiffnesses[j]} for j in range(count)}

@@ -100,11 +100,11 @@ def _moved(exit_: Exit, to: CurvedMode, slider: str, stiffness: float, damping: 
     return replace(exit_, quantity=quantity, reset=reset | dict(exit_.reset))
 
 
-def _level(held: CurvedMode, side: float) -> float | None:
+def _level(stuck: CurvedMode, side: float) -> float | None:
     """The steady force up to which a mode holds to a side; None where there is none."""
-    if held.friction is not None:
+    if stuck.friction is not None:
         return None
-    for exit_ in held.exits:
+    for exit_ in stuck.exits:
         if set(exit_.quantity) == {"f", "1"} and exit_.quantity["f"] * side > 0:
             return -exit_.quantity["1"] / abs(exit_.quantity["f"])
     return None
@@ -115,8 +115,8 @@ def _creeping(law: Any, slider: str, stiffness: float, damping: float) -> Iterat
     spring = stiffness * (symbol("x") - symbol(slider))
     force = symbol(FORCE) if damping else spring
     for name, side, other in (("back", -1, "forward"), ("forward", 1, "back")):
-        held = law.holding(1.0, side)
-        creep, rates = held.creep.put({"f": force}), {own: rate.put({"f": force}) for own, rate in held.rates.items()}
+        stuck = law.holding(1.0, side)
+        creep, rates = stuck.creep.put({"f": force}), {own: rate.put({"f": force}) for own, rate in stuck.rates.items()}
         rates[slider] = creep
         if damping:
             balance = spring + damping * (symbol("v") - creep)
@@ -142,8 +142,8 @@ def _require_no_jump(modes: tuple[CurvedMode, ...], damping: float) -> None:
                 )
 
 
-def _require_continuous(held: CurvedMode, exit_: Exit, slip: CurvedMode) -> None:
-    level = _level(held, math.copysign(1.0, exit_.quantity.get("f", 0.0)))
+def _require_continuous(stuck: CurvedMode, exit_: Exit, slip: CurvedMode) -> None:
+    level = _level(stuck, math.copysign(1.0, exit_.quantity.get("f", 0.0)))
     if level is None or slip.friction is None or slip.friction.symbols - {"v"}:
         return
     slowest = abs(slip.friction.at(v=0.0))

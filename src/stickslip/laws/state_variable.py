@@ -140,14 +140,20 @@ class StateVariable(Rigid):
                 self._slip("forward", 1, decay, pull, edge),
             )
         band = TREMBLE * pull / decay
-        onward = (Exit({"f": 1.0, "theta": -1.0, "1": -band}, "forward"),
-                  Exit({"f": -1.0, "theta": 1.0, "1": -band}, "back"))  # fmt: skip
-        released = (Exit({"df": 1.0, "theta": decay, "1": -pull}, "forward"),
-                    Exit({"df": -1.0, "theta": -decay, "1": -pull}, "back"))  # fmt: skip
+        onward = (
+            Exit({"f": 1.0, "theta": -1.0, "1": -band}, "forward"),
+            Exit({"f": -1.0, "theta": 1.0, "1": -band}, "back"),
+        )
+        released = (
+            Exit({"df": 1.0, "theta": decay, "1": -pull}, "forward"),
+            Exit({"df": -1.0, "theta": -decay, "1": -pull}, "back"),
+        )
         follows, push = {"theta": {"df": 1.0}}, {"theta": {"f": 1.0}}
         # no time passes while it turns: it goes on, or its friction is the push from then on and holds it or lets it go
-        let_go = (Exit({"df": 1.0, "f": decay, "1": -pull}, "forward", push),
-                  Exit({"df": -1.0, "f": -decay, "1": -pull}, "back", push))  # fmt: skip
+        let_go = (
+            Exit({"df": 1.0, "f": decay, "1": -pull}, "forward", push),
+            Exit({"df": -1.0, "f": -decay, "1": -pull}, "back", push),
+        )
         turning = (*onward, *let_go, Exit({"1": 1.0}, "held", push))
         return (
             self._slip("back", -1, decay, pull),

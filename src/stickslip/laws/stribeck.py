@@ -334,12 +334,12 @@ class Tabulated(Rigid):
         return (*self._side(-1, "back"), stuck, *self._side(1, "forward"))
 
     def _side(self, side: int, name: str) -> list[Mode]:
-        found = []
+        modes = []
         last, slopes = len(self.speeds) - 1, (*self._slopes(), 0.0)
         for j in range(last + 1):
             low, high, slope = self.speeds[j], self.speeds[min(j + 1, last)], slopes[j]
             friction = {"1": side * (self.forces[j] - slope * low), "v": slope}
             slower = Exit({"v": -side, "1": low}, f"{name} {j - 1}") if j else Exit({"v": float(-side)}, "stuck")
             faster = (Exit({"v": float(side), "1": -high}, f"{name} {j + 1}"),) if j < last else ()
-            found.append(Mode(f"{name} {j}", "slip", side, friction, (slower, *faster)))
-        return found
+            modes.append(Mode(f"{name} {j}", "slip", side, friction, (slower, *faster)))
+        return modes

@@ -17,8 +17,7 @@ from stickslip.maps.crowd import Watch, crowds, on_cpu, watched
 from stickslip.maps.measures import AT_REST, EVENTS, FAILED, LOG, MOVING, NO_SYSTEM, ORDERS, own_name
 from stickslip.maps.plan import Arrays, Plan
 from stickslip.maps.watch import repeats
-from stickslip.solve.exponents import lyapunov
-from stickslip.solve.poincare import derivative, lap, tables
+from stickslip.solve.poincare import derivative, lap, lyapunov, tables
 from stickslip.solve.simulate import simulate
 from stickslip.solve.tables import Array, System, Tables
 from stickslip.solve.trajectory import Event, Trajectory
@@ -216,8 +215,8 @@ def outcome(run: Trajectory) -> int:
     """Whether the run still moves at its end: not where it is held through a whole period of the drive, or for good."""
     table, mode = run.table, int(run.modes[-1])
     still = not np.any(table.flow[mode][: table.physical]) if isinstance(table, Tables) else False
-    held = still and math.isfinite(table.motion.period) and run.durations[-1] >= (1 - 1e-9) * table.motion.period
-    return AT_REST if held or run.status == "at rest" else MOVING
+    resting = still and math.isfinite(table.motion.period) and run.durations[-1] >= (1 - 1e-9) * table.motion.period
+    return AT_REST if resting or run.status == "at rest" else MOVING
 
 
 def multiplier(run: Trajectory, settle: int) -> complex:

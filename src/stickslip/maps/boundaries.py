@@ -33,8 +33,8 @@ Kind = Callable[[Attractor], object]
 def sticking(attractor: Attractor) -> str:
     """Whether a contact ever holds."""
     modes = attractor.orbit.orbit.table.modes
-    held = any(modes[m].friction is None or modes[m].side == 0 for m in attractor.orbit.orbit.modes)
-    return "stops" if held else "no stops"
+    stops = any(modes[m].friction is None or modes[m].side == 0 for m in attractor.orbit.orbit.modes)
+    return "stops" if stops else "no stops"
 
 
 KINDS: dict[str, Kind] = {

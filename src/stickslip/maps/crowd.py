@@ -124,7 +124,7 @@ def _starts(plan: Plan, steps: Index) -> dict[str, Array]:
 def watched(plan: Plan, systems: Systems, start: Mapping[str, Any], watch: Watch) -> Arrays:
     """The measures of systems of one kind."""
     table = tables_of(systems)
-    asked = {measure for measure in plan.measures if isinstance(measure, str)}
+    named = {measure for measure in plan.measures if isinstance(measure, str)}
     states, modes = opened(table, start)
     count, physical = len(states), table.physical
     driven = bool(np.all(np.isfinite(table.period)))
@@ -132,15 +132,15 @@ def watched(plan: Plan, systems: Systems, start: Mapping[str, Any], watch: Watch
     with np.errstate(divide="ignore"):
         units = np.where(np.isfinite(table.period), table.period, 2 * np.pi / natural)
         rest = np.where(natural > 0, 1 / natural, table.period)
-    tangents = asked & {"multipliers", "lyapunov"}
-    grown, turned = driven and "lyapunov" in asked, driven and "multipliers" in asked
-    rows = min(2 * ORDERS, plan.cycles) if driven and asked & {"period", "multipliers"} else 0
+    tangents = named & {"multipliers", "lyapunov"}
+    grown, turned = driven and "lyapunov" in named, driven and "multipliers" in named
+    rows = min(2 * ORDERS, plan.cycles) if driven and named & {"period", "multipliers"} else 0
     leaps = table.leap if tangents else np.zeros((count, 1, 1, 1, 1))
     weights = np.ones((count, physical))
     weights[:, 1] = rest
-    wants = np.array([plan.settle, plan.cycles, grown, turned, physical, bool(asked & PATHS)], dtype=np.int64)
+    wants = np.array([plan.settle, plan.cycles, grown, turned, physical, bool(named & PATHS)], dtype=np.int64)
     models = Model(table.linear, phasors_of(table), table.period)
-    given = Given(states, modes, units, models, _look(table, asked), wants, leaps, weights)
+    given = Given(states, modes, units, models, _look(table, named), wants, leaps, weights)
     out = Counted(
         np.full(count, FAILED, np.int64),
         np.zeros((count, log.ENTRIES)),
@@ -156,7 +156,7 @@ def watched(plan: Plan, systems: Systems, start: Mapping[str, Any], watch: Watch
     return {"status": out.statuses, **answers}
 
 
-def _look(table: Tables, asked: set[str]) -> Look:
+def _look(table: Tables, named: set[str]) -> Look:
     """What the watch looks at."""
     fixed = np.arange(len(table.names)) != 0
     gap = np.eye(len(table.names))[0] - table.outputs["face"]  # of the mass from the counter-face
@@ -167,8 +167,8 @@ def _look(table: Tables, asked: set[str]) -> Look:
         quantities = table.series[:, table.first[j] : table.first[j + 1], 0]
         stops = np.any(np.all(np.delete(quantities, 1, axis=2) == 0, axis=(0, 2))) and still_face
         constant = not np.any(np.delete(table.friction[:, j, 0], table.physical, axis=1))
-        inner.append("amplitude" in asked and not rests and not stops)
-        works.append(0 if "energy" not in asked or mode.friction is None else CONSTANT if constant else VARIES)
+        inner.append("amplitude" in named and not rests and not stops)
+        works.append(0 if "energy" not in named or mode.friction is None else CONSTANT if constant else VARIES)
         still.append(rests)
     kinds = [KINDS.get(mode.kind, log.SLIP) for mode in table.modes]
     return Look(

@@ -229,10 +229,10 @@ def _moments(plain: Trajectory) -> list[Start]:
 
 def longest_stick(run: Trajectory, after: float) -> float:
     """Longest stretch in which the contact does not slip [s], of what happens after an instant."""
-    held = np.array([mode.kind in ("stick", "microstick") for mode in run.table.modes])[run.modes]
+    stuck = np.array([mode.kind in ("stick", "microstick") for mode in run.table.modes])[run.modes]
     ends = run.starts + run.durations
-    begun = np.flatnonzero(held & ~np.append(False, held[:-1]))
-    over = np.flatnonzero(held & ~np.append(held[1:], False))
+    begun = np.flatnonzero(stuck & ~np.append(False, stuck[:-1]))
+    over = np.flatnonzero(stuck & ~np.append(stuck[1:], False))
     return float(np.max(ends[over] - np.maximum(run.starts[begun], after), initial=0.0))
 
 

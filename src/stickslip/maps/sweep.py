@@ -23,8 +23,7 @@ from stickslip.maps.measures import EVENTS, FAILED, REPEATS, Measure, Variable, 
 from stickslip.maps.plan import BLOCK, Arrays, Keep, Plan, assemble, blank, chunked, required
 from stickslip.maps.store import Store
 from stickslip.oscillator import Oscillator
-from stickslip.solve.exponents import BATCHES
-from stickslip.solve.poincare import tables
+from stickslip.solve.poincare import BATCHES, tables
 from stickslip.solve.refusal import Endless
 from stickslip.solve.simulate import opening, simulate
 from stickslip.solve.tables import System
@@ -231,17 +230,17 @@ def planned(
     axes = apart(system, read_grid(system, grid), variables(asked_for))
     chunks = chunked([len(axis.values) for axis in axes])
     plan = Plan(system, axes, asked_for, int(cycles), int(settle), dict(start or {}), chunks)
-    asked = {measure for measure in plan.measures if isinstance(measure, str)}
+    named = {measure for measure in plan.measures if isinstance(measure, str)}
     system, begun = first_of(plan)
     if begun and not (isinstance(system, Oscillator) and isinstance(system.law, TimeDelay)):
         opening(tables(system), begun)
-    if "lyapunov" in asked and cycles < BATCHES:
+    if "lyapunov" in named and cycles < BATCHES:
         raise ModelError(f"cycles = {cycles}", f"a Lyapunov exponent needs {BATCHES} at least", "raise cycles=")
-    if asked & REPEATS and cycles < 2:
+    if named & REPEATS and cycles < 2:
         raise ModelError(f"cycles = {cycles}", "an orbit repeats within 2 measured periods at least", "raise cycles=")
-    if asked & EVENTS and isinstance(system, Structure) and len(system.contacts) != 1:
+    if named & EVENTS and isinstance(system, Structure) and len(system.contacts) != 1:
         raise ModelError(
-            f"{', '.join(sorted(asked & EVENTS))} of {len(system.contacts)} contacts",
+            f"{', '.join(sorted(named & EVENTS))} of {len(system.contacts)} contacts",
             "these measures are of systems with one contact",
             "measure with a function of the Trajectory",
         )

@@ -139,8 +139,8 @@ def _short(record: Record) -> list[Fault]:
 def _cut(record: Record) -> list[Fault]:
     """What the files that were read were found to lack."""
     last = len(record) - 1
-    told = [file for step in record.history for file in step.arguments.get("files", ()) if file.get("cut")]
-    return [Fault("cut", None, ((last, last),), f"'{file['name']}': {file['cut']}.") for file in told]
+    files = [file for step in record.history for file in step.arguments.get("files", ()) if file.get("cut")]
+    return [Fault("cut", None, ((last, last),), f"'{file['name']}': {file['cut']}.") for file in files]
 
 
 # ---- the clock
@@ -221,7 +221,7 @@ def _pairs(first: NDArray[np.intp], width: int = 1) -> Runs:
 
 def _unstated(record: Record) -> list[Fault]:
     """The clock and the channels whose unit nobody stated, with what they span in the one that was taken."""
-    finite = {name: record[name][np.isfinite(record[name])] for name, each in record.channels.items() if each.assumed}
+    finite = {name: record[name][np.isfinite(record[name])] for name, entry in record.channels.items() if entry.assumed}
     spans = {
         name: (record.channels[name].unit, float(np.ptp(values))) for name, values in finite.items() if len(values)
     }
@@ -239,8 +239,8 @@ def _unstated(record: Record) -> list[Fault]:
     return [*_clock_unstated(record), Fault("unit", channel, ((0, len(record) - 1),), message)]
 
 
-def _listed(words: list[str]) -> str:
-    return " and ".join(filter(None, (", ".join(words[:-1]), words[-1])))
+def _listed(parts: list[str]) -> str:
+    return " and ".join(filter(None, (", ".join(parts[:-1]), parts[-1])))
 
 
 def _clock_unstated(record: Record) -> list[Fault]:
@@ -328,11 +328,11 @@ def _shape_faults(name: str, unit: str, values: Array) -> list[Fault]:
     if cut is not None:
         faults.append(cut)
     top = flaws.rows_of(cut.rows if cut is not None else (), len(values))
-    held = tuple(run for run in flaws.frozen(values) if not top[run[0] : run[1] + 1].any()) if measured else ()
-    if held:
-        longest = max(last - first + 1 for first, last in held)
+    frozen = tuple(run for run in flaws.frozen(values) if not top[run[0] : run[1] + 1].any()) if measured else ()
+    if frozen:
+        longest = max(last - first + 1 for first, last in frozen)
         what = f"samples frozen while the signal moved on, for up to {longest} rows"
-        faults.append(_fault("frozen", name, held, what, f'make them NaN and use fill_missing(record, "{name}")'))
+        faults.append(_fault("frozen", name, frozen, what, f'make them NaN and use fill_missing(record, "{name}")'))
     rise = flaws.drift(values)
     if rise > DRIFT:
         what = f"a drift of {rise:.2g} times the oscillation's amplitude over the record"
@@ -348,8 +348,8 @@ def find_clipping(record: Record, name: str) -> Fault | None:
     Unlike the check-up, this also asks of a friction that was measured.
     """
     if name != COMPUTED:
-        found = (fault for fault in record.check() if fault.kind == "clipped" and fault.channel == name)
-        return next(found, None)
+        clipped = (fault for fault in record.check() if fault.kind == "clipped" and fault.channel == name)
+        return next(clipped, None)
     values = record[name]
     spikes = flaws.spikes(values)
     if spikes:

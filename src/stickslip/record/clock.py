@@ -225,21 +225,21 @@ def inspect(stamps: Array) -> Stamps:
     forward = steps[steps > 0]
     step = _usual(forward, quantum) if len(forward) else 0.0
     share = float(np.mean(repeated))
-    held = share > 0.5 or (share > 0.05 and float(np.median(steps)) < 0.6 * mean)
+    repeats = share > 0.5 or (share > 0.05 and float(np.median(steps)) < 0.6 * mean)
     # One stamp gone wrong disturbs the interval after it too.
-    readable = (_around(repeated | backward, 5) == 0) & (not held)
+    readable = (_around(repeated | backward, 5) == 0) & (not repeats)
     gaps = (steps > (GAP + spanned - 1) * step) & readable
     uneven = np.abs(steps - spanned * step) > max(1.5 * quantum, TOLERANCE * step)
     uneven &= readable & ~gaps
     if np.mean(uneven) < 0.01:
         uneven[:] = False
-        if not (held or (repeated | backward | gaps).any() or len(missing) or is_uniform(stamps)):
+        if not (repeats or (repeated | backward | gaps).any() or len(missing) or is_uniform(stamps)):
             uneven[_worst(steps, step, quantum)] = True
     # gaps row after row are another rate
     rate = _around(gaps, 2 * STEADY - 1) >= STEADY
     slower, gaps = gaps & rate, gaps & ~rate
     return Stamps(
-        step, quantum, held, first[repeated], first[backward], first[gaps], first[slower], first[uneven], missing
+        step, quantum, repeats, first[repeated], first[backward], first[gaps], first[slower], first[uneven], missing
     )
 
 

@@ -95,7 +95,7 @@ def from_pandas(
         units=units or {},
         stated={str(name): str(unit) for name, unit in stated.items()} if isinstance(stated, Mapping) else {},
         described=frame.attrs.get(KEY),
-        step=Step("from_pandas", _given(fs=fs, units=units, time=time)),
+        step=Step("from_pandas", _stated(fs=fs, units=units, time=time)),
     )
 
 
@@ -158,7 +158,7 @@ def from_xarray(
         units=units or {},
         stated=stated,
         described=dataset.attrs.get(KEY),
-        step=Step("from_xarray", _given(fs=fs, units=units)),
+        step=Step("from_xarray", _stated(fs=fs, units=units)),
     )
 
 
@@ -381,7 +381,7 @@ def _identifier(name: str) -> str:
     return f"_{name}" if name[0].isdigit() else name
 
 
-def _given(**arguments: Any) -> dict[str, Any]:
+def _stated(**arguments: Any) -> dict[str, Any]:
     """The arguments that were given, for the history."""
     return {
         key: dict(value) if isinstance(value, Mapping) else value

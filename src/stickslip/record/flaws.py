@@ -51,8 +51,8 @@ def rows_of(runs: Runs, n: int) -> Mask:
 def held_over(values: Array, lost: Mask) -> Array:
     """The values with the last one before held over lost ones: one interpolated would leave the sensor's levels."""
     last = np.maximum.accumulate(np.where(lost, 0, np.arange(len(values))))
-    held: Array = np.where(lost[last], values[~lost][0], values[last])
-    return held
+    filled: Array = np.where(lost[last], values[~lost][0], values[last])
+    return filled
 
 
 def constant(values: Array) -> bool:
@@ -104,10 +104,10 @@ def spikes(values: Array) -> Runs:
     agree with each other. Where more than one sample in sixty stands off (each disturbs three such differences), they
     count as what the channel does, and none is found: such a channel has no spikes but a fault of its cable.
     """
-    found = np.zeros(len(values), dtype=bool)
+    flags = np.zeros(len(values), dtype=bool)
     for width in (1, 2):
-        found |= _spikes(values, width)
-    return runs_of(found)
+        flags |= _spikes(values, width)
+    return runs_of(flags)
 
 
 def _spikes(values: Array, width: int, reach: int = 10) -> Mask:
@@ -146,7 +146,7 @@ def frozen(values: Array, shortest: int = 5) -> Runs:
     if not candidates:
         return ()
     step = quantum(values)
-    found = [run for run in candidates if _is_frozen(values, still, run, step, span)]
+    runs = [run for run in candidates if _is_frozen(values, still, run, step, span)]
     levels = np.array([abs(values[first]) for first, _ in candidates])
     lengths = np.array([last - first + 1 for first, last in candidates])
     near = max(0.5 * step, EXACT * span)
@@ -155,7 +155,7 @@ def frozen(values: Array, shortest: int = 5) -> Runs:
         alike = (np.abs(levels - abs(values[run[0]])) <= near) & (lengths >= 0.5 * (run[1] - run[0] + 1))
         return int(np.sum(alike)) > 1
 
-    return tuple(run for run in found if not recurs(run))
+    return tuple(run for run in runs if not recurs(run))
 
 
 def _is_frozen(values: Array, still: Mask, run: tuple[int, int], step: float, span: float) -> bool:
@@ -252,8 +252,8 @@ def _clipped_top(values: Array, noise: float, step: float, plateaus: bool, stric
         calm = high[:-4] + high[1:-3] + high[2:-2] + high[3:-1] + high[4:] > 2  # the median of five
         # here the noise goes on at the top, as it does on a plateau: only twin parabolas tell
         mask, slack, plateaus = calm, 3 * spread, True
-    held = [run for run in runs_of(mask) if run[1] - run[0] >= 2]
-    cut = _were_cut(values, held, level, slack, plateaus, strictness)
+    plateau_runs = [run for run in runs_of(mask) if run[1] - run[0] >= 2]
+    cut = _were_cut(values, plateau_runs, level, slack, plateaus, strictness)
     return mask if cut else np.zeros(len(values), dtype=bool)
 
 
@@ -273,11 +273,11 @@ def _piled_up(values: Array, count: int, noise: float) -> bool:
 
 
 def _were_cut(
-    values: Array, held: list[tuple[int, int]], level: float, slack: float, plateaus: bool, strictness: float
+    values: Array, runs: list[tuple[int, int]], level: float, slack: float, plateaus: bool, strictness: float
 ) -> bool:
     """Whether plateaus, taken together, cut off tops; no, where their approach is not resolved."""
     floor, sides = level - 0.5 * float(np.ptp(values)), []
-    for first, last in held[:: 1 + len(held) // ENOUGH]:
+    for first, last in runs[:: 1 + len(runs) // ENOUGH]:
         length = last - first + 1
         reach = max(4, length)
         before, after = values[max(0, first - reach) : first][::-1], values[last + 1 :][:reach]

@@ -102,7 +102,7 @@ class Log:
 
     def rows(self) -> list[tuple[str, str]]:
         """What was written down, as a person reads it: title and value."""
-        return [(TITLES[name], _told(name, value)) for name, value in self.entries().items()]
+        return [(TITLES[name], _text(name, value)) for name, value in self.entries().items()]
 
 
 def _number(name: str, value: Any) -> float:
@@ -125,7 +125,7 @@ def _kelvin(value: float | str) -> float:
     return parse_value(value, "K")
 
 
-def _told(name: str, value: Any) -> str:
+def _text(name: str, value: Any) -> str:
     match name:
         case "temperature":
             return f"{value - ZERO_CELSIUS:.4g} °C"

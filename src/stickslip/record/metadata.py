@@ -51,12 +51,12 @@ def read_beside(path: Path) -> dict[str, Any]:
         if file.read(len(BEGINS)) != BEGINS.encode():
             return {}
         file.seek(0)
-        held = parse_metadata(file.read(LONGEST))
-    told = held.get(KEY)
-    if BEFORE in held:
+        metadata = parse_metadata(file.read(LONGEST))
+    about = metadata.get(KEY)
+    if BEFORE in metadata:
         with path.open("rb") as text:
-            told = told if hashlib.file_digest(text, "sha256").hexdigest() == held.get(OF) else held[BEFORE]
-    return told if isinstance(told, dict) else {}
+            about = about if hashlib.file_digest(text, "sha256").hexdigest() == metadata.get(OF) else metadata[BEFORE]
+    return about if isinstance(about, dict) else {}
 
 
 def record_to_metadata(record: Record) -> dict[str, Any]:
@@ -143,11 +143,11 @@ def require_columns(metadata: Mapping[str, Any], there: Collection[str]) -> None
         )
 
 
-def require_rows(metadata: Mapping[str, Any], found: int) -> None:
+def require_rows(metadata: Mapping[str, Any], rows: int) -> None:
     """Refuse a file that was cut short: its last number may be cut too."""
-    if metadata.get("rows") != found:
+    if metadata.get("rows") != rows:
         raise FormatError(
-            f"{found} rows where the description of the record says {str(metadata.get('rows'))[:20]}",
+            f"{rows} rows where the description of the record says {str(metadata.get('rows'))[:20]}",
             "a file written by write_record is whole",
             "copy it again, or read what is there by naming channels=",
         )

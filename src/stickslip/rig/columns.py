@@ -105,9 +105,9 @@ def guess_columns(record: Record) -> list[Guess]:
     for find in (_by_itself, _by_word, _by_unit):
         for channel in record.channels.values():
             if channel.name not in taken:
-                found = find(channel, {each for each, _ in taken.values()})
-                if found[0]:
-                    taken[channel.name] = found
+                guess = find(channel, {channel_taken for channel_taken, _ in taken.values()})
+                if guess[0]:
+                    taken[channel.name] = guess
     return [_guess(record, channel, *taken.get(channel.name, ("", ""))) for channel in record.channels.values()]
 
 
@@ -116,8 +116,8 @@ def _by_itself(channel: Channel, taken: set[str]) -> tuple[str, str]:
 
 
 def _by_word(channel: Channel, taken: set[str]) -> tuple[str, str]:
-    for name, words in WORDS:
-        if name not in taken and _fits(channel, name) and re.search(words, channel.name.lower().strip("_")):
+    for name, pattern in WORDS:
+        if name not in taken and _fits(channel, name) and re.search(pattern, channel.name.lower().strip("_")):
             return name, "its name"
     return "", ""
 

@@ -18,6 +18,7 @@ from stickslip.record.record import RIG_UNITS, Record
 from stickslip.settings import STRICT, checked, quantity, read_toml
 
 REPAIRS = ("clock", "gaps", "missing", "spikes", "clipping", "drift")
+READING = ("channels", "units", "fs", "time", "delimiter", "decimal")  # options that read_record has too
 
 
 def _row_range(value: object) -> object:
@@ -245,6 +246,10 @@ class RigSettings(BaseModel):
         names = (name, name.rpartition("/")[2])
         fits = (load for pattern, load in self.normal.items() if any(fnmatch.fnmatch(name, pattern) for name in names))
         return next(fits, None)
+
+    def reading(self) -> dict[str, Any]:
+        """What ``read_record`` is told of the files, None where nothing is."""
+        return {name: getattr(self, name) or None for name in READING}
 
     def row_range(self) -> tuple[int, int | None] | None:
         """`rows` as the pair (first, last), last excluded."""

@@ -114,9 +114,10 @@ class Shaker:
         """
         if not self.lowest <= frequency <= self.highest:
             raise ModelError(
-                f"{frequency:g} Hz", f"the shaker's motion is a sine from {self.lowest:g} to {self.highest:g} Hz",
+                f"{frequency:g} Hz",
+                f"the shaker's motion is a sine from {self.lowest:g} to {self.highest:g} Hz",
                 "choose a frequency between",
-            )  # fmt: skip
+            )
         demands = self.demands(frequency, amplitude, pull=pull)
         worst = max(demands, key=lambda name: demands[name])
         if demands[worst] > 1:

@@ -3,12 +3,12 @@ from stickslip.signals.clocks import clock_rate as clock_rate
 from stickslip.signals.clocks import synchronise as synchronise
 from stickslip.signals.derivatives import differentiate as differentiate
 from stickslip.signals.derivatives import smooth as smooth
+from stickslip.signals.filters import Harmonics as Harmonics
+from stickslip.signals.filters import harmonics as harmonics
 from stickslip.signals.filters import keep_band as keep_band
 from stickslip.signals.filters import remove_mode as remove_mode
 from stickslip.signals.filters import remove_trend as remove_trend
 from stickslip.signals.interpolate import without_delays as without_delays
-from stickslip.signals.periodic import Harmonics as Harmonics
-from stickslip.signals.periodic import harmonics as harmonics
 from stickslip.signals.repair import fill_gaps as fill_gaps
 from stickslip.signals.repair import fill_missing as fill_missing
 from stickslip.signals.repair import remove_drift as remove_drift

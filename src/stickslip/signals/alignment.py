@@ -134,10 +134,10 @@ class Lines:
     @property
     def telling(self) -> Lines:
         """The lines that tell nearly all that these tell of a mount."""
-        told = self.information * self.turn**4
-        ordered = np.sort(told)
+        curvature = self.information * self.turn**4
+        ordered = np.sort(curvature)
         least = np.searchsorted(np.cumsum(ordered), (1 - TELLING) * ordered.sum())
-        return self.chosen(told >= ordered[least]) if len(told) else self
+        return self.chosen(curvature >= ordered[least]) if len(curvature) else self
 
     def without_offset(self, gain: float) -> Lines:
         """The second less its offset, which is all that the relation leaves at frequency zero."""
@@ -147,30 +147,30 @@ class Lines:
     def residual(self, theta: Array) -> Complex:
         """Of the relation, over its standard deviation; theta is (delay [s], gain, 2 zeta/w_m [s], 1/w_m^2 [s^2])."""
         delay, gain, damped, squared = theta
-        left = self.second[0] + damped * self.second[1] + squared * self.second[2]
+        residual = self.second[0] + damped * self.second[1] + squared * self.second[2]
         factor = 1 + 1j * damped * self.turn - squared * self.turn**2
         spread = np.abs(factor) ** 2 * self.noise[1] + gain**2 * self.noise[0]
-        return np.asarray((left - gain * np.exp(-1j * self.turn * delay) * self.first) / np.sqrt(spread))
+        return np.asarray((residual - gain * np.exp(-1j * self.turn * delay) * self.first) / np.sqrt(spread))
 
     def expansion(self, theta: Array) -> tuple[float, Array, Array, Array]:
         """Sum of squares of :meth:`residual`, half its slopes and curvatures by theta, and the slopes' products."""
         delay, gain, damped, squared = theta
         w, (of_first, of_second), none = self.turn, self.noise, np.zeros_like(self.turn)
         stiff, turned = 1 - squared * w**2, np.exp(-1j * w * delay) * self.first
-        left = self.second[0] + damped * self.second[1] + squared * self.second[2] - gain * turned
+        residual = self.second[0] + damped * self.second[1] + squared * self.second[2] - gain * turned
         spread = (stiff**2 + (damped * w) ** 2) * of_second + gain**2 * of_first
         by_theta = np.array([1j * w * gain * turned, -turned, self.second[1], self.second[2]])
         widened = np.array([none, gain * of_first, damped * w**2 * of_second, -stiff * w**2 * of_second]) / spread
-        power = np.abs(left) ** 2 / spread
-        slopes = (left.conj() * by_theta).real / spread
+        power = np.abs(residual) ** 2 / spread
+        slopes = (residual.conj() * by_theta).real / spread
         mixed = 2 * slopes @ widened.T
         curvature = ((by_theta.conj() / spread) @ by_theta.T).real - mixed - mixed.T + 4 * (power * widened) @ widened.T
-        twice = np.array([gain * w**2, 1j * w]) * turned * left.conj() / spread  # delay and delay, delay and gain
+        twice = np.array([gain * w**2, 1j * w]) * turned * residual.conj() / spread  # delay and delay, delay and gain
         curvature[0, 0] += np.sum(twice[0].real)
         curvature[[0, 1], [1, 0]] += np.sum(twice[1].real)
         widest = np.array([none, of_first, w**2 * of_second, w**4 * of_second]) / spread
         curvature -= np.diag(widest @ power)
-        of_residual = (by_theta - left * widened) / np.sqrt(spread)
+        of_residual = (by_theta - residual * widened) / np.sqrt(spread)
         products = (of_residual.conj() @ of_residual.T).real
         return float(np.sum(power)), np.sum(slopes - power * widened, axis=1), curvature, products
 
@@ -284,9 +284,9 @@ def align(
     used = [0, 1, 2, 3] if free else [0, 1]
     for done in range(rounds):
         if not done:
-            theta[1] = told([next(pairs[0].stretches(delay, room))]).gain or 1.0
+            theta[1] = merged([next(pairs[0].stretches(delay, room))]).gain or 1.0
         parts = (part.without_offset(theta[1]) for pair in pairs for part in pair.stretches(delay, room))
-        lines = told(part.weighed(theta) if done and rounds > 2 else part for part in parts)
+        lines = merged(part.weighed(theta) if done and rounds > 2 else part for part in parts)
         theta, misfit = _likeliest(lines, theta, used)
         delay, theta[0] = float(np.clip(delay + theta[0], -FARTHEST, FARTHEST)), 0.0
     square = window(1 << 12) ** 2
@@ -343,10 +343,10 @@ def _likeliest(lines: Lines, theta: Array, free: list[int]) -> tuple[Array, Misf
     for _ in range(STEPS):
         step, tried = misfit.step(damping), theta.copy()
         tried[free] += step * misfit.scale
-        found, gain = Misfit.of(lines, tried, free), float(-step @ misfit.gradient)
-        if found.value < misfit.value:
-            gain = min(gain, misfit.value - found.value)
-            theta, misfit, damping = tried, found, damping / 10 if damping > DAMPED else 0.0
+        moved, gain = Misfit.of(lines, tried, free), float(-step @ misfit.gradient)
+        if moved.value < misfit.value:
+            gain = min(gain, misfit.value - moved.value)
+            theta, misfit, damping = tried, moved, damping / 10 if damping > DAMPED else 0.0
         else:
             damping = max(10 * damping, DAMPED)
         if gain < SETTLED * max(1.0, misfit.value / (2 * len(lines.turn))):
@@ -362,10 +362,12 @@ def _terms(mount: tuple[float, float] | None) -> tuple[float, float]:
     return 2 * mount[1] / turn, 1 / turn**2
 
 
-def told(parts: Iterable[Lines]) -> Lines:
+def merged(parts: Iterable[Lines]) -> Lines:
     """The clear lines of all stretches that tell something of a delay or a mount, of what their own stretch tells."""
     clear = [part.chosen(part.clear).telling for part in parts]
-    lines = Lines(*(np.concatenate([getattr(each, field.name) for each in clear], axis=-1) for field in fields(Lines)))
+    lines = Lines(
+        *(np.concatenate([getattr(chosen, field.name) for chosen in clear], axis=-1) for field in fields(Lines))
+    )
     if len(lines.turn) < 2:
         raise EstimateError(
             "no line of the spectra stands above the noise of either channel",
@@ -413,7 +415,7 @@ def _middle(pair: Pair, most: int) -> Pair:
 def _peaks(pair: Pair) -> list[float]:
     """Delays [s], to a sample, at which a pair correlates most, fast lines first: the highest and the nearest."""
     part = next(_middle(pair, BLOCK).stretches(0.0))
-    lines, step = told([part]), float(part.turn[1])
+    lines, step = merged([part]), float(part.turn[1])
     count = round(2 * math.pi * pair.fs / step)
     spectrum = np.zeros(count // 2 + 1, dtype=complex)
     across = lines.first.conj() * lines.second[0]

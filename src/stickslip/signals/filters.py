@@ -1,14 +1,21 @@
-"""Filters that shift nothing in time: a band kept, a mode taken out, a trend taken off; each is told in the history."""
+"""Filters that shift nothing in time: a band kept, a mode taken out, a trend taken off; each is told in the history.
+
+How harmonic a periodic channel is, is told by the amplitudes of its fundamental and of the multiples of it.
+"""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from stickslip.errors import RecordError
+from stickslip.errors import EstimateError, RecordError
+from stickslip.estimate import Estimate, Result
 from stickslip.record.record import Record, Step, require_record
+from stickslip.statistics import LeastSquares, least_squares, student
 
 Array = NDArray[np.float64]
 
@@ -63,9 +70,9 @@ def keep_band(
         )
     kind = "bandpass" if len(edges) == 2 else "highpass" if high is None else "lowpass"
     between = " to ".join(f"{edge:g}" for edge in edges)
-    words = {"bandpass": f"kept {between} Hz", "highpass": f"kept above {low:g} Hz" if low else "",
+    outcome = {"bandpass": f"kept {between} Hz", "highpass": f"kept above {low:g} Hz" if low else "",
              "lowpass": f"kept below {high:g} Hz" if high else ""}[kind]  # fmt: skip
-    return _filtered(record, channels, edges, kind, Step("keep_band", {"low": low, "high": high}, words))
+    return _filtered(record, channels, edges, kind, Step("keep_band", {"low": low, "high": high}, outcome))
 
 
 def remove_mode(
@@ -108,8 +115,8 @@ def remove_mode(
             "its band lies between 0 and half the sampling rate",
             "correct the frequency [Hz] or width=",
         )
-    words = f"taken out {edges[0]:g} to {edges[1]:g} Hz"
-    step = Step("remove_mode", {"frequency": frequency, "width": width}, words)
+    outcome = f"taken out {edges[0]:g} to {edges[1]:g} Hz"
+    step = Step("remove_mode", {"frequency": frequency, "width": width}, outcome)
     return _filtered(record, channels, edges, "bandstop", step)
 
 
@@ -167,5 +174,89 @@ def _filtered(record: Record, channels: Iterable[str] | None, edges: list[float]
     most = len(record) - 1
     settle = min(most, int(SETTLES * record.fs / edges[0]))
     through: dict[str, Array] = {n: sosfiltfilt(sections, record[n], padlen=settle) for n in names}
-    told = Step(step.action, {**step.arguments, "channels": names}, step.outcome)
-    return record.with_samples({**record.samples, **through}, told, filtered=True)
+    described = Step(step.action, {**step.arguments, "channels": names}, step.outcome)
+    return record.with_samples({**record.samples, **through}, described, filtered=True)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Harmonics(Result):
+    """The harmonics of a channel.
+
+    Attributes
+    ----------
+    frequency : float
+        Of the fundamental [Hz], as asked for.
+    amplitudes : tuple of Estimate
+        Of the fundamental and its multiples, in the channel's unit.
+    """
+
+    frequency: float
+    amplitudes: tuple[Estimate, ...]
+
+    @property
+    def estimates(self) -> tuple[Estimate, ...]:
+        """The amplitudes."""
+        return self.amplitudes
+
+    def ratio(self, order: int) -> float:
+        """How many times larger the fundamental is than the harmonic of this order."""
+        return self.amplitudes[0].value / self.amplitudes[order - 1].value
+
+
+def harmonics(record: Record, channel: str = "x", *, frequency: float, count: int = 5) -> Harmonics:
+    r"""How large are the fundamental of a periodic channel and the multiples of it?
+
+    Least squares of :math:`a_0 + \sum_k a_k\cos k\omega t + b_k\sin k\omega t`; the amplitudes are
+    :math:`\sqrt{a_k^2 + b_k^2}` (thesis, section 3.5.1, where sliding counts as harmonic because the fundamental is
+    100 times the second harmonic). The mean and a steady drift are taken off with it.
+
+    Parameters
+    ----------
+    record : Record
+        With the channel, over two cycles or more.
+    channel : str
+        Which one.
+    frequency : float
+        Of the fundamental [Hz].
+    count : int
+        How many, the fundamental among them.
+
+    Returns
+    -------
+    Harmonics
+
+    Raises
+    ------
+    EstimateError
+        The record is shorter than two cycles, or does not hold the highest harmonic.
+
+    Examples
+    --------
+    >>> t = np.arange(2000) / 500
+    >>> swing = Record.of({"x": np.cos(2 * np.pi * 5 * t) + 0.01 * np.sin(2 * np.pi * 15 * t)}, fs=500)
+    >>> round(harmonics(swing, frequency=5.0).ratio(3), 6)
+    100.0
+    """
+    record.require_clean(channel, question="harmonics")
+    cycles = record.duration * frequency
+    if cycles < 2 or 2 * count * frequency >= record.fs:
+        raise EstimateError(
+            f"{cycles:.3g} cycles of {frequency:g} Hz at {record.fs:g} samples a second",
+            f"{count} harmonics need two cycles, and more than {2 * count * frequency:g} samples a second",
+            "give a longer record, or ask for fewer harmonics",
+        )
+    turned = 2 * math.pi * frequency * (record.time - record.time[0])
+    waves = [wave(order * turned) for order in range(1, count + 1) for wave in (np.cos, np.sin)]
+    line = least_squares(np.column_stack([*waves, np.ones(len(turned)), turned]), record[channel])
+    unit = record.channels[channel].unit
+    return Harmonics(frequency, tuple(_amplitude(line, order, unit) for order in range(count)))
+
+
+def _amplitude(line: LeastSquares, order: int, unit: str) -> Estimate:
+    """Of one harmonic, with the standard deviation along its own phase."""
+    parts = slice(2 * order, 2 * order + 2)
+    value = float(np.hypot(*line.coefficients[parts]))
+    sd = float(np.hypot(*(line.coefficients[parts] * line.sd[parts]))) / value if value else float(line.sd[parts].max())
+    name = "fundamental" if order == 0 else f"harmonic {order + 1}"
+    quantile = student(float(line.freedom[parts].min()))
+    return Estimate.normal(name, value, sd=sd, unit=unit, method="least squares", quantile=quantile).within(0.0)

@@ -67,11 +67,11 @@ def band_limited(values: Array, times: Array, *, cutoff: float = 1.0) -> Array:
         past = block - base
         if np.ptp(past) < SAME and np.all(np.diff(base) == 1):  # a plain delay: the same weights everywhere
             weights = _weights(past[0] - taps, cutoff)
-            found = around[..., base[0] + 1 : base[-1] + 2, :] @ weights
+            products = around[..., base[0] + 1 : base[-1] + 2, :] @ weights
         else:
             weights = _weights(past[:, None] - taps, cutoff)
-            found = np.einsum("...ij,ij->...i", around[..., base + 1, :], weights)
-        result[..., first : first + BLOCK] = found / np.sum(weights, axis=-1)
+            products = np.einsum("...ij,ij->...i", around[..., base + 1, :], weights)
+        result[..., first : first + BLOCK] = products / np.sum(weights, axis=-1)
     return result
 
 

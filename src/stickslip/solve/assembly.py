@@ -290,11 +290,11 @@ class _Builder:
 
     def _stilled(self, held: Mapping[int, float]) -> Rows:
         """The state with the velocities of some contacts told, none where they hold."""
-        told = {
+        columns = {
             c: (self.contacts[c].tangent, self.contacts[c].carried * self.face[1] + speed * self.one)
             for c, speed in held.items()
         }
-        return np.asarray(stilled(np.tile(self.unit, (self.count, 1, 1)), self.degrees, told))
+        return np.asarray(stilled(np.tile(self.unit, (self.count, 1, 1)), self.degrees, columns))
 
     def build(self) -> Tables:
         joints, count, size = self.joints, self.count, self.size

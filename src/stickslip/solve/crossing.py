@@ -67,13 +67,13 @@ def crossings(run: Trajectory, channel: str, *, level: float = 0.0, side: int = 
     if not 0 <= contact < len(values):
         raise ModelError(f"contact = {contact}", f"'{channel}' has {len(values)} rows, from 0", "correct it")
     series = np.polynomial.chebyshev.chebfit(points, values[contact].reshape(-1, ORDER + 1).T - level, ORDER)
-    found = [*_within(series, begins, widths, side), *_jumped(series, begins, side)]
-    return np.unique(np.array(found, dtype=np.float64))
+    instants = [*_within(series, begins, widths, side), *_jumped(series, begins, side)]
+    return np.unique(np.array(instants, dtype=np.float64))
 
 
 def _within(series: Array, begins: Array, widths: Array, side: int) -> list[float]:
     """Instants at which a cell's polynomial crosses zero."""
-    found = []
+    instants = []
     largest = np.abs(series).sum(axis=0)
     near = np.abs(series[0]) <= np.abs(series[1:]).sum(axis=0) + ROUNDING * np.max(largest, initial=0.0)
     for j in np.flatnonzero(near & (largest > 0)):
@@ -84,8 +84,8 @@ def _within(series: Array, begins: Array, widths: Array, side: int) -> list[floa
         signs = np.sign(np.polynomial.chebyshev.chebval(edges, own))
         for root, before, after in zip(real, signs, signs[1:], strict=False):
             if before * after < 0 and side * after >= 0:
-                found.append(float(begins[j] + widths[j] * (root + 1) / 2))
-    return found
+                instants.append(float(begins[j] + widths[j] * (root + 1) / 2))
+    return instants
 
 
 def _jumped(series: Array, begins: Array, side: int) -> list[float]:

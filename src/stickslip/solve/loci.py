@@ -103,9 +103,9 @@ def doubled(orbit: SteadyState) -> SteadyState:
         state[: table.physical] += push * direction
         near = lap(run.system, table, state, int(run.modes[0]), 2 * orbit.order * LAPS).end()
         for place, mode in ((state, int(run.modes[0])), near):
-            found = closed_orbit(run.system, table, place, mode, 2 * orbit.order)
-            if found is not None and found.order == 2 * orbit.order and not alike(found, orbit):
-                return found
+            closed = closed_orbit(run.system, table, place, mode, 2 * orbit.order)
+            if closed is not None and closed.order == 2 * orbit.order and not alike(closed, orbit):
+                return closed
     raise ModelError(
         f"no orbit of {2 * orbit.order} periods beside the one of {orbit.order}",
         "a period doubling sends one off, to one side",
@@ -186,8 +186,8 @@ def locus(branch: Branch, *, kind: str, parameter: str, values: Sequence[float],
         if value != value_of(orbit.orbit.system, parameter):
             orbit = continue_orbit(orbit, parameter, to=value, step=0.5).orbits[-1]
         own = continue_orbit(orbit, branch.parameter, to=high)
-        found = _change(own, kind, number)
-        place, at = (np.nan, None) if found is None else _sharpened(own, kind, found, high - low)
+        change = _change(own, kind, number)
+        place, at = (np.nan, None) if change is None else _sharpened(own, kind, change, high - low)
         points.append((place, value))
         orbits.append(at)
     return Locus(kind, (branch.parameter, parameter), np.array(points).reshape(-1, 2), tuple(orbits))
@@ -195,8 +195,8 @@ def locus(branch: Branch, *, kind: str, parameter: str, values: Sequence[float],
 
 def _change(branch: Branch, kind: str, number: int) -> int | None:
     """Which orbit of a branch is the first behind a change, or at it."""
-    found = {"fold": branch.folds, "grazing": branch.changes, "doubling": period_doublings(branch)}[kind]
-    return found[number] if number < len(found) else None
+    changes = {"fold": branch.folds, "grazing": branch.changes, "doubling": period_doublings(branch)}[kind]
+    return changes[number] if number < len(changes) else None
 
 
 def _sharpened(branch: Branch, kind: str, j: int, way: float) -> tuple[float, SteadyState]:

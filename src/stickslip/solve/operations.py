@@ -51,10 +51,13 @@ class Bound:
     def friction(self, force: Sequence[Form], acceleration: Sequence[Form]) -> list[Form]:
         """Forces of the contacts that hold, by the forces on the masses and the accelerations of the counter-face."""
         if self.count < self.degrees:
-            return _through(self.share, [
-                combined([*zip(row, force, strict=True), (-1.0, own)])
-                for row, own in zip(self.rows @ self.inverse, acceleration, strict=True)
-            ])  # fmt: skip
+            return _through(
+                self.share,
+                [
+                    combined([*zip(row, force, strict=True), (-1.0, own)])
+                    for row, own in zip(self.rows @ self.inverse, acceleration, strict=True)
+                ],
+            )
         forced = _through(self.mass @ self.spread, acceleration)
         rest = [combined([(1.0, push), (-1.0, own)]) for push, own in zip(force, forced, strict=True)]
         return _through(self.spread.T, rest)

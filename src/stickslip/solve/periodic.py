@@ -15,9 +15,20 @@ from itertools import pairwise
 import numpy as np
 
 from stickslip.errors import ModelError, SolveError
-from stickslip.solve.exponents import growth
 from stickslip.solve.orbit import SteadyState, alike
-from stickslip.solve.poincare import CLOSED, Table, beat, beats, carried_on, closes, derivative, extent, lap, tables
+from stickslip.solve.poincare import (
+    CLOSED,
+    Table,
+    beat,
+    beats,
+    carried_on,
+    closes,
+    derivative,
+    extent,
+    growth,
+    lap,
+    tables,
+)
 from stickslip.solve.self_excited import self_excited
 from stickslip.solve.simulate import opening
 from stickslip.solve.tables import Array, System
@@ -39,16 +50,16 @@ def aperiodic(system: System, table: Table, state: Array, mode: int) -> SteadySt
     seen: its neighbours come together, and it only repeats later than was looked."""
     orbit = beats(system, table, state, mode, 1)
     none = np.full(table.physical, np.nan, dtype=np.complex128)
-    found = SteadyState("not periodic", math.nan, 0, orbit, none)
+    answer = SteadyState("not periodic", math.nan, 0, orbit, none)
     count = COUNTED_CURVED if isinstance(table, Tape) else COUNTED
     exponent = growth(system, table, state, mode, cycles=count)
     parted = exponent.value * count * beat(table)
     if parted > PARTED and exponent.interval[0] > 0:
-        return replace(found, status="chaotic", exponent=exponent)
+        return replace(answer, status="chaotic", exponent=exponent)
     known = tuple(omega / (2 * math.pi) for _, _, omega, _ in table.motion.tones)
     tonal = not math.isfinite(table.motion.period) and len(known) > 1
     if parted < -PARTED and not tonal:
-        return replace(found, exponent=exponent)
+        return replace(answer, exponent=exponent)
     lines, again = [], (state, mode)
     for _ in range(1 if tonal else 2):
         motion = beats(system, table, *again, LOOKED)
@@ -56,7 +67,7 @@ def aperiodic(system: System, table: Table, state: Array, mode: int) -> SteadySt
         lines.append(spectrum(motion, max(known)))
     basic = known if tonal else (*known, *_own(lines, known[0], 1 / motion.duration))
     status = "quasi-periodic" if len(basic) > 1 else "not periodic"
-    return replace(found, status=status, exponent=exponent, lines=lines[-1], frequencies=basic)
+    return replace(answer, status=status, exponent=exponent, lines=lines[-1], frequencies=basic)
 
 
 def tonal(system: System, table: Table, start: Mapping[str, float | str], counts: tuple[int, int]) -> SteadyState:
@@ -234,8 +245,8 @@ def steady_state(
     if growing:
         none = np.full(table.physical, np.nan, dtype=np.complex128)
         return passed or SteadyState("unbounded", math.nan, 0, lap(system, table, state, mode, 1), none)
-    found = aperiodic(system, table, state, mode)
-    return passed if passed is not None and found.status == "not periodic" else found
+    motion = aperiodic(system, table, state, mode)
+    return passed if passed is not None and motion.status == "not periodic" else motion
 
 
 def attractors(

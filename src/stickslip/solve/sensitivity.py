@@ -156,8 +156,9 @@ class _Changes:
         self.reset[first] = (near.reset - table.reset) / step
         self.leap[first] = (near.leap - table.leap) / step
         for name, rows in self.rows.items():
-            rows[first] = [(replace(run, table=near.of(k)).rows(name) - run.rows(name))[:, 0] / step
-                           for k in range(len(near.flow))]  # fmt: skip
+            rows[first] = [
+                (replace(run, table=near.of(k)).rows(name) - run.rows(name))[:, 0] / step for k in range(len(near.flow))
+            ]
 
     @property
     def of_events(self) -> tuple[Array, ...]:

@@ -59,10 +59,10 @@ def settled_alike(tables: Tables, like: Tables) -> Tables:
     if not like.settling:
         return tables
     split = np.searchsorted(like.first, sorted(like.settling), side="right") - 1
-    each = [_neighbour(tables.of(k), split.tolist()) for k in range(len(tables.flow))]
-    own: Any = {name: np.array([getattr(one, name) for one in each]) for name in OWN}
-    outputs = {name: np.array([one.outputs[name] for one in each]) for name in tables.outputs}
-    return replace(each[0], **own, outputs=outputs, motions=tables.motions)
+    members = [_neighbour(tables.of(k), split.tolist()) for k in range(len(tables.flow))]
+    own: Any = {name: np.array([getattr(one, name) for one in members]) for name in OWN}
+    outputs = {name: np.array([one.outputs[name] for one in members]) for name in tables.outputs}
+    return replace(members[0], **own, outputs=outputs, motions=tables.motions)
 
 
 def _neighbour(table: Tables, split: list[int]) -> Tables:

@@ -361,8 +361,8 @@ def _chasing(table: Tables, mode: int, state: Array) -> list[str]:
         names.append(table.modes[mode].name)
         for e in range(table.first[mode], table.first[mode + 1]):
             ahead, noise = table.series[e] @ state, NOISE * (np.abs(table.series[e]) @ np.abs(state))
-            told = ahead[np.abs(ahead) > noise]
-            if not table.crossing[e] and len(told) and told[0] > 0:
+            apart = ahead[np.abs(ahead) > noise]
+            if not table.crossing[e] and len(apart) and apart[0] > 0:
                 mode, state = int(table.target[e]), table.reset[e] @ state
                 break
     return names[-LISTED:]

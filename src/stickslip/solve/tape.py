@@ -230,6 +230,8 @@ class _Builder:
         face = self.form(motion.face)
         self.face = [face, self.moved(face), self.moved(self.moved(face))]
         damper = self.moved(self.base) if whole.damper == "base" else ({}, 0.0)
+        own = self.form(motion.imposed)
+        self.imposed = [own, self.moved(own), self.moved(self.moved(own))] if motion.imposed else None
         share, n = np.asarray(whole.acts_on, dtype=np.float64), self.degrees
         stiffness, damping = (np.asarray(part, dtype=np.float64) for part in (whole.stiffness, whole.damping))
         self.push = [
@@ -333,6 +335,8 @@ class _Builder:
         ]  # fmt: skip
         rates = dict(enumerate(bound.speed(speeds)))
         rates |= {n + i: form for i, form in enumerate(bound.acceleration(force, [self.faced(c, 2) for c in held]))}
+        if self.imposed:  # whatever acts on it
+            rates[n] = self.imposed[2]
         for c, (part, contact) in enumerate(zip(parts, self.contacts, strict=True)):
             speeding = [(contact.tangent[i], rates[n + i]) for i in range(n)]
             known[c]["a"] = combined([*speeding, (-1.0, self.faced(c, 2))])
@@ -421,10 +425,11 @@ class _Builder:
         quantities = [
             [
                 one.moving.scaled(self.told(self.contacts[c], exit_.quantity, one.known[c]))
-                for i, c, exit_ in leaving if i == j
+                for i, c, exit_ in leaving
+                if i == j
             ]
             for j, one in enumerate(made)
-        ]  # fmt: skip
+        ]
         shown = [self.shown(one, own) for one, own in zip(made, parts, strict=True)]
         rate = tuple(np.array([[r[c] for r in one.entries] for one in made], dtype=d) for c, d in enumerate(DTYPES))
         exits = self.exits(joints, parts, leaving, quantities)
@@ -471,6 +476,8 @@ class _Builder:
         opening, n = np.zeros((self.one, self.size)), self.degrees
         faces = np.array([self.row(self.faced(c, 1)) for c in range(len(self.contacts))])
         opening[n : 2 * n] = np.linalg.pinv(np.array([contact.tangent for contact in self.contacts])) @ faces
+        if self.imposed:
+            opening[0], opening[1] = map(self.row, self.imposed[:2])
         for contact in self.contacts:
             for name, j in zip(contact.law.memory, contact.memory, strict=True):
                 opening[j] = self.row(self.remade(contact, name, contact.law.memory[name], contact.symbols))
@@ -514,16 +521,16 @@ class _Builder:
     def stilled(self, held: Mapping[int, float]) -> Array:
         """The state with the velocities of some contacts told, and no more of them left but for rounding."""
         one = self.row(({}, 1.0))
-        told = {
+        columns = {
             c: (self.contacts[c].tangent, (self.row(self.faced(c, 1)) + speed * one)[None]) for c, speed in held.items()
         }
-        return np.asarray(stilled(np.eye(self.size)[None], self.degrees, told)[0])
+        return np.asarray(stilled(np.eye(self.size)[None], self.degrees, columns)[0])
 
 
 def _alone(system: Oscillator) -> Structure:
     """The structure of one mass and one contact that an oscillator is."""
     contact = Contact(system.law, [1.0])  # type: ignore[arg-type]
-    return Structure(system.mass, system.damping, system.stiffness, [contact], system.drive, damper=system.damper)
+    return Structure(system.mass, system.damping, system.stiffness, [contact], damper=system.damper)
 
 
 def _kept(size: int, sums: Sums, exits: Exits, guards: Guards) -> tuple[tuple[int, ...], ...]:

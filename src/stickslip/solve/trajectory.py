@@ -172,10 +172,10 @@ class Trajectory:
     @cached_property
     def _changes(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         """Pieces that begin with an event, and a number for what happens there: by which exit, into which mode."""
-        told = self.exits[:-1] >= 0
+        changed = self.exits[:-1] >= 0
         if self.table.settling:
-            told &= ~np.isin(self.exits[:-1], list(self.table.settling))
-        begun = np.flatnonzero(told) + 1
+            changed &= ~np.isin(self.exits[:-1], list(self.table.settling))
+        begun = np.flatnonzero(changed) + 1
         return begun, self.exits[begun - 1].astype(np.int64) * len(self.table.modes) + self.modes[begun]
 
     def _words(self, code: int) -> list[tuple[str, str, int, int]]:

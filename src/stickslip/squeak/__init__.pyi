@@ -8,6 +8,8 @@ from stickslip.squeak.couplings import Pair as Pair
 from stickslip.squeak.couplings import coupling as coupling
 from stickslip.squeak.cycles import LimitCycle as LimitCycle
 from stickslip.squeak.cycles import limit_cycle as limit_cycle
+from stickslip.squeak.hunting import Hunting as Hunting
+from stickslip.squeak.hunting import servo_hunting as servo_hunting
 from stickslip.squeak.quality import Impulsiveness as Impulsiveness
 from stickslip.squeak.quality import SoundQuality as SoundQuality
 from stickslip.squeak.quality import impulsiveness as impulsiveness

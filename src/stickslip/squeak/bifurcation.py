@@ -152,8 +152,8 @@ def limit_cycles(
         raise ModelError(f"values = {values!r}", f"they are at least {LEAST} numbers that rise", step)
 
     def at(value: float) -> System:
-        found = parameter(value) if callable(parameter) else system.having(**{parameter: value})
-        return found if speed is None else found.having(drive=Belt(speed))
+        changed = parameter(value) if callable(parameter) else system.having(**{parameter: value})
+        return changed if speed is None else changed.having(drive=Belt(speed))
 
     up = _along(at, places, SMALL)
     down = _along(at, places[::-1], SMALL if any(one.vibrates for one in up) else LARGE)[::-1]
@@ -164,11 +164,11 @@ def limit_cycles(
     try:
         threshold = critical_value(at(ends[0]), at, between=ends)
     except ModelError:
-        words = f"steady sliding is {'' if up[0].sliding.stable else 'un'}stable at every value"
+        status = f"steady sliding is {'' if up[0].sliding.stable else 'un'}stable at every value"
         if beside:
-            words += f"; a vibration lasts beside it from {beside[0]:.4g} to {beside[-1]:.4g}"
+            status += f"; a vibration lasts beside it from {beside[0]:.4g} to {beside[-1]:.4g}"
         both = (beside[0], beside[-1]) if beside else None
-        return CycleBranches(places, up, down, None, UNTOLD, math.nan, both, words, between)
+        return CycleBranches(places, up, down, None, UNTOLD, math.nan, both, status, between)
     return CycleBranches(places, up, down, threshold, *_called(at, threshold, beside, width), between)
 
 
@@ -179,10 +179,10 @@ def _lasts_beside(cycle: LimitCycle) -> bool:
 
 def _along(at: Callable[[float], System], values: Array, push: float) -> tuple[LimitCycle, ...]:
     """The motions at values in turn, each from the one before where that vibrates."""
-    found: list[LimitCycle] = []
+    cycles: list[LimitCycle] = []
     for value in values:
-        found.append(_from(at(float(value)), found[-1] if found else None, push))
-    return tuple(found)
+        cycles.append(_from(at(float(value)), cycles[-1] if cycles else None, push))
+    return tuple(cycles)
 
 
 def _from(system: System, before: LimitCycle | None, push: float) -> LimitCycle:
@@ -211,11 +211,11 @@ def _called(
     begins = _begins(exponent, beyond[0])
     both = sorted([*beside, *(value for value, one in zip(before, back, strict=True) if _lasts_beside(one))])
     if both:
-        words = f"{begins}; a vibration lasts beside stable sliding from {both[0]:.4g} to {both[-1]:.4g}"
-        return "subcritical", exponent, (both[0], both[-1]), words
+        status = f"{begins}; a vibration lasts beside stable sliding from {both[0]:.4g} to {both[-1]:.4g}"
+        return "subcritical", exponent, (both[0], both[-1]), status
     if back[0].status == "steady sliding" and all(one.vibrates for one in beyond):
-        words = f"{begins}; on the way back it has died away {abs(before[0] - threshold.value):.2g} past the threshold"
-        return "supercritical", exponent, None, words
+        status = f"{begins}; on the way back it has died away {abs(before[0] - threshold.value):.2g} past the threshold"
+        return "supercritical", exponent, None, status
     return UNTOLD, exponent, None, f"{beyond[0].status} beyond the threshold, {back[0].status} before it"
 
 
@@ -378,18 +378,18 @@ def stability_map(
     shape = tuple(len(values) for values in axes.values())
     if callable(system):
         _require_taken(system, axes)
-    found = np.empty(shape, dtype=object)
+    answers = np.empty(shape, dtype=object)
     for place in np.ndindex(*shape):
         values = {name: float(axes[name][i]) for name, i in zip(axes, place, strict=True)}
-        found[place] = stability(system(**values) if callable(system) else system.having(**values), speed=speed)
+        answers[place] = stability(system(**values) if callable(system) else system.having(**values), speed=speed)
 
-    def told(what: Callable[[Stability], Any], kind: Any) -> tuple[list[str], NDArray[Any]]:
-        return list(axes), np.array([what(one) for one in found.ravel()], dtype=kind).reshape(shape)
+    def mapped(what: Callable[[Stability], Any], kind: Any) -> tuple[list[str], NDArray[Any]]:
+        return list(axes), np.array([what(one) for one in answers.ravel()], dtype=kind).reshape(shape)
 
     data = {
-        "growth": told(lambda one: one.growth, float),
-        "frequency": told(lambda one: one.frequency, float),
-        "mechanism": told(lambda one: one.mechanism, str),
+        "growth": mapped(lambda one: one.growth, float),
+        "frequency": mapped(lambda one: one.frequency, float),
+        "mechanism": mapped(lambda one: one.mechanism, str),
     }
     return xarray.Dataset(data, coords=axes)
 
@@ -410,12 +410,12 @@ def _require_taken(system: Callable[..., System], axes: Mapping[str, Array]) -> 
 def numbers(name: str, values: ArrayLike) -> Array:
     """Values of a parameter; refused where they are no numbers."""
     try:
-        found = np.asarray(values, dtype=np.float64)
+        array = np.asarray(values, dtype=np.float64)
     except (TypeError, ValueError):
-        found = np.array([math.nan])
-    if not np.all(np.isfinite(found)):
+        array = np.array([math.nan])
+    if not np.all(np.isfinite(array)):
         raise ModelError(f"{name} = {values!r}", "the values of a parameter are finite numbers", "correct them")
-    return found
+    return array
 
 
 def _marginal_frequency(matrices: Matrices) -> float:

@@ -116,7 +116,7 @@ def find_squeaks(
     motion = ForcedMotion.of(record)
     unit = record.channels[name].unit
     listener = _Listener(record, name, hearing, motion, clipped_rows(record, name))
-    bursts = _of_one_contact(sorted((listener.burst(part) for part in hearing.spans), key=lambda each: each.start))
+    bursts = _of_one_contact(sorted((listener.burst(part) for part in hearing.spans), key=lambda burst: burst.start))
     cautions = tuple(listener.cautions(unit))
     notes = (*cautions, *listener.notes(unit))
     heard = (
@@ -139,7 +139,7 @@ class ForcedMotion:
     def of(cls, record: Record) -> ForcedMotion:
         from scipy.signal import butter, hilbert, sosfiltfilt
 
-        name = next((each for each in ("x", "v") if each in record and np.ptp(record[each]) > 0), None)
+        name = next((channel for channel in ("x", "v") if channel in record and np.ptp(record[channel]) > 0), None)
         if name is None or not np.all(np.isfinite(record[name])):
             return cls()
         values = record[name] - record[name].mean()
@@ -290,36 +290,36 @@ class _Listener:
     def _swinging(self, part: Span, kind: str) -> tuple[str, str, str]:
         """Of a tone while the contact slides: whether the friction force swings with it as it must to feed it."""
         share = self._modulation(part)
-        words = f"the friction force swings by {100 * share:.0f} % of its level at {part.line:.0f} Hz as it slides"
+        evidence = f"the friction force swings by {100 * share:.0f} % of its level at {part.line:.0f} Hz as it slides"
         if share >= FED:
-            return kind, "shown", words
+            return kind, "shown", evidence
         if share <= FREE:
-            return "tonal", "no", f"{words}: too little to feed it"
+            return "tonal", "no", f"{evidence}: too little to feed it"
         between = f"more than beneath a free ringing, {FREE:.0%}, and less than beneath a squeak, {FED:.0%}"
-        return "tonal", "not told", f"{words}: {between}; near the threshold it can not be told"
+        return "tonal", "not told", f"{evidence}: {between}; near the threshold it can not be told"
 
     def _broad(self, part: Span, *, slides: bool) -> tuple[str, str, str]:
         rate = part.rate
         if not math.isnan(rate) and self.name in TANGENTIAL and self._at_reversals(rate):
             return "noise", "no", f"its {rate:.3g} jumps in a second are the reversals of the motion"
         if not math.isnan(rate) and (slides or (rate < VOICED and part.wander > WANDERS)):
-            words = (
+            evidence = (
                 f"pulses follow each other at intervals that change slowly, {rate:.3g} in a second, as in stick-slip"
             )
-            return "creak", "shown" if slides else "likely", words
+            return "creak", "shown" if slides else "likely", evidence
         if slides:
             return "scrape", "shown", "broad band while the contact slides"
         if self.hearing.partials(part) > PARTIALS:
             return "tonal", "not told", "several partials that do not glide, as those of a bell"
         if not math.isnan(rate):
-            words = f"of sound alone: {rate:.3g} pulses in a second"
+            evidence = f"of sound alone: {rate:.3g} pulses in a second"
             if rate >= VOICED:
-                return "scrape", "not told", f"{words}, as a voice has from {VOICED:g} on"
-            return "scrape", "not told", f"{words} keep their rate, as those of a machine or a clock do"
+                return "scrape", "not told", f"{evidence}, as a voice has from {VOICED:g} on"
+            return "scrape", "not told", f"{evidence} keep their rate, as those of a machine or a clock do"
         if part.throughout:
             return "noise", "not told", "broad band from end to end: what makes it can not be told"
-        words = "broad band, and it begins and ends; of sound alone it can not be told whether anything rubs"
-        return "scrape", "not told", words
+        evidence = "broad band, and it begins and ends; of sound alone it can not be told whether anything rubs"
+        return "scrape", "not told", evidence
 
     def _at_reversals(self, rate: float) -> bool:
         """Whether pulses come once or twice in a forcing cycle, as the jumps of dry friction do."""
@@ -344,28 +344,28 @@ class _Listener:
 
     def _status(self, part: Span, spoilt: bool) -> str:
         ends = self._cut(part)
-        told = [f"cut by the {' and '.join(ends)} of the record: it may last longer"] if ends else []
-        told += ["clipped: its level and harmonics can not be told"] if spoilt else []
-        return Status(*told)
+        doubts = [f"cut by the {' and '.join(ends)} of the record: it may last longer"] if ends else []
+        doubts += ["clipped: its level and harmonics can not be told"] if spoilt else []
+        return Status(*doubts)
 
     def cautions(self, unit: str) -> list[str]:
         """What every level and every burst rests on."""
-        told = []
+        cautions = []
         if unit == "1":
-            told.append(
+            cautions.append(
                 f"Channel {self.name} is not calibrated: its levels are relative to 1, and no sound pressure level is "
                 f'told; state its sensitivity when reading, as in channels={{"sound": "{self.name} * 2.5 [Pa]"}}.'
             )
-        return [*told, *self._unheard(unit)]
+        return [*cautions, *self._unheard(unit)]
 
     def notes(self, unit: str) -> list[str]:
         """What could not be told, beside the cautions."""
-        told = []
+        notes = []
         if unit not in ("1", *REFERENCES):
-            told.append(f"Levels of channel {self.name} are re 1 {unit}: it is neither a sound nor a vibration.")
+            notes.append(f"Levels of channel {self.name} are re 1 {unit}: it is neither a sound nor a vibration.")
         if self.motion.velocity is None:
-            told.append("No forced motion is recorded beside it: phase and sliding speed can not be told.")
-        return told
+            notes.append("No forced motion is recorded beside it: phase and sliding speed can not be told.")
+        return notes
 
     def _unheard(self, unit: str) -> list[str]:
         """Which channels of a stereo file were not listened to; nothing where another than the first was chosen."""
@@ -390,9 +390,9 @@ def _of_one_contact(bursts: list[Squeak]) -> list[Squeak]:
     why = _unlike_a_contact(bursts, alone) if alone else ""
     if not why:
         return bursts
-    words = f"of sound alone: {why}"
+    evidence = f"of sound alone: {why}"
     return [
-        replace(burst, kind="tonal", friction="not told", evidence=words) if burst in alone else burst
+        replace(burst, kind="tonal", friction="not told", evidence=evidence) if burst in alone else burst
         for burst in bursts
     ]
 
@@ -404,7 +404,7 @@ def _unlike_a_contact(bursts: list[Squeak], claimed: list[Squeak]) -> str:
     intervals, and what goes on may be a drive, a whistle or a kettle.
     """
     clear = [burst for burst in bursts if burst.kind != "noise" and burst.tonality > CLEAR]
-    tones = [each for each in clear if each in claimed or each.duration * each.frequency > LASTS]
+    tones = [burst for burst in clear if burst in claimed or burst.duration * burst.frequency > LASTS]
     if not tones:
         return f"less than {CLEAR:.0%} of its power is in its tones"
     pitch = float(np.median([tone.frequency for tone in tones]))

@@ -128,15 +128,15 @@ class Coupling(Result):
     @property
     def estimates(self) -> tuple[Estimate, ...]:
         """The energies that are known."""
-        return tuple(each for each in (getattr(self, name) for name in ENERGIES) if each is not None)
+        return tuple(energy for energy in (getattr(self, name) for name in ENERGIES) if energy is not None)
 
     def of(self, first: str, second: str) -> Pair:
         """The pair of two channels, in this order."""
-        found = next((pair for pair in self.pairs if (pair.first, pair.second) == (first, second)), None)
-        if found is None:
+        match = next((pair for pair in self.pairs if (pair.first, pair.second) == (first, second)), None)
+        if match is None:
             known = ", ".join(f"{pair.first} and {pair.second}" for pair in self.pairs)
             raise EstimateError(f"no pair of {first} and {second}", f"there are {known}", "choose one of them")
-        return found
+        return match
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON."""
@@ -266,13 +266,13 @@ def _pair(
         beyond = _coherence(outside[one], outside[other])[0]
         added = _added(one, other, (coherence, count), (beyond, len(outside[one])))
     tied = {one, other} == {"a", "friction"} and (computed or (opposed and coherence > chance))
-    told = None if opposed and coherence > chance else delay
-    return Pair(one, other, coherence, beyond, chance, added, phase, told, tied)
+    lag = None if opposed and coherence > chance else delay
+    return Pair(one, other, coherence, beyond, chance, added, phase, lag, tied)
 
 
 def _added(one: str, other: str, inside: tuple[float, int], outside: tuple[float, int]) -> Estimate:
     """The difference of two coherences, each with its count of segments."""
-    (low, high), (least, most) = (_coherence_interval(*each) for each in (inside, outside))
+    (low, high), (least, most) = (_coherence_interval(*side) for side in (inside, outside))
     value = inside[0] - outside[0]
     ends = (
         value - math.hypot(inside[0] - low, most - outside[0]),
@@ -311,23 +311,23 @@ class _Work:
 
     def energies(self, lever: float | None) -> dict[str, Estimate | None]:
         record = self.record
-        told: dict[str, Estimate | None] = dict.fromkeys(ENERGIES)
+        energies: dict[str, Estimate | None] = dict.fromkeys(ENERGIES)
         if "friction" in record and "v" in record:
             friction, velocity = self.tone("friction"), self.tone("v")
-            told["energy_per_cycle"] = self.mean(
+            energies["energy_per_cycle"] = self.mean(
                 -friction * velocity, "energy that friction gives the vibration in a cycle"
             )
             taken = record["friction"] * record["v"]
-            told["dissipated_per_cycle"] = self.mean(taken, "energy that friction takes from the motion in a cycle")
+            energies["dissipated_per_cycle"] = self.mean(taken, "energy that friction takes from the motion in a cycle")
         if "friction" in record and "torsion_velocity" in record and lever is not None:
             work = -lever * self.tone("friction") * self.tone("torsion_velocity")
-            told["energy_to_torsion"] = self.mean(work, "energy that friction gives the torsion in a cycle")
+            energies["energy_to_torsion"] = self.mean(work, "energy that friction gives the torsion in a cycle")
         if "normal" in record and "normal_acceleration" in record:
             work = -self.tone("normal") * self.integrated("normal_acceleration")
-            told["energy_to_normal"] = self.mean(
+            energies["energy_to_normal"] = self.mean(
                 work, "energy that the normal force gives the normal motion in a cycle"
             )
-        return told
+        return energies
 
     @property
     def band(self) -> tuple[float, float]:
@@ -354,7 +354,7 @@ def _mean(name: str, values: list[float]) -> Estimate:
     count = len(values)
     status = Status(*([Doubt.few(count, "burst")] if count <= 2 else []))
     sd = float(np.std(values, ddof=1) / math.sqrt(count)) if count > 1 else math.inf
-    found = Estimate.normal(
+    mean = Estimate.normal(
         name,
         float(np.mean(values)),
         sd=sd,
@@ -363,5 +363,5 @@ def _mean(name: str, values: list[float]) -> Estimate:
         quantile=student(max(1, count - 1)),
         status=status,
     )
-    unsure = count > 2 and found.includes(0.0)
-    return replace(found, status=UNSURE) if unsure else found
+    unsure = count > 2 and mean.includes(0.0)
+    return replace(mean, status=UNSURE) if unsure else mean

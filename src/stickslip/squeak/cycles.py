@@ -86,7 +86,9 @@ class LimitCycle:
             return f"LimitCycle: {self.status}"
         named = {"sticks": self.stick_share, "lifted": self.separation_share}
         shares = [
-            f"{name} {', '.join(f'{one:.3g}' for one in each)} of the time" for name, each in named.items() if any(each)
+            f"{name} {', '.join(f'{one:.3g}' for one in parts)} of the time"
+            for name, parts in named.items()
+            if any(parts)
         ]
         head = f"LimitCycle: {self.status}, {self.frequency:.5g} Hz, contacts slide {self.amplitude:.4g} m to and fro"
         return "\n  ".join([head, *shares])
@@ -154,7 +156,7 @@ def limit_cycle(
     table = tables(system)
     cycle = 1 / (sliding.frequency or system.frequency)
     begin = _pushed(system, table, sliding, push) if start is None else opening(table, start)
-    return _told(system, sliding, *_followed(system, table, sliding, begin, cycle, patience))
+    return _cycle_of(system, sliding, *_followed(system, table, sliding, begin, cycle, patience))
 
 
 def separating_cycle(system: System, lasting: LimitCycle) -> LimitCycle | None:
@@ -180,13 +182,13 @@ def separating_cycle(system: System, lasting: LimitCycle) -> LimitCycle | None:
         dies, lasts = (dies, middle) if vibrates else (middle, lasts)
     for share, cycles in itertools.product((lasts, dies), NEAR):
         near = stretch(system, table, *opening(table, start(share)), span=(0.0, cycles * cycle))
-        found = settled_cycle(near, cycle)
-        if found is not None and abs(found[1][0]) > 1:
-            return _told(system, sliding, "unstable", *found)
+        settled = settled_cycle(near, cycle)
+        if settled is not None and abs(settled[1][0]) > 1:
+            return _cycle_of(system, sliding, "unstable", *settled)
     return None
 
 
-def _told(
+def _cycle_of(
     system: System, sliding: Stability, status: str, motion: Trajectory, multipliers: NDArray[np.complex128]
 ) -> LimitCycle:
     """What there is to say of a motion."""
@@ -219,15 +221,19 @@ def _followed(
         end, after = motion.end()
         part = count / 4
         first, last = (_size(motion, sliding, begin * cycle, part, cycle) for begin in (0.0, count - part))
-        if _held(motion):
+        if _sticks(motion):
             return "held", motion, none
         opened = opened or first
         if sliding.stable and last < DYING * min(opened, 1.0):
             return "steady sliding", motion, none
         if last > LEAST:
-            found = settled_cycle(motion, cycle)
-            if found is not None and abs(found[1][0]) < 1 and _size(found[0], sliding, 0.0, 1.0, cycle) > LEAST:
-                return "periodic", *found
+            repeating = settled_cycle(motion, cycle)
+            if (
+                repeating is not None
+                and abs(repeating[1][0]) < 1
+                and _size(repeating[0], sliding, 0.0, 1.0, cycle) > LEAST
+            ):
+                return "periodic", *repeating
         done += count
         if done >= patience:
             settled = abs(last / first - 1) < UNSETTLED and sliding.growth != 0
@@ -236,7 +242,7 @@ def _followed(
         state[:physical], mode, count = end[:physical], after, min(done, patience - done)
 
 
-def _held(motion: Trajectory) -> bool:
+def _sticks(motion: Trajectory) -> bool:
     """Whether the last piece is a rest on the counter-face that lasts."""
     mode = motion.table.modes[motion.modes[-1]]
     return mode.friction is None and bool(motion.durations[-1] > 0.5 * motion.duration)
@@ -346,5 +352,5 @@ def _shares(motion: Trajectory) -> tuple[tuple[float, ...], tuple[float, ...]]:
     """Share of the time that each contact holds, and is lifted off."""
     kinds = np.array([[part.kind for part in _parts(mode)] for mode in motion.table.modes])[motion.modes]
     weights = motion.durations / motion.duration
-    held = weights @ ((kinds == "stick") | (kinds == "microstick"))
-    return tuple(map(float, held)), tuple(map(float, weights @ (kinds == "flight")))
+    stuck = weights @ ((kinds == "stick") | (kinds == "microstick"))
+    return tuple(map(float, stuck)), tuple(map(float, weights @ (kinds == "flight")))

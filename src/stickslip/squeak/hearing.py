@@ -144,7 +144,7 @@ class Hearing:
     def _stands(self, part: Span, broad: list[Span]) -> bool:
         """Whether a tone is a burst by itself: it lasts, or no broad burst holds it."""
         lasts = (part.last - part.first) * part.line > LASTS * self.fs
-        return lasts or not any(each.first <= (part.first + part.last) / 2 < each.last for each in broad)
+        return lasts or not any(noise.first <= (part.first + part.last) / 2 < noise.last for noise in broad)
 
     def tones(self, part: Span) -> tuple[float, tuple[tuple[float, float], ...], float]:
         """Dominant frequency [Hz], the harmonics that stand out, and the share of the power in both."""
@@ -156,16 +156,16 @@ class Hearing:
         frequency = _centre(power, step, 0.9 * line, 1.1 * line)
         wide = max(4 * self.fs / len(values), 0.02 * frequency)
         lobe = power[_bins(step, frequency, wide, len(power))]
-        strength, own, found, inside = lobe.max(), lobe.sum(), [], 0.0
+        strength, own, overtones, inside = lobe.max(), lobe.sum(), [], 0.0
         for order in range(2, HARMONICS + 1):
             if order * frequency + wide > self.band[1]:
                 break
             place = _bins(step, order * frequency, order * wide, len(power))
             beside = _bins(step, order * frequency, 8 * order * wide, len(power))
             if _decibel(power[place].max()) - _decibel(np.median(power[beside])) > STANDS_OUT:
-                found.append((order * frequency, float(_decibel(power[place].max()) - _decibel(strength))))
+                overtones.append((order * frequency, float(_decibel(power[place].max()) - _decibel(strength))))
                 inside += power[place].sum()
-        return frequency, tuple(found), float(min(1.0, (own + inside) / max(power.sum(), np.finfo(float).tiny)))
+        return frequency, tuple(overtones), float(min(1.0, (own + inside) / max(power.sum(), np.finfo(float).tiny)))
 
     def glide(self, part: Span) -> float:
         """Range of the pitch over its median: of nine tenths of the burst's power, in stretches of many cycles."""
@@ -242,7 +242,7 @@ class Hearing:
         from scipy.signal import find_peaks
 
         line, strength, tonal = self.lines
-        found = []
+        spans = []
         for first, last in self._one_pitch(line, tonal):
             stretch = median_filter(strength[first : last + 1], STEADY, mode="nearest")
             unlike = stretch + LEANS * np.arange(
@@ -260,8 +260,8 @@ class Hearing:
                 sounding = tonal[part]
                 if sounding.any():
                     middle = _fundamental(line[part][sounding], strength[part][sounding])
-                    found.append(self._tonal(part.start, part.stop, middle, swells=len(peaks) > 1))
-        return [part for part in found if (part.last - part.first) * part.line > SHORTEST * self.fs]
+                    spans.append(self._tonal(part.start, part.stop, middle, swells=len(peaks) > 1))
+        return [part for part in spans if (part.last - part.first) * part.line > SHORTEST * self.fs]
 
     def _one_pitch(self, line: Array, tonal: Flags) -> list[tuple[int, int]]:
         """Runs of frames of one tone: it may glide, leap to a multiple, or be drowned for a moment."""
@@ -434,13 +434,13 @@ def _runs(flags: Flags) -> list[tuple[int, int]]:
 
 
 def _joined(runs: list[tuple[int, int]], gap: int) -> list[tuple[int, int]]:
-    found: list[tuple[int, int]] = []
+    joined: list[tuple[int, int]] = []
     for first, last in runs:
-        if found and first - found[-1][1] <= gap:
-            found[-1] = (found[-1][0], last)
+        if joined and first - joined[-1][1] <= gap:
+            joined[-1] = (joined[-1][0], last)
         else:
-            found.append((first, last))
-    return found
+            joined.append((first, last))
+    return joined
 
 
 def _bins(step: float, centre: float, reach: float, count: int) -> slice:

@@ -62,8 +62,8 @@ class SoundQuality:
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON, without the curve over time."""
-        told = ("loudness", "loudest", "sharpness", "roughness", "duration", "method")
-        return dict(plain({name: getattr(self, name) for name in told}))
+        names = ("loudness", "loudest", "sharpness", "roughness", "duration", "method")
+        return dict(plain({name: getattr(self, name) for name in names}))
 
 
 @dataclass(frozen=True, eq=False)

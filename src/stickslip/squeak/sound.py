@@ -116,8 +116,8 @@ def sound_pressure(
             "give a larger distance= or a smaller area=, or ask for a disk in a wall: baffled=True",
         )
     paths = _disk(area, distance) if baffled else [(AIR * area / (4 * math.pi * distance), distance / SPEED_OF_SOUND)]
-    lag, told = paths[0][1], {"area": area, "distance": distance, "baffled": baffled}
-    step = Step("sound_pressure", told, f"{lag * 1e3:.3g} ms later")
+    lag, arguments = paths[0][1], {"area": area, "distance": distance, "baffled": baffled}
+    step = Step("sound_pressure", arguments, f"{lag * 1e3:.3g} ms later")
     if isinstance(run, Record):
         name = normal if isinstance(normal, str) else "normal_acceleration" if "normal_acceleration" in run else "a"
         run.require_clean(name, question="the sound of a surface")

@@ -205,9 +205,9 @@ def _longest(record: Record, squeaks: Squeaks) -> tuple[int, Stretches]:
     sizes = [longest >> halved for halved in range(10) if longest >> halved >= SHORTEST]
     tried = [(size, stretches(record, squeaks=squeaks, size=size)) for size in sizes]
     for enough, beyond in ((ENOUGH, ENOUGH), (ENOUGH, FEWEST), (ENOUGH, 0), (FEWEST, 0)):
-        for size, found in tried:
-            if len(found.inside) >= enough and len(found.outside) >= beyond:
-                return size, found
+        for size, pieces in tried:
+            if len(pieces.inside) >= enough and len(pieces.outside) >= beyond:
+                return size, pieces
     raise EstimateError(
         f"bursts of {max(burst.duration for burst in squeaks.bursts) * record.fs:.0f} samples at most",
         f"spectra are averaged over {FEWEST} segments of {SHORTEST} samples at least",

@@ -183,9 +183,9 @@ class Squeaks(Result):
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON."""
-        told = ("channel", "kind", "squeaking", "reference", "forcing", "threshold", "bursts", "notes")
+        names = ("channel", "kind", "squeaking", "reference", "forcing", "threshold", "bursts", "notes")
         history = [str(step) for step in self.record.history]
-        return {**plain({name: getattr(self, name) for name in told}), "history": history}
+        return {**plain({name: getattr(self, name) for name in names}), "history": history}
 
     def __repr__(self) -> str:
         rows = [

@@ -204,15 +204,15 @@ def modes_of(matrices: Matrices) -> tuple[SlidingMode, ...]:
     """One for each pair of eigenvalues and each real one, those that grow fastest first."""
     values, vectors = np.linalg.eig(_flow(matrices))
     largest, count = float(np.max(np.abs(values))), len(matrices[0])
-    found = []
+    modes = []
     for value, vector in zip(values, vectors.T, strict=True):
         if value.imag < -ROUNDING * largest:
             continue
         shape = vector[:count] / vector[np.argmax(np.abs(vector[:count]))]
         growth = float(value.real) if abs(value.real) > ROUNDING * largest else 0.0
         frequency = float(value.imag) if value.imag > ROUNDING * largest else 0.0
-        found.append(SlidingMode(frequency / (2 * math.pi), growth, shape))
-    return tuple(sorted(found, key=lambda mode: (-mode.growth, mode.frequency)))
+        modes.append(SlidingMode(frequency / (2 * math.pi), growth, shape))
+    return tuple(sorted(modes, key=lambda mode: (-mode.growth, mode.frequency)))
 
 
 def _mechanism(
@@ -243,8 +243,10 @@ def _rest(stiffness: Array, rubbing: Sequence[Rubbing]) -> tuple[tuple[float, ..
             unpressed = tuple(r.preload for r in rubbing)
             return (math.nan,) * len(place), unpressed, "no spring holds it: the loads are those before it slides"
         pairs = zip(rubbing, loads, strict=True)
-        left = stiffness @ place + sum(((load - r.preload) * r.normal + r.at(load) * r.tangent for r, load in pairs), 0)
-        step = np.linalg.solve(steep, left)
+        residual = stiffness @ place + sum(
+            ((load - r.preload) * r.normal + r.at(load) * r.tangent for r, load in pairs), 0
+        )
+        step = np.linalg.solve(steep, residual)
         place = place - step
         if np.linalg.norm(step) <= np.finfo(float).eps * np.linalg.norm(place):
             break

@@ -1,6 +1,6 @@
+from stickslip.story.findings import check_table as check_table
+from stickslip.story.findings import write_table as write_table
 from stickslip.story.folder import check_folder as check_folder
-from stickslip.story.many import check_table as check_table
-from stickslip.story.many import write_table as write_table
 from stickslip.story.simulation import Outcome as Outcome
 from stickslip.story.simulation import outcome as outcome
 from stickslip.story.simulation import require_output as require_output

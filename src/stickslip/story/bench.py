@@ -65,21 +65,24 @@ def of_plan(plan: ExperimentPlan, *, needs: Sequence[tuple[str, str]] = ()) -> S
     ]
     errors = f"Root-mean-square errors of {plan.draws} record{'s' * (plan.draws > 1)} at each rate."
     return Story(
-        "Plan of an experiment", ["; ".join(_enough(plan, *need) for need in needs)] * bool(needs), notes=plan.refusals,
+        "Plan of an experiment",
+        ["; ".join(_enough(plan, *need) for need in needs)] * bool(needs),
+        notes=plan.refusals,
         tables=[Table("What each setup tells", ("fs [Hz]", "sensors", *plan.questions), rows, errors)],
-        draw=lambda: [plate("plan", partial(plot_plan, plan), "What each setup tells", CAPTION)], data=plan.to_dict,
-    )  # fmt: skip
+        draw=lambda: [plate("plan", partial(plot_plan, plan), "What each setup tells", CAPTION)],
+        data=plan.to_dict,
+    )
 
 
 def _enough(plan: ExperimentPlan, question: str, error: str) -> str:
     setup = plan.enough(question, error)
-    found = f"{', '.join(setup.sensors)} at {setup.fs:g} Hz" if setup else "none of these"
-    return f"{question} within {error}: {found}"
+    choice = f"{', '.join(setup.sensors)} at {setup.fs:g} Hz" if setup else "none of these"
+    return f"{question} within {error}: {choice}"
 
 
 def of_commissioned(done: Commissioned) -> Story:
     """The constants first; a table of the steps, and one of every number."""
-    known, found = done.known, done.results
+    known, results = done.known, done.results
     constants = known.constants
     own = [*(constants.estimates if constants else ()), *([known.damping] if known.damping else [])]
     lines = [Line.of(estimate, done.true_value(estimate.name)) for estimate in own]
@@ -87,7 +90,7 @@ def of_commissioned(done: Commissioned) -> Story:
     cautions = [Caution(f"{_title(name)} {why}") for name, why in done.refused.items()]
     cautions += [
         Caution(f"{_title(name)} {status}.")
-        for name, result in found.items()
+        for name, result in results.items()
         if not stands(status := str(getattr(result, "status", "ok")))
     ]
 
@@ -103,13 +106,13 @@ def of_commissioned(done: Commissioned) -> Story:
 def _headline(done: Commissioned) -> str:
     known = done.known
     constants = known.constants
-    asked = f"{len(done.results)} step{'s' * (len(done.results) != 1)} answered"
+    answered = f"{len(done.results)} step{'s' * (len(done.results) != 1)} answered"
     refused = f", {len(done.refused)} refused" if done.refused else ""
     if constants is None:
-        return f"{asked}{refused}."
+        return f"{answered}{refused}."
     mass, spring = constants.estimates
     damper = f" and a damper of {value_of(known.damping)}" if known.damping else ""
-    return f"The rig is a mass of {value_of(mass)} on a spring of {value_of(spring)}{damper}: {asked}{refused}."
+    return f"The rig is a mass of {value_of(mass)} on a spring of {value_of(spring)}{damper}: {answered}{refused}."
 
 
 def _leading(done: Commissioned) -> Iterator[tuple[str, Estimate]]:
@@ -190,15 +193,15 @@ def _plates(done: Commissioned) -> list[Plate]:
 def of_tour(tour: Tour) -> Story:
     """One page, as a lab would hand it in."""
     driven = [
-        replace(of_findings(each), title=f"The base at {run.frequency:g} Hz")
-        for each, run in zip(tour.comparison.findings, tour.runs, strict=True)
+        replace(of_findings(finding), title=f"The base at {run.frequency:g} Hz")
+        for finding, run in zip(tour.comparison.findings, tour.runs, strict=True)
     ]
     parts = [
         replace(of_commissioned(tour.commissioned), title="The rig"),
         *driven,
         replace(of_findings(tour.decay), title="A free decay over the contact"),
         replace(of_laws(tour.laws), title="Which law is it?"),
-        *(replace(of_findings(each), title=each.name.capitalize()) for each in tour.squeaks.findings),
+        *(replace(of_findings(finding), title=finding.name.capitalize()) for finding in tour.squeaks.findings),
     ]
 
     def write(folder: Path) -> None:
@@ -219,18 +222,18 @@ def _abstract(tour: Tour) -> list[str]:
     contact = _of(tour.laws.estimates, "contact stiffness")
     level = _of(tour.laws.estimates, "sliding friction")
     first = tour.laws.verdict.partition(":")[0].partition(". ")[0].rstrip(".")
-    told = [
+    sentences = [
         f"{first}"
         + (f": it slides at {value_of(level)}" if level else "")
         + (f", and before it slides gives way like a spring of {value_of(contact)}." if contact else "."),
         f"The rig, commissioned from nothing, is a mass of {value_of(constants.mass)} on a spring of "
         f"{value_of(constants.stiffness)} with a damping ratio of {_ratio(tour)}.",
-        _held(tour),
+        _stuck_runs(tour),
         *_squeaked(tour),
     ]
     if tour.proposals:
-        told.append(_advice(tour.proposals[0]))
-    return told
+        sentences.append(_advice(tour.proposals[0]))
+    return sentences
 
 
 def _of(estimates: tuple[Estimate, ...], name: str) -> Estimate | None:
@@ -243,12 +246,12 @@ def _ratio(tour: Tour) -> str:
     return value_of(ratio) if ratio is not None else "unknown size"
 
 
-def _held(tour: Tour) -> str:
+def _stuck_runs(tour: Tour) -> str:
     """Which runs stuck."""
     stuck = [
         f"{run.frequency:g} Hz ({value_of(share)} of the time)"
-        for each, run in zip(tour.comparison.findings, tour.runs, strict=True)
-        if (share := _share(each)) is not None and share.interval[0] > 0
+        for finding, run in zip(tour.comparison.findings, tour.runs, strict=True)
+        if (share := _share(finding)) is not None and share.interval[0] > 0
     ]
     free = len(tour.runs) - len(stuck)
     if not stuck:
@@ -280,14 +283,14 @@ def _lines(tour: Tour) -> list[Line]:
     if done.known.damping is not None:
         lines.append(Line.of(done.known.damping, truth.get("damping of the suspension")))
     for name, key in (("sliding friction", "kinetic friction"), ("contact stiffness", "contact stiffness")):
-        each = _of(tour.laws.estimates, name)
-        if each is not None:
-            lines.append(Line.of(each, truth.get(key), name=f"{name}, by the law"))
+        estimate = _of(tour.laws.estimates, name)
+        if estimate is not None:
+            lines.append(Line.of(estimate, truth.get(key), name=f"{name}, by the law"))
     stick = done.results.get("stick")
     for name in ("contact stiffness", "coupled frequency"):
-        each = _of(stick.estimates, name) if stick is not None else None
-        if each is not None:
-            lines.append(Line.of(each, truth.get(name), name=f"{name}, by ringing"))
+        estimate = _of(stick.estimates, name) if stick is not None else None
+        if estimate is not None:
+            lines.append(Line.of(estimate, truth.get(name), name=f"{name}, by ringing"))
     return lines
 
 
@@ -299,8 +302,8 @@ def _runs(tour: Tour) -> Table:
     """Every run in a row."""
     names = ("sliding friction", "stuck share of the time", "contact stiffness", "static over sliding friction")
     rows = []
-    for each, run in zip(tour.comparison.findings, tour.runs, strict=True):
-        cells = [value_of(one) if (one := _of(tuple(each.estimates), name)) else "–" for name in names]
+    for finding, run in zip(tour.comparison.findings, tour.runs, strict=True):
+        cells = [value_of(one) if (one := _of(tuple(finding.estimates), name)) else "–" for name in names]
         rows.append([f"{run.frequency:g} Hz", f"{1e3 * run.amplitude:g} mm", run.why, *cells])
     heads = ("base", "amplitude", "what for", "sliding friction", "stuck", "contact stiffness", "static over sliding")
     note = "Each run has its own section below, with intervals and figures; –: not asked, or not told by that run."
@@ -328,7 +331,7 @@ def _data(tour: Tour) -> dict[str, object]:
     return {
         "rig": tour.commissioned.to_dict(),
         "runs": [run.model_dump() for run in tour.runs],
-        "records": [of_findings(each).data() for each in tour.comparison.findings],
+        "records": [of_findings(finding).data() for finding in tour.comparison.findings],
         "decay": of_findings(tour.decay).data(),
         "laws": tour.laws.to_dict(),
         "squeaks": of_comparison(tour.squeaks).data(),

@@ -33,7 +33,7 @@ def of_findings(findings: Findings) -> Story:
     """One record."""
     decay, chosen = findings.decay, findings.settings
     beside = [replace(comparison, status="for comparison") for comparison in decay.comparisons]
-    motions = () if decay.motion is None else [told[1:] for told in decay.motion.candidates]
+    motions = () if decay.motion is None else [candidate[1:] for candidate in decay.motion.candidates]
     units = rig_units(chosen["channel"])
     settings = {"methods": METHODS[chosen["method"]], "channel": chosen["channel"], "spring": chosen["restoring"]}
     stated = {key: number(value, 0.0, units[key]) for key, value in chosen.items() if key in units}
@@ -59,11 +59,11 @@ def _scope(findings: Findings) -> Scope | None:
     fit = findings.decay.waveform
     if fit is None:
         return None
-    asked = ["decay", "--channel", fit.channel]
+    question = ["decay", "--channel", fit.channel]
     if findings.settings["restoring"] != "linear":
-        asked += ["--restoring", findings.settings["restoring"]]
+        question += ["--restoring", findings.settings["restoring"]]
     time, fitted = np.concatenate(fit.time), np.concatenate(fit.fitted)
-    return of_fit(findings.record, fit.channel, time, fitted, asked, fit.model)
+    return of_fit(findings.record, fit.channel, time, fitted, question, fit.model)
 
 
 def _by_other_ways(estimates: list[Estimate]) -> Iterator[Table]:
@@ -77,17 +77,24 @@ def _by_other_ways(estimates: list[Estimate]) -> Iterator[Table]:
 def of_comparison(comparison: Comparison) -> Story:
     """Several records together."""
     own = [
-        Line.of(number, each.true_value(number), name=f"{number.name}, {each.name}")
-        for each in comparison.findings
-        for number in (each.decay.best.damping_ratio, each.decay.best.dry_displacement, each.decay.best.frequency)
+        Line.of(number, finding.true_value(number), name=f"{number.name}, {finding.name}")
+        for finding in comparison.findings
+        for number in (
+            finding.decay.best.damping_ratio,
+            finding.decay.best.dry_displacement,
+            finding.decay.best.frequency,
+        )
     ]
     joint = comparison.joint
     half_cycles = None if joint is None else joint.half_cycles
     return Story(
-        f"{len(comparison.findings)} records together", list(_together(comparison)), doubts(comparison.estimates),
-        lines=own, draw=lambda: plates_together(comparison),
+        f"{len(comparison.findings)} records together",
+        list(_together(comparison)),
+        doubts(comparison.estimates),
+        lines=own,
+        draw=lambda: plates_together(comparison),
         data=lambda: {"joint": joint is not None, "apart": comparison.apart, "half_cycles": half_cycles},
-    )  # fmt: skip
+    )
 
 
 def _data(decay: Decay) -> dict[str, Any]:
@@ -101,7 +108,7 @@ def _data(decay: Decay) -> dict[str, Any]:
             {**{key: getattr(ring_down, key) for key in keys}, "extremes": len(ring_down.turns)}
             for ring_down in decay.releases.ring_downs
         ],
-        "motions": [{"name": name, "words": words, "verdict": verdict} for name, words, verdict in tried],
+        "motions": [{"name": name, "words": label, "verdict": verdict} for name, label, verdict in tried],
         "viscous_residual": decay.viscous_residual,
         "comparisons": [estimate.to_dict() for estimate in decay.comparisons],
         "decrements": None if decay.thesis is None else _decrements(decay.thesis),
@@ -170,8 +177,8 @@ def _dying(decay: Decay) -> str:
     shown = _both(ratio, dry)
     curved = decay.best is decay.thesis and not decay.releases.ring_downs[0].isochronous
     if decay.motion is not None and decay.best is decay.motion:
-        words = decay.motion.choice.chosen.fitted.motion.words
-        return f"The motion dies away by {words}: {_listed([_told(term) for term in decay.motion.terms])}."
+        forces = decay.motion.choice.chosen.fitted.motion.words
+        return f"The motion dies away by {forces}: {_listed([_with_interval(term) for term in decay.motion.terms])}."
     if decay.denied and decay.whichever:
         ratio, dry = decay.whichever
         reach = f"the damping ratio is {_reach(ratio)} and the dry friction displacement {_reach(dry)}"
@@ -182,10 +189,10 @@ def _dying(decay: Decay) -> str:
         model = decay.best.model
         return f"The motion dies away by {model if 'friction' in model else f'{model} friction'}: {shown}."
     if viscous:
-        widest = max((dry, *decay.whichever[1:]), key=lambda each: each.interval[1])
-        return f"The motion dies away by viscous friction: {_told(ratio)}. {_hidden(widest, 'dry friction')}"
+        widest = max((dry, *decay.whichever[1:]), key=lambda estimate: estimate.interval[1])
+        return f"The motion dies away by viscous friction: {_with_interval(ratio)}. {_hidden(widest, 'dry friction')}"
     if rubs:
-        return f"The motion dies away by dry friction: {_told(dry)}. {_hidden(ratio, 'viscous friction')}"
+        return f"The motion dies away by dry friction: {_with_interval(dry)}. {_hidden(ratio, 'viscous friction')}"
     return "Neither viscous nor dry friction can be told from zero."
 
 
@@ -227,25 +234,25 @@ def _chosen(decay: Decay) -> Iterator[str]:
 def _reach(estimate: Estimate) -> str:
     """The interval; the value where it is narrower than the digits shown."""
     low, high = estimate.interval
-    words = interval_of(estimate)
-    if words == WITHIN_DIGIT:
+    interval = interval_of(estimate)
+    if interval == WITHIN_DIGIT:
         return value_of(estimate)
     two_sided = -math.inf < low < high < math.inf and not estimate.is_bound
-    return f"within {words}" if two_sided else words
+    return f"within {interval}" if two_sided else interval
 
 
 def _both(ratio: Estimate, dry: Estimate) -> str:
-    return f"{_told(ratio)} and {_told(dry)}"
+    return f"{_with_interval(ratio)} and {_with_interval(dry)}"
 
 
-def _told(estimate: Estimate) -> str:
+def _with_interval(estimate: Estimate) -> str:
     return f"a {estimate.name} of {value_of(estimate)} (95 %: {interval_of(estimate)})"
 
 
-def _hidden(estimate: Estimate, words: str) -> str:
+def _hidden(estimate: Estimate, kind: str) -> str:
     """What is not told from zero, and up to how much of it would not be."""
     least = value_of(estimate, max(0.0, estimate.interval[1]))
-    return f"That there is {words} too can not be told: less than {least} of it would not be seen."
+    return f"That there is {kind} too can not be told: less than {least} of it would not be seen."
 
 
 def _left_over(decay: Decay) -> Iterator[str]:
@@ -253,9 +260,9 @@ def _left_over(decay: Decay) -> Iterator[str]:
     fit = decay.waveform
     if fit is None or LEFT_OVER not in kinds(fit.status):
         return
-    time, left = max(zip(fit.time, fit.residual, strict=True), key=lambda each: float(np.std(each[1])))
-    power = np.abs(np.fft.rfft((left - left.mean()) * np.hanning(len(left)))) ** 2
-    frequency = np.fft.rfftfreq(len(left), float(time[1] - time[0]))
+    time, residual = max(zip(fit.time, fit.residual, strict=True), key=lambda pair: float(np.std(pair[1])))
+    power = np.abs(np.fft.rfft((residual - residual.mean()) * np.hanning(len(residual)))) ** 2
+    frequency = np.fft.rfftfreq(len(residual), float(time[1] - time[0]))
     own, total = fit.frequency.value, float(power.sum())
     near = slice(max(0, int(np.argmax(power)) - 2), int(np.argmax(power)) + 3)
     line = float(power[near].sum())
@@ -336,9 +343,9 @@ def _together(comparison: Comparison) -> Iterator[str]:
     if either is not None:
         yield f"Whichever motion it was, the dry friction displacement is {_reach(either)}."
     if static is not None:
-        waveforms = [each.decay.waveform for each in comparison.findings]
+        waveforms = [finding.decay.waveform for finding in comparison.findings]
         alone = [waveform.static_displacement for waveform in waveforms if waveform is not None]
-        least = min(alone, key=lambda each: each.interval[1] - each.interval[0])
+        least = min(alone, key=lambda estimate: estimate.interval[1] - estimate.interval[0])
         yield (
             f"The static friction displacement lies within {_reach(static).removeprefix('within ')}; the surest record "
             f"alone leaves {interval_of(least)}."

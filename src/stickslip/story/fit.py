@@ -72,29 +72,30 @@ def of_laws(comparison: LawComparison, *, record: Records = ()) -> Story:
     )  # fmt: skip
 
 
-def _story(fit: Fit, record: Records, headline: list[str], **told: Any) -> Story:
+def _story(fit: Fit, record: Records, headline: list[str], **content: Any) -> Story:
     """What all fits tell of their parameters and of the records that they were made to."""
     records = [record] if isinstance(record, Record) else list(record)
-    units = list(dict.fromkeys(words for each in records for words in leading(each.check())))
+    units = list(dict.fromkeys(caution for record in records for caution in leading(record.check())))
     cautions = [*map(Caution, (doubt.words for doubt in doubts_of(fit.status))), *doubts(fit.estimates)]
     if records:
         first = records[0]
-        told = {"channels": list(first.channels.values()), "history": first.history, **told}
-        told["settings"] = {
-            "records": str(len(records)), "sampling rate": f"{first.fs:g} Hz",
-            "length": ", ".join(f"{each.duration:g} s" for each in records),
-        }  # fmt: skip
+        content = {"channels": list(first.channels.values()), "history": first.history, **content}
+        content["settings"] = {
+            "records": str(len(records)),
+            "sampling rate": f"{first.fs:g} Hz",
+            "length": ", ".join(f"{record.duration:g} s" for record in records),
+        }
     title = record_name(records[0]) if len(records) == 1 else f"{len(records)} records" if records else "Fit"
     return Story(
         title, [*units, *headline], cautions, lines=list(map(Line.of, fit.estimates)),
         draw=lambda: law_plates(fit), look=lambda: _scope(fit, records),
-        write=partial(write_law, result=fit, records=records), **told,
+        write=partial(write_law, result=fit, records=records), **content,
     )  # fmt: skip
 
 
-def _scope(found: Fit, records: Sequence[Record]) -> Scope | None:
+def _scope(result: Fit, records: Sequence[Record]) -> Scope | None:
     """The first record's first channel with what the law's sensor would have read."""
-    fit = found.fit if isinstance(found, LawComparison) else found
+    fit = result.fit if isinstance(result, LawComparison) else result
     if not records or isinstance(fit, CurveFit) or not fit.traces:
         return None
     traces = fit.traces[0]
@@ -124,8 +125,8 @@ def _law_told(fit: LawFit) -> Iterator[str]:
 
 
 def _values(law: object) -> str:
-    told = {key: value for key, value in vars(law).items() if isinstance(value, float)}
-    return ", ".join(f"{key} {number(value, abs(value) / 1000, unit(law, key))}" for key, value in told.items())
+    values = {key: value for key, value in vars(law).items() if isinstance(value, float)}
+    return ", ".join(f"{key} {number(value, abs(value) / 1000, unit(law, key))}" for key, value in values.items())
 
 
 def _curve_numbers(fit: CurveFit) -> dict[str, object]:
@@ -160,18 +161,20 @@ def write_law(draft: Path, result: LawComparison | LawFit | CurveFit, records: S
 def _whole(law: str, result: LawComparison | LawFit | CurveFit, record: Record) -> str:
     """The law's table within a system, moved as the first record was; alone where the mass is not known."""
     if isinstance(result, CurveFit):
-        told: dict[str, Any] = {} if record.rig is None else record.rig.constants
-        contact = str(told.get("contact", "ground"))
+        constants: dict[str, Any] = {} if record.rig is None else record.rig.constants
+        contact = str(constants.get("contact", "ground"))
         given: Drive = HarmonicBase(0.0, frequency=1.0, contact=contact)
     else:
         rig = (result.fit if isinstance(result, LawComparison) else result).oscillator
-        told = {name: getattr(rig, name) for name in ("mass", "stiffness", "damping", "damper")}
+        constants = {name: getattr(rig, name) for name in ("mass", "stiffness", "damping", "damper")}
         given = rig.drive
-    if told.get("mass") is None or told.get("stiffness") is None:
+    if constants.get("mass") is None or constants.get("stiffness") is None:
         return f"{ALONE}\n{law}"
     drive = _drive(record, given)
     start = {"x": float(record["x"][0])} if isinstance(drive, Release) and "x" in record else {}
-    system: dict[str, Any] = {name: told[name] for name in ("mass", "stiffness", "damping", "damper") if name in told}
+    system: dict[str, Any] = {
+        name: constants[name] for name in ("mass", "stiffness", "damping", "damper") if name in constants
+    }
     tables = [law, _plain("system", system), toml_table("drive", drive)]
     return "\n".join(
         [*tables, *([_plain("start", start)] if start else []), _plain("run", {"duration": record.duration})]
@@ -235,7 +238,7 @@ def _of_one(part: Prediction, law: str) -> Story:
     if part.sticks:
         of = [(stick.per_cycle, stick.share) for stick in part.sticks]
         stops = [
-            (pair[0].name, *(text for each in pair for text in (value_of(each), interval_of(each))))
+            (pair[0].name, *(text for estimate in pair for text in (value_of(estimate), interval_of(estimate))))
             for pair in zip(*of, strict=True)
         ]
         tables.append(Table("Stops, by the speed", ("", "measured", "95 %", "predicted", "95 %"), stops))
@@ -291,8 +294,8 @@ def _left(part: Prediction, name: str) -> str:
 
 
 def _listed(follows: Mapping[str, float]) -> str:
-    told = [f"{_percent(value)} of {name}" for name, value in follows.items()]
-    return " and ".join([", ".join(told[:-1]), told[-1]] if len(told) > 1 else told)
+    shares = [f"{_percent(value)} of {name}" for name, value in follows.items()]
+    return " and ".join([", ".join(shares[:-1]), shares[-1]] if len(shares) > 1 else shares)
 
 
 def _percent(value: float | None) -> str:

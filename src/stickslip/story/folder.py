@@ -232,8 +232,8 @@ def results_folder(folder: Path, results: Mapping[str, Any]) -> Iterator[Path]:
     with _written(folder) as draft:
         yield draft
         files = sorted(str(path.relative_to(draft).as_posix()) for path in draft.rglob("*") if path.is_file())
-        told = {"program": PROGRAM, "version": __version__, "files": [*files, NUMBERS], **results}
-        text = printable(json.dumps(told, indent=2, ensure_ascii=False, allow_nan=False))
+        numbers = {"program": PROGRAM, "version": __version__, "files": [*files, NUMBERS], **results}
+        text = printable(json.dumps(numbers, indent=2, ensure_ascii=False, allow_nan=False))
         (draft / NUMBERS).write_text(text + "\n", encoding="utf-8")
 
 
@@ -275,8 +275,8 @@ def _strangers(folder: Path) -> list[str]:
         path.relative_to(folder).as_posix() for path in folder.rglob("*") if not path.is_dir() or path.is_symlink()
     }
     try:
-        told = json.loads((folder / NUMBERS).read_text(encoding="utf-8"))
-        ours = set(told["files"]) if told["program"] == PROGRAM else set()
+        numbers = json.loads((folder / NUMBERS).read_text(encoding="utf-8"))
+        ours = set(numbers["files"]) if numbers["program"] == PROGRAM else set()
     except (OSError, ValueError, KeyError, TypeError):  # absent or not ours: then every file is a stranger's
         ours = set()
     return sorted(present - ours)

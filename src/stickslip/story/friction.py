@@ -12,7 +12,7 @@ from stickslip.answers.findings import Comparison, Findings
 from stickslip.answers.frequencies import TimeFrequency
 from stickslip.answers.mistakes import hopeless
 from stickslip.balance.balance import Pull
-from stickslip.consistent.slips import Slip
+from stickslip.consistent.checks import Slip
 from stickslip.contact.mechanisms import UNTOLD
 from stickslip.cycle.before_slip import Presliding
 from stickslip.cycle.onset import Breakaway
@@ -45,23 +45,25 @@ def of_findings(findings: Findings) -> Story:
 
 def of_comparison(comparison: Comparison) -> Story:
     """Several records side by side."""
-    levels = [(each, each.level) for each in comparison.findings if each.level is not None]
+    levels = [(finding, finding.level) for finding in comparison.findings if finding.level is not None]
     return Story(
         f"{len(comparison.findings)} records compared",
         list(_together(comparison)),
-        lines=[Line.of(level, each.true_value(level), name=f"{level.name}, {each.name}") for each, level in levels],
+        lines=[
+            Line.of(level, finding.true_value(level), name=f"{level.name}, {finding.name}") for finding, level in levels
+        ],
         draw=lambda: plates_together(comparison),
     )
 
 
 def _settings(findings: Findings) -> dict[str, str]:
-    told = {key: str(value) for key, value in findings.settings.items() if key not in ("sd", "sensors")}
+    settings = {key: str(value) for key, value in findings.settings.items() if key not in ("sd", "sensors")}
     for channel, stated in findings.settings.get("sensors", {}).items():
-        told[f"sensor {channel}"] = ", ".join(f"{key} {value}" for key, value in stated.items())
+        settings[f"sensor {channel}"] = ", ".join(f"{key} {value}" for key, value in stated.items())
     sd = findings.settings.get("sd", {})
-    for key in told.keys() & RIG_UNITS.keys():
-        told[key] = _constant(findings.settings[key], sd.get(key, 0.0), RIG_UNITS[key])
-    return told
+    for key in settings.keys() & RIG_UNITS.keys():
+        settings[key] = _constant(findings.settings[key], sd.get(key, 0.0), RIG_UNITS[key])
+    return settings
 
 
 def _data(findings: Findings) -> dict[str, Any]:
@@ -137,12 +139,16 @@ def _headline(findings: Findings) -> Iterator[str]:
     if findings.loops is not None:
         yield sentence(f"{'; '.join(clauses)}.")
         yield from _of_loops(findings)
-    found = findings.regression
-    if found is not None and found.viscous is not None and found.coulomb is not None:
-        share = f"; {100 * found.residual:.1f} % of it is left unexplained" if math.isfinite(found.residual) else ""
+    regression = findings.regression
+    if regression is not None and regression.viscous is not None and regression.coulomb is not None:
+        share = (
+            f"; {100 * regression.residual:.1f} % of it is left unexplained"
+            if math.isfinite(regression.residual)
+            else ""
+        )
         yield (
-            f"An inertia of {value_of(found.inertia)}, viscous friction of {value_of(found.viscous)} and dry friction "
-            f"of {value_of(found.coulomb)} explain the measured force{share}."
+            f"An inertia of {value_of(regression.inertia)}, viscous friction of {value_of(regression.viscous)} and "
+            f"dry friction of {value_of(regression.coulomb)} explain the measured force{share}."
         )
     apart = findings.asymmetric
     if apart is not None and findings.loops is None:
@@ -256,12 +262,14 @@ def _of_breakaway(breakaway: Breakaway) -> Iterator[str]:
         return
     more = "more than" if low > 1 + ALIKE else "less than" if high < 1 - ALIKE else "about as much as"
     sides = " and ".join(
-        f"{value_of(each)} {each.name.split()[-1]}" for each in (breakaway.forward, breakaway.back) if each
+        f"{value_of(estimate)} {estimate.name.split()[-1]}"
+        for estimate in (breakaway.forward, breakaway.back)
+        if estimate
     )
     yield (
         f"At breakaway it bears {sides}: {more} while it slides ({value_of(ratio)} times, 95 %: {interval_of(ratio)})."
     )
-    rings = [each for each in (breakaway.ringing_forward, breakaway.ringing_back) if each is not None]
+    rings = [estimate for estimate in (breakaway.ringing_forward, breakaway.ringing_back) if estimate is not None]
     if rings:
         yield f"After slip begins it rings at {' and '.join(f'{value_of(e)} {e.name.split()[-1]}' for e in rings)}."
     apart = breakaway.ringing_difference
@@ -380,6 +388,6 @@ def _of_slip_ringing(ringing: SlipRinging) -> Iterator[str]:
     ]
     yield f"After slip begins the friction rings at {' and '.join(sides)}{'' if ringing.difference else ' alone'}."
     if ringing.difference is not None:
-        told = ringing.verdict if ringing.verdict.startswith("no") else f"it is {ringing.verdict}"
+        verdict = ringing.verdict if ringing.verdict.startswith("no") else f"it is {ringing.verdict}"
         low_high = interval_of(ringing.difference)
-        yield f"Between the directions {told}: forward less back {value_of(ringing.difference)} (95 %: {low_high})."
+        yield f"Between the directions {verdict}: forward less back {value_of(ringing.difference)} (95 %: {low_high})."

@@ -44,13 +44,13 @@ def of_map(atlas: Any, *, system: System | None = None) -> Story:
 
 def _measures(atlas: Any) -> dict[str, dict[str, Any]]:
     """Of each variable its least and most value, at how many points it is known, and its unit."""
-    found = {}
+    ranges = {}
     for name, column in atlas.data_vars.items():
         values = abs(column) if column.dtype.kind == "c" else column
         known = int(values.notnull().sum())
         least, most = (float(values.min()), float(values.max())) if known else (None, None)
-        found[str(name)] = {"least": least, "most": most, "known": known, "unit": column.attrs.get("units", "1")}
-    return found
+        ranges[str(name)] = {"least": least, "most": most, "known": known, "unit": column.attrs.get("units", "1")}
+    return ranges
 
 
 def _plates(atlas: Any, system: System | None) -> tuple[Plate, ...]:
@@ -62,8 +62,10 @@ def _plates(atlas: Any, system: System | None) -> tuple[Plate, ...]:
 def _counts(atlas: Any) -> dict[str, int]:
     """How many motions ended in what."""
     status = atlas["status"]
-    codes, words = status.attrs.get("flag_values", ()), status.attrs.get("flag_meanings", "").split()
-    return {word.replace("_", " "): int(np.sum(status.values == code)) for code, word in zip(codes, words, strict=True)}
+    codes, meanings = status.attrs.get("flag_values", ()), status.attrs.get("flag_meanings", "").split()
+    return {
+        word.replace("_", " "): int(np.sum(status.values == code)) for code, word in zip(codes, meanings, strict=True)
+    }
 
 
 def _headline(atlas: Any) -> list[str]:
@@ -111,18 +113,21 @@ def of_bifurcation(diagram: Bifurcation) -> Story:
     rows = [(change.direction, f"{change.value:.6g}", change.before, change.after) for change in diagram.changes]
     ways = (("up", diagram.up), ("down", diagram.down))
     return _story(
-        "Motion along a parameter", "bifurcation", partial(plot_bifurcation, diagram),
+        "Motion along a parameter",
+        "bifurcation",
+        partial(plot_bifurcation, diagram),
         "Where the mass is once in each period of the drive: blue followed upwards, orange downwards; lines mark "
         "where the kind of motion changes. Below, the largest multiplier: at 1 the motion ceases to attract.",
         headline=list(_along(diagram)),
         tables=[Table("Changes of the motion", ("way", diagram.parameter, "before", "after"), rows)] if rows else (),
         data=lambda: {
-            "parameter": diagram.parameter, "values": diagram.values.tolist(),
+            "parameter": diagram.parameter,
+            "values": diagram.values.tolist(),
             "coexisting": diagram.coexisting.tolist(),
-            "regimes": {name: [each.regime for each in way] for name, way in ways},
+            "regimes": {name: [motion.regime for motion in way] for name, way in ways},
             "changes": [vars(change) for change in diagram.changes],
         },
-    )  # fmt: skip
+    )
 
 
 def _along(diagram: Bifurcation) -> Iterator[str]:
@@ -147,33 +152,41 @@ def of_stability(stability: Stability) -> Story:
     ]
     tone = f"at {stability.frequency:.5g} Hz"
     if stability.stable:
-        told = f"Steady sliding is stable: the slowest vibration, {tone}, dies away by {abs(stability.growth):.4g} 1/s."
+        answer = (
+            f"Steady sliding is stable: the slowest vibration, {tone}, dies away by {abs(stability.growth):.4g} 1/s."
+        )
     else:
         growth = f"{stability.growth:.4g} 1/s"
-        told = f"Steady sliding is unstable by {stability.mechanism}: a vibration {tone} grows by {growth}."
+        answer = f"Steady sliding is unstable by {stability.mechanism}: a vibration {tone} grows by {growth}."
     keys = ("stable", "mechanism", "growth", "without_coupling", "without_slope", "place", "loads", "status")
     modes = [{key: getattr(mode, key) for key in ("frequency", "growth", "damping_ratio")} for mode in stability.modes]
     return Story(
-        "Stability of steady sliding", [told], [] if stability.status == "ok" else [stability.status],
+        "Stability of steady sliding",
+        [answer],
+        [] if stability.status == "ok" else [stability.status],
         tables=[Table("Modes", ("frequency", "growth", "damping ratio"), rows)],
         data=lambda: plain({**{key: getattr(stability, key) for key in keys}, "modes": modes}),
-    )  # fmt: skip
+    )
 
 
 def of_basins(basins: Basins) -> Story:
     """Attractors over starts."""
     return _story(
-        "Which start leads where", "basins", partial(plot_basins, basins),
+        "Which start leads where",
+        "basins",
+        partial(plot_basins, basins),
         "Each start in the colour of the motion it leads to; crosses: where that motion is at phase zero.",
-    )  # fmt: skip
+    )
 
 
 def of_boundary(boundary: Boundary) -> Story:
     """Where the kind of motion changes."""
     return _story(
-        "Where the kind of motion changes", "boundary", partial(plot_boundary, boundary),
+        "Where the kind of motion changes",
+        "boundary",
+        partial(plot_boundary, boundary),
         "Points: found by bisection of exact runs. Line: the closed form.",
-    )  # fmt: skip
+    )
 
 
 def of_dither(dither: Dither) -> Story:
@@ -196,5 +209,5 @@ def of_dither(dither: Dither) -> Story:
     )  # fmt: skip
 
 
-def _story(title: str, name: str, draw: Callable[[], Any], caption: str, **told: Any) -> Story:
-    return Story(title, draw=lambda: [plate(name, draw, title, caption)], **told)
+def _story(title: str, name: str, draw: Callable[[], Any], caption: str, **content: Any) -> Story:
+    return Story(title, draw=lambda: [plate(name, draw, title, caption)], **content)

@@ -12,7 +12,7 @@ import numpy as np
 
 from stickslip.answers.findings import Findings
 from stickslip.balance.motion import is_measured
-from stickslip.consistent.slips import Slip
+from stickslip.consistent.checks import Slip
 from stickslip.errors import StickslipError
 from stickslip.figures.contact import across
 from stickslip.figures.style import Array, envelope, prefixed, spelled
@@ -21,6 +21,7 @@ from stickslip.printing import printable
 from stickslip.record.record import RIG_UNITS, Record
 from stickslip.rig.rig import Rig
 from stickslip.rig.sensor import Digitiser, Noise, Sensor
+from stickslip.rig.settings import READING
 from stickslip.statistics import follows
 from stickslip.twin.belief import Belief
 
@@ -33,7 +34,6 @@ EXPLAINED = "inertia, viscous and dry friction"  # the model of a regression
 BESIDE = {"x": "z"}  # drawn in the same panel
 HERE = "{here}"  # before the name of a file that lies beside the page, which knows its folder
 ROWS = "--rows {first}:{last}"  # of a command, with the rows left open
-READING = ("channels", "units", "fs", "time", "delimiter", "decimal")  # options that read_record has too
 
 
 @dataclass(frozen=True, eq=False)
@@ -188,10 +188,10 @@ def _panels(record: Record, twin: Record | None) -> Iterator[Panel]:
 
 def _explained(panel: Panel, findings: Findings) -> Panel:
     """The force that a regression explains, over what was measured of it."""
-    found, time = findings.regression, findings.record.time
-    if panel.name != found.signal:
+    regression, time = findings.regression, findings.record.time
+    if panel.name != regression.signal:
         return panel
-    over = np.interp(time, found.time, found.explained, left=np.nan, right=np.nan)
+    over = np.interp(time, regression.time, regression.explained, left=np.nan, right=np.nan)
     return replace(panel, lines={**panel.lines, "model": over})
 
 
@@ -204,12 +204,12 @@ def _moved(findings: Findings, twin: Record | None) -> Panel:
     return Panel("displacement", findings.loops.unit, lines)
 
 
-def of_fit(record: Record, name: str, time: Array, fitted: Array, asked: Sequence[str], model: str) -> Scope | None:
+def of_fit(record: Record, name: str, time: Array, fitted: Array, question: Sequence[str], model: str) -> Scope | None:
     """A channel with what was fitted to it at some times; none of a broken clock."""
     if record.stamps is not None:
         return None
     lines = {"measured": record[name], "model": np.interp(record.time, time, fitted, left=np.nan, right=np.nan)}
-    command, first = command_of(record, *asked)
+    command, first = command_of(record, *question)
     panels = [Panel(name, record.channels[name].unit, lines)]
     return Scope(record.start, record.fs, panels, model, command=command, first=first)
 
@@ -221,10 +221,8 @@ def of_run(record: Record, period: float, view: tuple[float, float], constants: 
         base = record["z"] if constants.get("contact") == "base" and "z" in record else 0.0
         moved = Panel("displacement", record.channels["x"].unit, {"measured": record["x"] - base})
     cycles = np.arange(view[0], min(view[1], record.start + record.duration - period), period)
-    asked = _beside(file, [*_stated(constants)])
-    return Scope(
-        record.start, record.fs, list(_panels(record, None)), "", moved, cycles, period, asked, view=view,
-    )  # fmt: skip
+    command = _beside(file, [*_stated(constants)])
+    return Scope(record.start, record.fs, list(_panels(record, None)), "", moved, cycles, period, command, view=view)
 
 
 def _beside(file: str, options: Sequence[str]) -> str:
@@ -237,24 +235,26 @@ def command_of(record: Record, question: str, *options: str) -> tuple[str, int]:
 
     Empty of a record that came from no file, or from several that were read one by one.
     """
-    words = _asked(record, question, options)
-    return (f"{shlex.join(words)} {ROWS}", _read(record).get("rows", (0,))[0] or 0) if words else ("", 0)
+    command = _command(record, question, options)
+    return (f"{shlex.join(command)} {ROWS}", _read(record).get("rows", (0,))[0] or 0) if command else ("", 0)
 
 
 def corrected(findings: Findings, slip: Slip, question: str = "analyze", options: Sequence[str] = ()) -> str:
     """The command that asks again, without a slip of the hand; empty where none can."""
     record, settings = findings.record, dict(findings.settings)
     read = dict(_read(record))
-    told = dict(read.get("channels") or _sources(record))
-    if not told.keys() >= {*slip.zeros, *(of for of, _ in slip.cure.values())}:
+    channels = dict(read.get("channels") or _sources(record))
+    if not channels.keys() >= {*slip.zeros, *(of for of, _ in slip.cure.values())}:
         return ""
     # of two that were exchanged each keeps its unit
-    cured = {name: times(told[of], by, unit=split_spec(told[name]).unit) for name, (of, by) in slip.cure.items()}
-    cured |= {name: shifted(told[name], off, name) for name, off in slip.zeros.items()}
+    cured = {
+        name: times(channels[of], by, unit=split_spec(channels[name]).unit) for name, (of, by) in slip.cure.items()
+    }
+    cured |= {name: shifted(channels[name], off, name) for name, off in slip.zeros.items()}
     if not all(cured.values()):
         return ""
     if cured:
-        read["channels"] = {**told, **cured}
+        read["channels"] = {**channels, **cured}
     if slip.clock != 1:
         read |= {"fs": record.fs / slip.clock, "time": None}
     settings |= {name: by * settings[name] for name, by in slip.constants.items() if name in settings}
@@ -284,11 +284,11 @@ def completed(findings: Findings, question: str = "analyze", options: Sequence[s
 def _again(
     findings: Findings, question: str, read: Mapping[str, Any], settings: Mapping[str, Any], options: Sequence[str]
 ) -> str:
-    words = _asked(findings.record, question, (*_stated(settings), *_loaded(findings), *options), read)
+    command = _command(findings.record, question, (*_stated(settings), *_loaded(findings), *options), read)
     rows = read.get("rows")
-    if words and rows:
-        words += ["--rows", ":".join("" if row is None else str(row) for row in rows)]
-    return shlex.join(words)
+    if command and rows:
+        command += ["--rows", ":".join("" if row is None else str(row) for row in rows)]
+    return shlex.join(command)
 
 
 def _loaded(findings: Findings) -> Iterator[str]:
@@ -309,25 +309,25 @@ def _read(record: Record) -> Mapping[str, Any]:
     return reads[0] if len(reads) == 1 else {}
 
 
-def _asked(record: Record, question: str, options: Sequence[str], read: Mapping[str, Any] | None = None) -> list[str]:
+def _command(record: Record, question: str, options: Sequence[str], read: Mapping[str, Any] | None = None) -> list[str]:
     """The words of a command about the record's file, `read` otherwise where that is given."""
     read = _read(record) if read is None else read
     if not read.get("files"):
         return []
-    words = [
+    command = [
         "stickslip",
         question,
         "+".join(f"{file['folder']}/{file['name']}" if "folder" in file else file["name"] for file in read["files"]),
     ]
     for option in READING:
-        told = read.get(option)
-        if isinstance(told, Mapping):
-            words += [word for name, value in told.items() for word in (f"--{option}", f"{name}={value}")]
-        elif told is not None:
-            words += [f"--{option}", f"{told:.12g}" if isinstance(told, float) else str(told)]
+        stated = read.get(option)
+        if isinstance(stated, Mapping):
+            command += [word for name, value in stated.items() for word in (f"--{option}", f"{name}={value}")]
+        elif stated is not None:
+            command += [f"--{option}", f"{stated:.12g}" if isinstance(stated, float) else str(stated)]
     repairs = [step.repair for step in record.history if step.repair]
-    words += ["--repair", ",".join(dict.fromkeys(repairs))] if repairs else []
-    return [*words, *options]
+    command += ["--repair", ",".join(dict.fromkeys(repairs))] if repairs else []
+    return [*command, *options]
 
 
 def _stated(constants: Mapping[str, Any]) -> Iterator[str]:

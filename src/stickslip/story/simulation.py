@@ -108,7 +108,7 @@ class Outcome:
             ],
             "known_answers": _plain(self.known),
             "event_count": counts.total(),
-            "events": [_told(event) for event in itertools.islice(self.run.each_event(), MOST_TOLD)],
+            "events": [_event_data(event) for event in itertools.islice(self.run.each_event(), MOST_TOLD)],
         }
 
 
@@ -126,7 +126,7 @@ def of_outcome(
     form: str = "csv",
     animation: str | None = None,
     sound: bool = False,
-    tell: Callable[[str, float], None] = lambda words, done: None,
+    tell: Callable[[str, float], None] = lambda stage, done: None,
 ) -> Story:
     """A run and what happened; its folder holds the events and the sampled record too.
 
@@ -212,11 +212,11 @@ def outcome(case: Case, *, progress: Callable[[float], object] | None = None) ->
     'The mass comes to rest after 3.142 s, at a displacement of 250 mm.'
     """
     run = simulate(case.system, start=case.start, progress=progress, **case.run)  # type: ignore[arg-type]
-    found: Mapping[str, Any] = {}
+    answers: Mapping[str, Any] = {}
     if case.known and run.status != "interrupted":
         scenario = scenarios.get(case.name)
-        found = scenarios.answers(scenario, run=run if case.run == scenario.run else None)
-    known = {question: {"known": case.known[question], "found": found[question]} for question in found}
+        answers = scenarios.answers(scenario, run=run if case.run == scenario.run else None)
+    known = {question: {"known": case.known[question], "found": answers[question]} for question in answers}
     values = _values(run)
     return Outcome(case, run, tuple(_sentences(run, values)), values, known)
 
@@ -245,10 +245,10 @@ def _write_sound(run: Trajectory, folder: Path, fs: float, form: str) -> None:
 def _write_events(run: Trajectory, path: Path) -> None:
     with path.open("w", encoding="utf-8") as file:
         file.write(",".join(["time [s]", *Event._fields[1:]]) + "\n")
-        file.writelines(",".join(map(str, _told(event).values())) + "\n" for event in run.each_event())
+        file.writelines(",".join(map(str, _event_data(event).values())) + "\n" for event in run.each_event())
 
 
-def _told(event: Event) -> dict[str, Any]:
+def _event_data(event: Event) -> dict[str, Any]:
     """An event for readers: contacts are counted from 1, as in a system's file."""
     return {**event._asdict(), "contact": event.contact + 1}
 
@@ -303,15 +303,15 @@ def _values(run: Trajectory) -> dict[str, tuple[float, str]]:
     }
     for j in range(len(run.labels("x"))):
         x, v = sampled(run, (("x", j), ("v", j)), times)
-        words, speed, units = *_ways(run, j), (run.units("x")[j], run.units("v")[j])
-        values[f"{words}, from"] = (float(x.min()), units[0])
-        values[f"{words}, to"] = (float(x.max()), units[0])
+        path, speed, units = *_ways(run, j), (run.units("x")[j], run.units("v")[j])
+        values[f"{path}, from"] = (float(x.min()), units[0])
+        values[f"{path}, to"] = (float(x.max()), units[0])
         values[f"largest {speed}"] = (float(np.abs(v).max()), units[1])
     for c in range(contacts_of(run)):
         if pressed(run, c):
             (load,) = sampled(run, (("load", c),), times)
-            words = numbered_words(run, "normal load", "load", c)
-            values[f"{words}, from"], values[f"{words}, to"] = (float(load.min()), "N"), (float(load.max()), "N")
+            label = numbered_words(run, "normal load", "load", c)
+            values[f"{label}, from"], values[f"{label}, to"] = (float(load.min()), "N"), (float(load.max()), "N")
     if len(run.modes) <= MOST_PIECES and isinstance(run.table, Tables):  # a closed form to integrate
         work = energy(run)
         values["work against friction"] = (work.friction, "J")
@@ -322,27 +322,27 @@ def _values(run: Trajectory) -> dict[str, tuple[float, str]]:
 def _ways(run: Trajectory, row: int) -> tuple[str, str]:
     """What a degree of freedom's displacement and speed are called."""
     turns = run.units("x")[row] == "rad"
-    words = ("angle", "angular speed") if turns else ("displacement", "speed")
-    return numbered_words(run, words[0], "x", row), numbered_words(run, words[1], "v", row)
+    names = ("angle", "angular speed") if turns else ("displacement", "speed")
+    return numbered_words(run, names[0], "x", row), numbered_words(run, names[1], "v", row)
 
 
 def _shares(run: Trajectory) -> dict[str, tuple[float, str]]:
     """How the time is shared by what each contact does."""
-    found: dict[str, tuple[float, str]] = {}
+    shares: dict[str, tuple[float, str]] = {}
     spent = np.bincount(run.modes, weights=run.durations, minlength=len(run.table.modes)) / run.duration
     for contact in range(contacts_of(run)):
         kinds = kinds_of(run, contact)
         for kind in [kind for kind in KINDS if kind in kinds]:
             share = float(sum(s for s, k in zip(spent, kinds, strict=True) if k == kind))
-            found[numbered_words(run, f"share of time in {kind}", "friction", contact)] = (share, "1")
-    return found
+            shares[numbered_words(run, f"share of time in {kind}", "friction", contact)] = (share, "1")
+    return shares
 
 
 def _sentences(run: Trajectory, values: Mapping[str, tuple[float, str]]) -> list[str]:
-    found = []
+    sentences = []
     masses = run.labels("x")
     if run.status == "interrupted":
-        found.append(f"Interrupted: the run holds the {_text(run.duration, 's')} simulated until then.")
+        sentences.append(f"Interrupted: the run holds the {_text(run.duration, 's')} simulated until then.")
     if run.status == "at rest":
         state, after = run.state(run.duration), _text(float(run.starts[-1]), "s")
         places = [
@@ -350,13 +350,13 @@ def _sentences(run: Trajectory, values: Mapping[str, tuple[float, str]]) -> list
             for name, unit in zip(masses, run.units("x"), strict=True)
         ]
         subject = "The mass comes" if len(masses) == 1 else "All masses come"
-        found.append(f"{subject} to rest after {after}, at a displacement of {_listed(places)}.")
+        sentences.append(f"{subject} to rest after {after}, at a displacement of {_listed(places)}.")
     else:
-        found += [holding(run)] if len(masses) == contacts_of(run) == 1 else []
+        sentences += [holding(run)] if len(masses) == contacts_of(run) == 1 else []
         ways = []
         for j, name in enumerate(masses):
-            words, _ = _ways(run, j)
-            low, high = (_text(*values[f"{words}, {end}"]) for end in ("from", "to"))
+            place, _ = _ways(run, j)
+            low, high = (_text(*values[f"{place}, {end}"]) for end in ("from", "to"))
             ways.append(f"{'the mass moves' if len(masses) == 1 else name} between {low} and {high}")
         speeds: dict[str, float] = {}
         for j in range(len(masses)):
@@ -364,22 +364,24 @@ def _sentences(run: Trajectory, values: Mapping[str, tuple[float, str]]) -> list
             speeds[unit] = max(speed, speeds.get(unit, 0.0))
         fastest = " and ".join(_text(speed, unit) for unit, speed in speeds.items())
         verb = "" if len(masses) == 1 else "the masses move: "
-        found.append(f"In the last cycle {verb}{_listed(ways)}, at up to {fastest}.")
+        sentences.append(f"In the last cycle {verb}{_listed(ways)}, at up to {fastest}.")
     counts = run.event_counts()
     if counts:
-        told = ", ".join(f"{count} × {kind}" for kind, count in counts.most_common())
+        counted = ", ".join(f"{count} × {kind}" for kind, count in counts.most_common())
         subject = "the contact changes" if contacts_of(run) == 1 else "the contacts change"
-        found.append(f"On the way {subject} {counts.total()} times: {told}.")
+        sentences.append(f"On the way {subject} {counts.total()} times: {counted}.")
     elif len(run.modes) == 1 and contacts_of(run):
-        found.append("The contact never changes its mode." if contacts_of(run) == 1 else "No contact changes its mode.")
-    return found
+        sentences.append(
+            "The contact never changes its mode." if contacts_of(run) == 1 else "No contact changes its mode."
+        )
+    return sentences
 
 
 def holding(run: Trajectory) -> str:
     """How often in a cycle a single contact holds, and for which share of the time, over the last cycles."""
     cycle = cycle_of(run)
     cycles = max(1, min(COUNTED_CYCLES, int(run.duration / cycle * (1 + 1e-9))))
-    first, told = run.duration - cycles * cycle, []
+    first, holds = run.duration - cycles * cycle, []
     for kind, verb in (("stick", "sticks"), ("microstick", "holds, giving a little,"), ("flight", "lifts off")):
         spans = stretches(run, kind, first=first, last=run.duration)
         if not len(spans):
@@ -389,10 +391,10 @@ def holding(run: Trajectory) -> str:
         count = (1 + int(begins.sum()) - bool(cut)) / cycles
         often = {1.0: "once", 2.0: "twice"}.get(count, f"{count:.2g} times")
         share = float(spans[:, 1].sum()) / (cycles * cycle)
-        told.append(
+        holds.append(
             f"{verb} {often} a cycle, {100 * share:.2g} % of the time" if share < 1 - 1e-9 else f"{verb} throughout"
         )
-    return f"The mass {_listed(told) if told else 'slides without a stop'}."
+    return f"The mass {_listed(holds) if holds else 'slides without a stop'}."
 
 
 def _listed(parts: Sequence[str]) -> str:

@@ -53,13 +53,15 @@ def _data(findings: Findings) -> dict[str, Any]:
         "normal_load": findings.normal,
         "squeaks": {key: value for key, value in heard.items() if key not in ("notes", "history")},
         "beside": {
-            each.channel: {
-                "kind": each.kind, "reference": each.reference, "bursts": [burst.to_dict() for burst in each.bursts],
+            squeaks.channel: {
+                "kind": squeaks.kind,
+                "reference": squeaks.reference,
+                "bursts": [burst.to_dict() for burst in squeaks.bursts],
             }
-            for each in findings.beside
+            for squeaks in findings.beside
         },
         **{name: None if part is None else part.to_dict() for name, part in parts.items()},
-    }  # fmt: skip
+    }
 
 
 def _together(comparison: Comparison) -> dict[str, Any]:
@@ -68,8 +70,8 @@ def _together(comparison: Comparison) -> dict[str, Any]:
         {key: value.to_dict() if isinstance(value, Estimate) else value for key, value in vars(condition).items()}
         for condition in comparison.conditions
     ]
-    told = [{**row, "trend": condition.trend} for row, condition in zip(rows, comparison.conditions, strict=True)]
-    return {"conditions": told, "verdicts": comparison.verdicts}
+    conditions = [{**row, "trend": condition.trend} for row, condition in zip(rows, comparison.conditions, strict=True)]
+    return {"conditions": conditions, "verdicts": comparison.verdicts}
 
 
 def _headline(findings: Findings) -> Iterator[str]:
@@ -88,8 +90,8 @@ def _headline(findings: Findings) -> Iterator[str]:
         yield f"Whether it squeaks{where} can not be told: {_untold(squeaks)}."
         yield from _power(squeaks)
     elif not heard:
-        kinds = [(squeaks.of(kind), words) for kind, words in WORDS.items()]
-        yield f"No squeak{where}. {'; '.join(f'{_counted(of)}, {words}' for of, words in kinds if of)}."
+        kinds = [(squeaks.of(kind), label) for kind, label in WORDS.items()]
+        yield f"No squeak{where}. {'; '.join(f'{_counted(of)}, {label}' for of, label in kinds if of)}."
         yield from _power(squeaks)
     else:
         many = f"{len(heard)} times in {record.duration:.3g} s" if len(heard) > 1 else "once"
@@ -141,8 +143,8 @@ def _of_energy(joined: Coupling, *, torsion: bool) -> Iterator[str]:
             yield f"Friction {verb} the {motion}: {value_of(energy)} in each cycle of the squeak."
     if joined.energy_per_cycle is not None and joined.energy_per_cycle.includes(0.0):
         lever = "; what it gives the torsion is told where its distance from the axis is stated, as lever= in m"
-        told = lever if torsion and joined.energy_to_torsion is None else ""
-        yield f"Whether friction feeds or damps the tangential vibration can not be told{told}."
+        why = lever if torsion and joined.energy_to_torsion is None else ""
+        yield f"Whether friction feeds or damps the tangential vibration can not be told{why}."
 
 
 def _spoken_name(channel: str) -> str:
@@ -153,14 +155,14 @@ def _spoken_name(channel: str) -> str:
 def _untold(squeaks: Squeaks) -> str:
     """Of how many bursts it can not be told whether friction makes them: of tonal ones, where there are any."""
     tonal = [burst for burst in squeaks.untold if burst.kind == "tonal"]
-    kind, asked = ("tonal", len(tonal)) if tonal else ("broad", len(squeaks.untold))
-    every = len(squeaks.of("tonal")) if tonal else asked
-    if every == asked == 1:
+    kind, undecided = ("tonal", len(tonal)) if tonal else ("broad", len(squeaks.untold))
+    every = len(squeaks.of("tonal")) if tonal else undecided
+    if every == undecided == 1:
         return f"one {kind} burst may be friction's, or not"
-    if every == asked:
+    if every == undecided:
         return f"each of {every} {kind} bursts may be friction's, or not"
-    rest = "the other one is not" if every - asked == 1 else f"the other {every - asked} are not"
-    return f"of {every} {kind} bursts {asked} may be friction's, or not; {rest}"
+    rest = "the other one is not" if every - undecided == 1 else f"the other {every - undecided} are not"
+    return f"of {every} {kind} bursts {undecided} may be friction's, or not; {rest}"
 
 
 def _power(squeaks: Squeaks) -> Iterator[str]:
@@ -173,9 +175,9 @@ def _of_one(burst: Squeak, squeaks: Squeaks) -> str:
     """The loudest burst in a sentence."""
     where = "" if math.isnan(burst.phase) else f", at {100 * burst.phase:.0f} % of the forcing cycle"
     speed = "" if math.isnan(burst.speed) else f" and {number(burst.speed, 1e-3, 'm/s')}"
-    told = f"The loudest is {_level_of(burst, squeaks)}{where}{speed}"
+    loudest = f"The loudest is {_level_of(burst, squeaks)}{where}{speed}"
     friction = {"shown": "friction makes it", "likely": "friction likely makes it"}.get(burst.friction)
-    return f"{told}; {friction}: {burst.evidence}." if friction else f"{told}: {burst.evidence}."
+    return f"{loudest}; {friction}: {burst.evidence}." if friction else f"{loudest}: {burst.evidence}."
 
 
 def _level_of(burst: Squeak, squeaks: Squeaks) -> str:
@@ -192,16 +194,16 @@ def _counted(bursts: Sequence[Squeak]) -> str:
 
 def _cautions(findings: Findings) -> list[str]:
     """What should keep the reader from trusting it."""
-    told = list(findings.squeaks.cautions)
+    said = list(findings.squeaks.cautions)
     if any(fault.kind == "spike" for fault in findings.faults):
-        told.append(
+        said.append(
             "What stands off as a spike may be a contact that sticks, lifts or lands: look before it is replaced."
         )
     spoilt: dict[str, list[str]] = {}
     for place, burst in enumerate(findings.squeaks.bursts):
         for doubt in doubts_of(burst.status):
             spoilt.setdefault(doubt.words, []).append(str(place + 1))
-    return told + [
+    return said + [
         f"Burst{'s' if len(places) > 1 else ''} {', '.join(places)}: {part}." for part, places in spoilt.items()
     ]
 
@@ -317,19 +319,19 @@ def _coupling_note(joined: Coupling) -> str:
 def _pair(pair: Pair, *, rest: bool) -> list[str]:
     sign = -1 if pair.leads == pair.second else 1
     first, second = (pair.second, pair.first) if sign < 0 else (pair.first, pair.second)
-    told = [f"{first}{' → ' if pair.leads != 'neither' else ', '}{second}", f"{pair.inside:.2f}"]
+    cells = [f"{first}{' → ' if pair.leads != 'neither' else ', '}{second}", f"{pair.inside:.2f}"]
     if rest:
         low, high = pair.added.interval if pair.added is not None else (math.nan, math.nan)
-        told += [f"{pair.outside:.2f}", f"{round(low, 2) + 0.0:.2f} to {round(high, 2) + 0.0:.2f}"]
+        cells += [f"{pair.outside:.2f}", f"{round(low, 2) + 0.0:.2f} to {round(high, 2) + 0.0:.2f}"]
     if not pair.coupled:
-        return [*told, NONE, "by chance"]
+        return [*cells, NONE, "by chance"]
     phase = f"{math.degrees(sign * pair.phase.value):.0f}°"
     if pair.delay is None:
-        return [*told, phase, "half a period"]
+        return [*cells, phase, "half a period"]
     delay, half = sign * pair.delay.value, (pair.delay.interval[1] - pair.delay.interval[0]) / 2
     factor, unit = prefixed(delay, "s")
     digits = decimals(factor * half, factor * delay)
-    return [*told, phase, f"{factor * delay:.{digits}f} ± {factor * half:.{digits}f} {unit}"]
+    return [*cells, phase, f"{factor * delay:.{digits}f} ± {factor * half:.{digits}f} {unit}"]
 
 
 def _condition_table(comparison: Comparison) -> tuple[Sequence[str], list[list[str]]]:

@@ -26,7 +26,7 @@ TELLERS = {
     "Findings": "findings.of_findings", "Comparison": "findings.of_comparison",
     "TimeFrequency": "friction.of_map",
     "LawComparison": "fit.of_laws", "LawFit": "fit.of_law", "CurveFit": "fit.of_curve",
-    "Predictions": "fit.of_predictions", "Batch": "many.of_batch",
+    "Predictions": "fit.of_predictions", "Batch": "findings.of_batch",
     "Outcome": "simulation.of_outcome", "Trajectory": "simulation.of_run",
     "Record": "bench.of_record", "ExperimentPlan": "bench.of_plan",
     "Bifurcation": "maps.of_bifurcation", "Basins": "maps.of_basins", "Boundary": "maps.of_boundary",
@@ -182,17 +182,21 @@ class Story:
     @property
     def answer(self) -> str:
         """The sentence that answers; where nothing is told, none."""
-        return next((told for told in self.headline if not isinstance(told, Caution)), "")
+        return next((sentence for sentence in self.headline if not isinstance(sentence, Caution)), "")
 
     @property
     def opening(self) -> list[str]:
         """What is read first, in this order: what every number hangs on, and the answer."""
-        return [told for told in self.headline if told and (isinstance(told, Caution) or told == self.answer)]
+        return [
+            sentence
+            for sentence in self.headline
+            if sentence and (isinstance(sentence, Caution) or sentence == self.answer)
+        ]
 
     @property
     def others(self) -> list[str]:
         """The sentences behind the answer."""
-        return [told for told in self.headline if not isinstance(told, Caution)][1:]
+        return [sentence for sentence in self.headline if not isinstance(sentence, Caution)][1:]
 
     @functools.cached_property
     def notices(self) -> list[Caution]:
@@ -206,9 +210,9 @@ class Story:
         reasons, kinds = {row.reason for row in rows}, {row.kind for row in rows} - {""}
         plain = [caution if isinstance(caution, Caution) else Caution(caution) for caution in self.cautions]
         others = [
-            each
-            for each in plain
-            if each.reason not in reasons and each.kind not in kinds and each.reason.casefold() not in said
+            remark
+            for remark in plain
+            if remark.reason not in reasons and remark.kind not in kinds and remark.reason.casefold() not in said
         ]
         return [*rows, *(other for other in others if not other.names), *(other for other in others if other.names)]
 
@@ -264,14 +268,14 @@ class Story:
 
     def _repr_html_(self) -> str:
         rows = [(line.name, line.value, line.interval, self.marks(line)) for line in self.leading]
-        notes = [f"{self.mark(each)} {each.reason}".strip() for each in self.shown]
+        notes = [f"{self.mark(caution)} {caution.reason}".strip() for caution in self.shown]
         title = " ".join(self.opening) or self.title
         return html_table(title, ("quantity", "value", "95 % interval", ""), rows, notes)
 
     @classmethod
-    def of_record(cls, title: str, record: Record, **told: Any) -> Story:
+    def of_record(cls, title: str, record: Record, **content: Any) -> Story:
         """What is told of something that was found in a record."""
-        return cls(title, channels=list(record.channels.values()), history=record.history, **told)
+        return cls(title, channels=list(record.channels.values()), history=record.history, **content)
 
 
 def summary(result: Any, **context: Any) -> Story:

@@ -8,7 +8,7 @@ from typing import Any
 from stickslip.answers.findings import Comparison, Findings
 from stickslip.cycle.tribometer import DEFINITIONS
 from stickslip.estimate import Estimate, stands
-from stickslip.figures.tribometer import plates_of
+from stickslip.figures.contact import tribometer_plates
 from stickslip.story.story import Story, Table
 from stickslip.story.words import cautions, interval_of, value_of
 
@@ -21,7 +21,7 @@ def of_findings(findings: Findings) -> Story:
     return Story(
         findings.name, list(_headline(findings)), cautions(findings),
         settings={key: str(value) for key, value in findings.settings.items()},
-        tables=[_definitions(findings)], draw=lambda: plates_of(found), data=lambda: _data(findings),
+        tables=[_definitions(findings)], draw=lambda: tribometer_plates(found), data=lambda: _data(findings),
     )  # fmt: skip
 
 

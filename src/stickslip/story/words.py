@@ -105,8 +105,8 @@ class Caution(str):
 def cautions(findings: Findings, said: Iterable[Estimate] = ()) -> list[Caution]:
     """What should keep the reader from trusting a number, but what the headline has `said` of those without a value."""
     untold = {estimate.name for estimate in said if not estimate.known}
-    told = [(estimate.name, estimate.status) for estimate in findings.quoted if estimate.name not in untold]
-    return [*flags([*told, *findings.doubts]), *faulty(findings.faults)]
+    statuses = [(estimate.name, estimate.status) for estimate in findings.quoted if estimate.name not in untold]
+    return [*flags([*statuses, *findings.doubts]), *faulty(findings.faults)]
 
 
 def doubts(estimates: Iterable[Estimate]) -> list[Caution]:
@@ -114,11 +114,11 @@ def doubts(estimates: Iterable[Estimate]) -> list[Caution]:
     return flags((estimate.name, estimate.status) for estimate in estimates)
 
 
-def flags(told: Iterable[tuple[str, str]]) -> list[Caution]:
+def flags(statuses: Iterable[tuple[str, str]]) -> list[Caution]:
     """What speaks against answers, each reason once, with the names of those concerned; few cycles last."""
     flagged: dict[str, list[str]] = {}
     few: dict[Doubt, list[str]] = {}
-    for name, status in told:
+    for name, status in statuses:
         for doubt in doubts_of(status):
             if doubt.count:
                 few.setdefault(doubt, []).append(name)
@@ -152,9 +152,9 @@ def leading(faults: Iterable[Fault]) -> list[Caution]:
     return [Caution(str(fault)) for fault in faults if fault.kind == "unit"]
 
 
-def sentence(words: str) -> str:
+def sentence(text: str) -> str:
     """Beginning with a capital."""
-    return words[:1].upper() + words[1:]
+    return text[:1].upper() + text[1:]
 
 
 def _rounded(value: float, digits: int) -> str:

@@ -55,25 +55,25 @@ def export_system(case: Case, *, format: str = "toml") -> str:
     """
     if format not in FORMATS:
         raise ModelError(f"format = '{format}'", f"it is one of {', '.join(FORMATS)}", nearest(str(format), FORMATS))
-    held = _tables(case)
+    tables = _tables(case)
     if format == "json":
-        return json.dumps(held, ensure_ascii=False, allow_nan=False)
-    return "\n".join(_toml(held) if format == "toml" else _python(case, held)) + "\n"
+        return json.dumps(tables, ensure_ascii=False, allow_nan=False)
+    return "\n".join(_toml(tables) if format == "toml" else _python(case, tables)) + "\n"
 
 
 def _tables(case: Case) -> dict[str, Any]:
     """The tables of a system's file."""
     system = case.system
-    held: dict[str, Any] = {"about": case.about, "system": _values(system)}
+    tables: dict[str, Any] = {"about": case.about, "system": _values(system)}
     if isinstance(system, Structure):
-        held["contacts"] = [{**_values(contact), "law": _part(contact.law, LAWS)} for contact in system.contacts]
+        tables["contacts"] = [{**_values(contact), "law": _part(contact.law, LAWS)} for contact in system.contacts]
     else:
-        held["law"] = _part(system.law, LAWS)
-    held["drive"] = _part(system.drive, DRIVES)
+        tables["law"] = _part(system.law, LAWS)
+    tables["drive"] = _part(system.drive, DRIVES)
     run = case.run if case.fs is None else {**case.run, "fs": case.fs}
     for name, values in (("start", case.start), ("run", run)):
-        held[name] = {key: value if isinstance(value, str) else float(value) for key, value in values.items()}
-    return held
+        tables[name] = {key: value if isinstance(value, str) else float(value) for key, value in values.items()}
+    return tables
 
 
 def _part(part: Any, known: Mapping[str, Any]) -> dict[str, Any]:
@@ -103,10 +103,10 @@ def _plain(value: Any) -> Any:
     return [_plain(item) for item in value] if isinstance(value, list | tuple) else value
 
 
-def _toml(held: Mapping[str, Any]) -> Iterator[str]:
-    if held["about"]:
-        yield f"about = {_toml_value(held['about'])}"
-    for name, table in held.items():
+def _toml(tables: Mapping[str, Any]) -> Iterator[str]:
+    if tables["about"]:
+        yield f"about = {_toml_value(tables['about'])}"
+    for name, table in tables.items():
         for table_row in table if isinstance(table, list) else [table]:
             if name != "about" and table_row:
                 yield ""
@@ -122,14 +122,14 @@ def _toml_value(value: Any) -> str:
     return quoted(value) if isinstance(value, str) else json.dumps(value)
 
 
-def _python(case: Case, held: Mapping[str, Any]) -> Iterator[str]:
+def _python(case: Case, tables: Mapping[str, Any]) -> Iterator[str]:
     yield "import stickslip as ss"
     yield ""
-    if _has_formula(held.get("law", {})):  # a formula is text
-        yield f"case = ss.systems.read_system({held!r})"
+    if _has_formula(tables.get("law", {})):  # a formula is text
+        yield f"case = ss.systems.read_system({tables!r})"
     else:
-        yield from _system(held)
-        known = f"{case.name!r}, {case.about!r}, system, start={held['start']!r}, run={held['run']!r}"
+        yield from _system(tables)
+        known = f"{case.name!r}, {case.about!r}, system, start={tables['start']!r}, run={tables['run']!r}"
         yield f"case = ss.systems.Case({known})"
     yield "result = ss.story.outcome(case)"
     yield "print(*result.sentences, sep='\\n')"
@@ -141,18 +141,18 @@ def _has_formula(law: Mapping[str, Any]) -> bool:
     return "curve" in law or ("law" in law and _has_formula(law["law"]))
 
 
-def _system(held: Mapping[str, Any]) -> Iterator[str]:
+def _system(tables: Mapping[str, Any]) -> Iterator[str]:
     """The system from its parts, each on a line of its own."""
-    yield f"drive = {_call(held['drive'])}"
-    if "contacts" in held:
+    yield f"drive = {_call(tables['drive'])}"
+    if "contacts" in tables:
         yield "contacts = ["
-        for contact in held["contacts"]:
+        for contact in tables["contacts"]:
             yield f"    ss.Contact({_call(contact['law'])}, {_arguments(contact, without=('law',))}),"
         yield "]"
-        yield f"system = ss.Structure({_arguments(held['system'])}, contacts=contacts, drive=drive)"
+        yield f"system = ss.Structure({_arguments(tables['system'])}, contacts=contacts, drive=drive)"
     else:
-        yield f"law = {_call(held['law'])}"
-        yield f"system = ss.Oscillator({_arguments(held['system'])}, law=law, drive=drive)"
+        yield f"law = {_call(tables['law'])}"
+        yield f"system = ss.Oscillator({_arguments(tables['system'])}, law=law, drive=drive)"
 
 
 def _call(part: Mapping[str, Any]) -> str:

@@ -343,8 +343,11 @@ def _oscillator(whole: _File, drive: Any, source: _Source) -> Oscillator:
 def _structure(whole: _File, drive: Any, source: _Source) -> Structure:
     if whole.law is not None:
         where = f"{source.name}{line_of(['law'], source.lines)}"
-        raise ModelError(f"{where} has a law beside a structure's matrices", "each contact of a structure has its own",
-                         "write it into [[contacts]], as law = {name = ...}")  # fmt: skip
+        raise ModelError(
+            f"{where} has a law beside a structure's matrices",
+            "each contact of a structure has its own",
+            "write it into [[contacts]], as law = {name = ...}",
+        )
     values = _part(_Structure, "system", whole.system, source)
     contacts = []
     for number, entry in enumerate(whole.contacts or [], start=1):
