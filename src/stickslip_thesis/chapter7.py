@@ -28,7 +28,7 @@ KEPT = 2  # cycles that are looked at
 HERTZ = 1.5  # power of the load of a sphere
 POWERS = {"virtual rig": 1.0, "spheres, 1.5": HERTZ, "rough surfaces, 2.5": 2.5}  # Oden and Martins: 2 to 3.3
 TOWARDS = -0.1  # m/s: the side on which the rig squeals
-LOADS, COARSE = (0.5, 40.0), 16  # N, and at how many of them the critical one is looked for
+LOADS, COARSE = (0.5, 40.0), 12  # N, and at how many of them the critical one is looked for
 LOUDEST = 0.125  # s: over what a sound level meter averages on "fast"
 CONDITIONS = (("dry", "heavy"), ("wet", "heavy"), ("dry", "light"), ("wet", "light"))
 SIGNALS = {
@@ -98,7 +98,7 @@ def _critical(given: Given) -> Iterator[Plate]:
         title="The critical load against wetness, and against the normal law",
     )
     light = ss.squeak.squeak_rig("wet", given["squeak"]["light"])
-    steep = ss.squeak.critical_value(light, "slope", between=(-8.0, 0.0), speed=TOWARDS)
+    steep = ss.squeak.critical_value(light, "slope", between=(-2.5, 0.0), speed=TOWARDS)
     yield figure(
         "mechanisms",
         plot_stability(mechanisms(), labels=("slope of the friction coefficient [s/m]", "normal load [N]")),
@@ -242,7 +242,7 @@ def mechanisms() -> Any:
     """What ends the steady sliding of the wet rig, over slope and load."""
     return ss.squeak.stability_map(
         lambda slope, load: ss.squeak.squeak_rig("wet", load).having(slope=slope),
-        grid={"slope": np.linspace(-4, 4, 17), "load": np.linspace(0.5, 15.5, 21)},
+        grid={"slope": np.linspace(-4, 4, 17), "load": np.linspace(0.5, 15.5, 16)},
         speed=TOWARDS,
     )
 
@@ -298,7 +298,7 @@ def _signals(record: ss.Record, names: tuple[str, ...]) -> Any:
 @styled
 def _thresholds(given: Given) -> Any:
     drawn, axes = panels(1, 2, height=3.0)
-    wetness, loads = np.linspace(0, 1, 9), np.linspace(0.5, 12.0, 41)
+    wetness, loads = np.linspace(0, 1, 7), np.linspace(0.5, 12.0, 24)
     for (name, power), colour in zip(POWERS.items(), (GREEN, BLUE, ORANGE), strict=True):
         critical = [critical_load(given, float(share), power) for share in wetness]
         axes[0].plot(wetness, critical, color=colour, label=name)

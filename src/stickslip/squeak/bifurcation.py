@@ -312,23 +312,24 @@ def critical_value(
         step = "turn them round" if bounds.shape == (2,) and bounds[0] > bounds[1] else "give between=(lowest, highest)"
         raise ModelError(f"between = {between}", "it is two values, the lower one first", step)
     low, high = map(float, bounds)
-    values = np.linspace(low, high, SCANNED + 1)
-    signs = np.array([excess(value) > ROUNDING for value in values])
-    changes = np.flatnonzero(signs[1:] != signs[:-1])
-    if not len(changes):
+    grows = excess(low) > ROUNDING
+    after = low
+    for value in map(float, np.linspace(low, high, SCANNED + 1)[1:]):
+        ends, after = (after, value), value
+        if (excess(value) > ROUNDING) != grows:
+            break
+    else:
         raise ModelError(
-            f"steady sliding is {'un' * int(signs[0])}stable at {SCANNED + 1} values from {low:g} to {high:g}",
+            f"steady sliding is {'un' * grows}stable at {SCANNED + 1} values from {low:g} to {high:g}",
             "a threshold lies where that changes",
             "widen between=",
         )
-    first = int(changes[0])
-    ends = float(values[first]), float(values[first + 1])
     # where nothing dies away on the stable side there is no sign to change
     signed = all(abs(excess(end)) > ROUNDING for end in ends) and excess(ends[0]) * excess(ends[1]) < 0
     value = float(brentq(excess, *ends, xtol=1e-300, rtol=FINEST)) if signed else _bisected(excess, *ends)
-    beyond = stability(at(ends[0] if signs[first] else ends[1]), speed=speed)
+    beyond = stability(at(ends[0] if grows else ends[1]), speed=speed)
     frequency = 0.0 if beyond.frequency == 0 else _marginal_frequency(sliding_matrices(at(value), speed))
-    return Threshold(value, frequency, beyond.mechanism, not signs[first])
+    return Threshold(value, frequency, beyond.mechanism, not grows)
 
 
 def stability_map(
