@@ -51,6 +51,7 @@ REFUSED = [
     ("2420 g ± 20", "stands a number with one, or per cent"),
     ("2.42 kg ± 1 % kg", "stands a number with one, or per cent"),
     ((2.42, 0.02, 0.01), "a pair is a value and its uncertainty"),
+    ("2,42 kg", "has a decimal comma"),
     ("2.42 ± 0.02 ± 0.01 kg", "is not known"),
     ("(2.42)", "not a finite number"),
 ]

@@ -247,3 +247,34 @@ def _correct(rng: np.random.Generator) -> Amplitudes:
         "stiffness": stiffness * (1 + 0.02 * rng.standard_normal()),
     }
     return Amplitudes({"x": x, "z": z}, 2 * math.pi * frequency, known, "ground", 0.01)
+
+
+def test_a_spring_in_newtons_a_millimetre_is_named_of_a_rig_that_sticks_below_its_resonance() -> None:
+    law = ss.laws.Stribeck(2.1, static=2.9, speed=0.01)
+    slider = ss.Oscillator(
+        mass=1.8, stiffness=3200, damping=0.5, law=law, drive=ss.drives.HarmonicBase(4e-3, frequency=3.0)
+    )
+    record = ss.Rig.perfect("x", "z", "a").measure(ss.simulate(slider, duration=5.0), fs=1000, rng=1, start=2.0)
+    for constants, wrong in (({"stiffness": 3.2}, "stiffness"), ({"mass": 1800.0}, "mass")):
+        findings = ss.analyze(record, **{"mass": 1.8, "stiffness": 3200.0, "damping": 0.5, **constants})
+        assert wrong in findings.contradiction
+        assert "N" not in {estimate.unit for estimate in findings.quoted}
+    assert ss.analyze(record, mass=1.8, stiffness=3200.0, damping=0.5).contradiction == ""
+
+
+def test_no_force_stands_in_the_table_where_what_it_rests_on_was_stated_wrongly() -> None:
+    path = written("t [s],x [m],z [m],a [m/s^2]", a=1 / 9.80665)
+    told = ask("analyze", path, *RIG)
+    assert "until that is mended no force is given" in " ".join(told.stdout.split())
+    assert "sliding friction" not in told.stdout
+    assert "sliding friction" in mended(told)
+
+
+def test_a_unit_that_ends_a_columns_name_is_read() -> None:
+    path = Path("data") / "run.csv"
+    seen = motion()
+    table = np.column_stack([1e3 * np.arange(len(seen)) / 1000, 1e6 * seen["x"], 1e6 * seen["z"]])
+    np.savetxt(path, table, delimiter=";", header="Zeit_ms;Weg_um;Tisch_um", comments="", fmt="%.9g")
+    told = ask("analyze", path, "--channels", "x=Weg_um", "--channels", "z=Tisch_um", *RIG)
+    assert "no unit" not in told.stdout
+    assert right(" ".join(told.stdout.split()))

@@ -206,6 +206,12 @@ def parse_value(text: str | float, expect: str) -> float:
     """
     stated = str(text).strip()
     match = re.fullmatch(rf"({_NUMBER})\s*(.*)", stated) if len(stated) <= LONGEST_VALUE else None
+    if match and re.match(r",\d", match[2]):
+        raise RecordError(
+            f"'{stated}' has a decimal comma",
+            "a number is written with a point",
+            f"write {stated.replace(',', '.', 1)}",
+        )
     value = float(match[1]) * (parse_unit(match[2], expect).scale if match[2] else 1.0) if match else math.nan
     if not math.isfinite(value):
         raise RecordError(

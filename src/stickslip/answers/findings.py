@@ -154,9 +154,13 @@ class Findings(Answers):
 
     @property
     def quoted(self) -> tuple[Estimate, ...]:
-        """The numbers that lead, without those that a result tells by other ways, too."""
-        beside = [estimate for result in self.results.values() for estimate in getattr(result, "beside", ())]
-        return tuple(estimate for estimate in self.estimates if estimate not in beside)
+        """The numbers that lead, without those that a result tells by other ways, too, and without any force where what
+        it rests on was stated wrongly."""
+        left_out = [estimate for result in self.results.values() for estimate in getattr(result, "beside", ())]
+        if self.contradiction:
+            forces = _numbers(self.results.get(key) for key in BY_FORCE)
+            left_out += [estimate for estimate in forces if estimate.name != DRIVEN]
+        return tuple(estimate for estimate in self.estimates if estimate not in left_out)
 
     @property
     def doubts(self) -> tuple[tuple[str, str], ...]:

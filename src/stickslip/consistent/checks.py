@@ -99,6 +99,7 @@ CLOSE = 30.0  # times by which the motions of mass and base differ at most where
 ELASTIC, TURNED = 87.0, 40.0  # degrees from which a slip of a constant, of the clock is looked for
 IDLE = 0.02  # of the friction: a spring that pulls less is too soft to have moved the mass
 OPPOSED = 20.0  # degrees within which the friction must be left
+BROUGHT = 45.0  # the same, of a constant: a rig that sticks for some of the cycle leaves its friction 25 behind
 LATE = 0.15  # rad by which sensors of which nothing is stated may lag one another: energy may seem to run back by it
 SWUNG, HURLED = 0.1, 300.0  # m and m/s^2: an oscillator that does more of both is read in the wrong unit
 
@@ -240,9 +241,10 @@ def _of_the_balance(balance: Amplitudes) -> Iterator[Slip]:
         return
     if not balance.knows:
         return
-    slips = list(_of_constants(balance.rig)) if balance.lag > ELASTIC and balance.idle < IDLE else []
-    slips += [_of_clock()] if balance.lag > TURNED and "a" not in balance.values else []
-    yield from (slip for slip in slips if balance.cured(slip).lag < OPPOSED)
+    idle = balance.lag > ELASTIC and balance.idle < IDLE
+    slips = [(slip, BROUGHT) for slip in _of_constants(balance.rig)] if idle else []
+    slips += [(_of_clock(), OPPOSED)] if balance.lag > TURNED and "a" not in balance.values else []
+    yield from (slip for slip, left in slips if balance.cured(slip).lag < left)
 
 
 def slip_check(balance: Amplitudes, slips: Sequence[Slip]) -> list[Check]:

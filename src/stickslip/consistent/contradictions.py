@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -259,12 +259,13 @@ def sampling_check(record: Record, seen: Seen) -> Check:
         return untold(name, "the friction never reverses")
     mean = float(sum(last - first for first, last in turning)) / turns
     rate = max(record.fs * LEAST_SAMPLES / max(mean, FEWEST), RINGS * _coupled(record["x"], force, turning, seen))
-    return compared(
+    check = compared(
         name, LEAST_SAMPLES, mean, sd=max(0.25, seen.tolerance), unit="1", bound=True,
         holds="enough to see how the friction turns round",
         fails=f"a reversal has {mean:.2g} sample{'' if mean == 1 else 's'} on the average, too few to see how the "
         f"friction turns round: sample at {_round_up(rate):.0f} Hz or more, or the contact is rigid",
     )  # fmt: skip
+    return replace(check, verdict=UNTOLD) if check.verdict == FAILS else check  # a rigid contact contradicts nothing
 
 
 def _coupled(x: Array, force: Array, turning: Sequence[tuple[int, int]], seen: Seen) -> float:

@@ -207,7 +207,7 @@ def plot_levels(comparison: Comparison, *, ax: Axes | None = None) -> Axes:
     levels = {findings.name: findings.level for findings in comparison.findings if findings.level is not None}
     ax, _, unit = named_intervals(list(levels), list(levels.values()), ax=ax)
     ax.set(xlabel=axis_label("sliding friction, 95 %", unit))
-    ax.set_xlim(left=0)
+    ax.margins(x=0.08)
     return ax
 
 

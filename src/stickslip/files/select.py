@@ -7,6 +7,7 @@ import itertools
 import re
 from collections import Counter
 from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -71,6 +72,23 @@ def is_unit(text: str) -> bool:
     except StickslipError:
         return False
     return True
+
+
+def unit_in_name(name: str, quantity: str) -> str | None:
+    """The unit that a name ends in, where it is one of the quantity: of the channels, or "s" for time.
+
+    Examples
+    --------
+    >>> unit_in_name("Weg_um", "x"), unit_in_name("Zeit_ms", "s"), unit_in_name("acc_g", "a"), unit_in_name("x_2", "x")
+    ('um', 'ms', 'g', None)
+    """
+    _, stands, unit = last_part(name).rpartition("_")
+    kinds = VOCABULARY[quantity].units if quantity in VOCABULARY else (quantity,)
+    for kind in kinds if stands and unit and len(unit) <= 20 else ():
+        with suppress(StickslipError):
+            parse_unit(unit, expect=kind)
+            return unit
+    return None
 
 
 def last_part(name: str) -> str:
@@ -214,7 +232,7 @@ class Columns:
             plain = next(iter(scales)) if weights.plain() else None
             stated = spec.unit if spec.unit is not None else self.units.get(name)
             if stated is None and plain:
-                stated = self.unit_of(plain)
+                stated = self.unit_of(plain) or unit_in_name(plain[1], name)
             wanted.append(Wanted(*self._channel(checked_name(name), spec, stated), scales, weights.offset))
         return wanted
 
@@ -314,7 +332,7 @@ class Columns:
 
     def _time_column(self, number: int, best: Column, named: Sequence[Column]) -> TimeColumn:
         twins = [column.name for column in named if re.fullmatch(re.escape(best.name) + r"_\d+", column.name)]
-        stated = self.unit_of((number, best.name))
+        stated = self.unit_of((number, best.name)) or unit_in_name(best.name, "s")
         scale = parse_unit(stated or "s", expect="s").scale
         return TimeColumn((number, best.name), scale, tuple((number, name) for name in twins), stated is None)
 
@@ -327,7 +345,7 @@ class Columns:
         column = by_name.get(spec.arithmetic.strip("`"))
         if column is None:
             return None
-        stated = spec.unit or self.unit_of((number, column.name))
+        stated = spec.unit or self.unit_of((number, column.name)) or unit_in_name(column.name, "s")
         return TimeColumn((number, column.name), parse_unit(stated or "s", expect="s").scale, assumed=stated is None)
 
     def check_units(self, channels: Iterable[str]) -> None:
@@ -355,7 +373,10 @@ def is_time(column: Column) -> bool:
 
 
 def _word(column: Column) -> str:
-    last = last_part(column.name).lower()
+    last = last_part(column.name)
+    if column.unit is None and (unit := unit_in_name(last, "s")):
+        last = last.removesuffix(f"_{unit}")
+    last = last.lower()
     return re.sub(r"(_\d+$|[^a-z])", "", last)
 
 

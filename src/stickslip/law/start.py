@@ -63,7 +63,7 @@ class Shown:
             raise RecordError(
                 f"a record of {', '.join(record)}",
                 "a law is fitted to a motion: displacement x or velocity v",
-                "give one, or integrate the acceleration first",
+                'name its column, as in channels={"x": "COLUMN [mm]"}, or integrate the acceleration first',
             )
         record.require_clean(*channels, name, question="a fitted law", samples=2 * LEAST)
         values, late = record[name], record.channels[name].delay

@@ -23,10 +23,11 @@ FAR = 6.0  # of how unsure a gain or a spring is, beyond which it is no calibrat
 
 
 class Remainder(NamedTuple):
-    """The channel of which a law leaves the largest share beyond the noise, and that share."""
+    """The channel of which a law leaves the largest share beyond the noise, that share, and times its noise."""
 
     channel: str
     share: float
+    over: float
 
     @classmethod
     def of(cls, left: Mapping[str, float], noise: Mapping[str, float], sizes: Mapping[str, float]) -> Remainder:
@@ -35,7 +36,8 @@ class Remainder(NamedTuple):
             name: math.sqrt(max(0.0, rms**2 - noise[name] ** 2)) / max(sizes[name], 1e-300)
             for name, rms in left.items()
         }
-        return cls(*max(shares.items(), key=lambda pair: pair[1]))
+        worst = max(shares, key=lambda name: shares[name])
+        return cls(worst, shares[worst], left[worst] / max(noise[worst], 1e-300))
 
     @classmethod
     def of_fit(cls, fit: LawFit) -> Remainder:
@@ -225,6 +227,9 @@ def _sentences(
 ) -> Iterator[str]:
     """The verdict, to be pasted into a report."""
     best = laws[0]
+    if len(laws) == 1:  # nothing was compared: how well it explains the records is all there is to say
+        yield f"{best.name}, the only law tried, {remainder}, {times(remainder.over)} the noise of {remainder.channel}."
+        return
     kept = [each.name for each in laws if each.kept]
     rivals = [each for each in laws if each.family != best.family and not each.limit]
     limits = [each.name for each in laws if each.limit]
@@ -240,9 +245,12 @@ def _sentences(
             larger = f"the misfit of any other family tried is at least {times(least)} as large"
             said.append(larger if least > 1 else "another family leaves no less where the records tell most")
         if limits:
-            said.append(f"{_either(limits)} would have to be so stiff that it says the same")
+            said.append(
+                f"{_either(limits)} would have to be so stiff that {'they are' if limits[1:] else 'it is'} rigid"
+            )
         told = "; ".join(said) or "no law of another family was tried"
-        lead = f"The best of those tried {remainder}. Among them the" if remainder.share > LEFT else "The"
+        fits = f"{kept[0]} fits best: the" if len(kept) == 1 else "The"
+        lead = f"The best of those tried {remainder}. Among them the" if remainder.share > LEFT else fits
         yield f"{lead} friction is {family_of(best.name).said}: {told}."
     if best.family == "rigid" and len(families) == 1 and excess_ is not None:
         low, high = excess_.interval

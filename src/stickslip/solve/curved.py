@@ -12,7 +12,7 @@ collocation is tried, to the same tolerance and with the same exits; leaps go on
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import dataclass
 from functools import lru_cache
@@ -28,13 +28,12 @@ from stickslip.solve.collocation import Model
 from stickslip.solve.march import LAPS, TIME, TRY, Dense, Shown, Steps, Work
 from stickslip.solve.refusal import Budget, chatter, held_back, named, require_numbers, unproved
 from stickslip.solve.series import expansion
-from stickslip.solve.tables import numbered
+from stickslip.solve.tables import Stops, numbered
 from stickslip.solve.tape import Tape
 from stickslip.solve.taylor import Array
 from stickslip.solve.trajectory import Trajectory
 
 March = Callable[..., tuple[int, int, int, int]]  # of clock, state and what follows in `march.march`
-Stops = Iterable[tuple[tuple[float, float], tuple[Any, Any]]]
 
 LOW, HIGH = 14, 18  # orders: few, since each is compiled, and near the best for any tolerance
 SHARE = 0.02  # of the tolerance is what a step may take: a hundred periods then stay within the tolerance
@@ -155,15 +154,13 @@ def run_curved(
     status = "complete"
     try:
         with ExitStack() as holding:
-            for until, (signals, values) in stops:
-                run.state[signals] = values
-                run.clock[TRY] = min(run.clock[TRY], run.scale)  # at rest steps would grow for ever
-                outcome = march.FULL
-                while outcome == march.FULL:
-                    if run.heed is None and run.kept:  # the first call may compile for long
-                        run.heed = holding.enter_context(held_back())
-                    outcome = run.chunk(until, follow or run.march)
-                    tell(run.share)
+            run.state[stops.places] = stops.values[0]
+            outcome = march.FULL
+            while outcome == march.FULL:
+                if run.heed is None and run.kept:  # the first call may compile for long
+                    run.heed = holding.enter_context(held_back())
+                outcome = run.chunk(stops, follow)
+                tell(run.share)
     except KeyboardInterrupt:
         if not run.kept:
             raise
@@ -185,7 +182,7 @@ class _Run:
 
     def __init__(self, table: Tape, state: Array, mode: int, *, total: float, budget: int, rtol: float) -> None:
         system, size, period, count = table.system, len(table.names), table.motion.period, table.nodes.most
-        self.table, self.mode, self.total = table, mode, total
+        self.table, self.mode, self.total, self.stop = table, mode, total, 0
         self.model = model_of(table, rtol)
         longest = period if math.isfinite(period) else 1 / system.frequency if system.frequency else total
         self.scale = min(longest, total)
@@ -209,15 +206,15 @@ class _Run:
         """Of the time that is over."""
         return 1.0 - self.ahead / self.total
 
-    def march(self, *rest: Any) -> tuple[int, int, int, int]:
-        """The march of this system."""
-        return march.march(self.model, *rest)  # type: ignore[no-any-return]
-
-    def chunk(self, until: tuple[float, float], follow: March) -> int:
+    def chunk(self, stops: Stops, follow: March | None) -> int:
         """March for so many steps at the most, keep them, and say why it ended; refuse what gets nowhere."""
         steps, before = self.room, self.clock.copy()
-        outcome, written, leapt, self.mode = follow(
-            self.clock, self.state, self.big, self.mode, until, steps, self.work
+        outcome, written, leapt, self.mode, self.stop = (
+            self._to_stop(stops, follow)
+            if follow
+            else march.course(
+                self.model, self.clock, self.state, self.big, self.mode, stops, self.stop, self.scale, steps, self.work
+            )
         )
         if written:
             steps.leaps[:written][steps.leaps[:written] >= 0] += self.leapt
@@ -232,6 +229,16 @@ class _Run:
             self._refuse(outcome, passed)
         self.events.spend(steps.ends[:written], passed=passed, state=self.state)
         return outcome
+
+    def _to_stop(self, stops: Stops, follow: March) -> tuple[int, int, int, int, int]:
+        """As :func:`stickslip.solve.march.course`, by another march, which ends at each stop."""
+        until, stop = tuple(stops.ends[self.stop]), self.stop
+        outcome, *rest = follow(self.clock, self.state, self.big, self.mode, until, self.room, self.work)
+        if outcome == march.DONE and stop + 1 < len(stops.ends):
+            outcome, stop = march.FULL, stop + 1
+            self.state[stops.places] = stops.values[stop]
+            self.clock[TRY] = min(self.clock[TRY], self.scale)
+        return outcome, *rest, stop  # type: ignore[return-value]
 
     def _refuse(self, outcome: int, passed: float) -> None:
         laps, time = self.clock[LAPS], self.clock[TIME]

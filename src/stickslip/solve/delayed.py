@@ -26,8 +26,9 @@ from stickslip.laws.base import Rigid, Row
 from stickslip.laws.curved import CurvedMode, lifted, symbol
 from stickslip.laws.time_delay import DELAYED, TimeDelay
 from stickslip.oscillator import Oscillator
-from stickslip.solve.curved import CHUNK, STEPS, CurvedTrajectory, Stops, degree, model_of, room_for, run_curved
+from stickslip.solve.curved import CHUNK, STEPS, CurvedTrajectory, degree, model_of, room_for, run_curved
 from stickslip.solve.march import DONE, DUE, LAPS, TIME, TRY, Steps, Work, march
+from stickslip.solve.tables import Stops
 from stickslip.solve.tape import Tape, tape
 from stickslip.solve.taylor import EXACT, GROWTH, Array, Index, coded, length
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from stickslip.compiled import OPTIONS, compiled
 from stickslip.solve.cells import DEGREE, SPLITTER
-from stickslip.solve.glide import Clock, glide, later, new_lap, remember, until
+from stickslip.solve.glide import Clock, Pieces, glide, later, new_lap, remember, until
 from stickslip.solve.roots import NOISE, NONE, UNSURE, first_rise, opening_order
 from stickslip.solve.tables import Array
 
@@ -367,6 +367,29 @@ def march(model, clock, state, mode, limit, past, out, work, patience):
             return CHATTER, count, came, clock
         if gone <= 0.0:
             return LOST, count, mode, clock
+
+
+@compiled(**OPTIONS)
+def course(model, clock, state, mode, stops, stop, span, past, out, work, patience):
+    """As :func:`march`, on the way to stop `stop` of several (:class:`~stickslip.solve.tables.Stops`) and to those
+    behind it, `span` [s] in all; returns also the stop that it is on its way to."""
+    done = np.int64(0)
+    while True:
+        end = Clock(stops.ends[stop, 0], stops.ends[stop, 1], 0.0)
+        rest = Pieces(
+            out.laps[done:], out.offsets[done:], out.modes[done:], out.durations[done:], out.states[done:],
+            out.exits[done:],
+        )  # fmt: skip
+        status, count, mode, clock = march(model, clock, state, mode, end, past, rest, work, patience)
+        done += count
+        if status != DONE or stop + 1 == stops.ends.shape[0]:
+            return status, done, mode, clock, stop
+        stop += 1
+        for j in range(stops.places.shape[0]):
+            state[stops.places[j]] = stops.values[stop, j]
+        came, mode = mode, begin(model.linear, mode, state, span, 1.0, work)
+        if mode < 0:
+            return CHATTER, done, came, clock, stop
 
 
 @compiled(**OPTIONS)

@@ -280,6 +280,32 @@ def march(model, clock, state, big, mode, until, steps, work):
 
 
 @compiled(**EXACT)
+def course(model, clock, state, big, mode, stops, stop, longest, steps, work):
+    """As :func:`march`, on the way to stop `stop` of several (:class:`~stickslip.solve.tables.Stops`) and to those
+    behind it; returns also the stop that it is on its way to. A Taylor step is at most `longest` [s] to begin with: at
+    rest steps would grow for ever."""
+    written, leapt = 0, 0
+    while True:
+        until = (stops.ends[stop, 0], stops.ends[stop, 1])
+        rest = Steps(
+            steps.laps[written:], steps.offsets[written:], steps.lengths[written:], steps.modes[written:],
+            steps.states[written:], steps.ends[written:], steps.leaps[written:], steps.polys[leapt:],
+            steps.reach[leapt:],
+        )  # fmt: skip
+        outcome, count, leaps, mode = march(model, clock, state, big, mode, until, rest, work)
+        for row in range(written, written + count):
+            if steps.leaps[row] >= 0:
+                steps.leaps[row] += leapt
+        written, leapt = written + count, leapt + leaps
+        if outcome != DONE or stop + 1 == stops.ends.shape[0]:
+            return outcome, written, leapt, mode, stop
+        stop += 1
+        for j in range(stops.places.shape[0]):
+            state[stops.places[j]] = stops.values[stop, j]
+        clock[TRY] = min(clock[TRY], longest)
+
+
+@compiled(**EXACT)
 def rests(model, mode, state, s):
     """Whether nothing moves."""
     series = coded(model.series)

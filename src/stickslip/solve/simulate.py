@@ -23,7 +23,7 @@ from stickslip.solve.glide import Clock, Model, Pieces, blank_past, blank_pieces
 from stickslip.solve.phasors import fast_tables
 from stickslip.solve.refusal import LISTED, Budget, chatter, held_back, named, require_numbers, unproved
 from stickslip.solve.roots import NOISE
-from stickslip.solve.tables import Array, System, Tables, is_curved
+from stickslip.solve.tables import Array, Stops, System, Tables, is_curved
 from stickslip.solve.tape import tape
 from stickslip.solve.trajectory import Trajectory
 
@@ -237,8 +237,7 @@ def run(
     march = _March(table, state, mode, total, Budget(table, scale=scale, most=budget), tell)
     try:
         with march.holding:
-            for at, (signals, values) in stops_of(table, laps, offset):
-                march.to(Clock(float(at[0]), float(at[1]), 0.0), signals, values)
+            march.through(stops_of(table, laps, offset))
     except KeyboardInterrupt:
         if tell is None or not march.pieces.count:
             raise
@@ -265,30 +264,31 @@ class _March:
         self.table, self.total, self.events, self.tell, self.holding = table, total, events, tell, ExitStack()
         self.model = Model(table.linear, fast_tables(table), table.motion.period)
         self.past, self.work = blank_past(), kernel.scratch(size)
-        self.clock, self.state, self.mode = Clock(0.0, 0.0, 0.0), state.copy(), mode
+        self.clock, self.state, self.mode, self.stop = Clock(0.0, 0.0, 0.0), state.copy(), mode, 0
         tonal = len(table.tones) == 1 and size == table.physical + 3
         self.pieces = _Log(table.physical if tonal else size, CHUNK)
         self.patience = max(1, CELLS // max(1, size // SMALL) ** 2)
         self.heed: Callable[[], None] | None = None
 
-    def to(self, goal: Clock, signals: list[int], values: Array | list[float]) -> None:
-        """March to a stop; the signals take their new values before."""
-        self.state[signals] = values
+    def through(self, stops: Stops) -> None:
+        """March to the last stop."""
+        self.state[stops.places] = stops.values[0]
         came, self.mode = self.mode, kernel.begin(self.model.linear, self.mode, self.state, self.total, 1.0, self.work)
         _refuse(kernel.CHATTER if self.mode < 0 else kernel.DONE, self.table, self.state, came, self.clock)
-        while self._chunk(goal) == kernel.FULL:
+        while self._chunk(stops) == kernel.FULL:
             pass
 
-    def _chunk(self, goal: Clock) -> int:
-        """March until the room is full, patience ends, or the goal is reached."""
+    def _chunk(self, stops: Stops) -> int:
+        """March until the room is full, patience ends, or the last stop is reached."""
         # numba makes the Clock that it hands back by calling Python, and dies of a Ctrl-C that comes just
         # then; the first call may compile for long, and is left to it
-        if self.heed is None and getattr(kernel.march, "overloads", True):
+        if self.heed is None and getattr(kernel.course, "overloads", True):
             self.heed = self.holding.enter_context(held_back())
         before, room = self.clock, self.pieces.room()
-        outcome, count, self.mode, self.clock = kernel.march(
-            self.model, before, self.state, self.mode, goal, self.past, room, self.work, self.patience
-        )
+        outcome, count, self.mode, self.clock, self.stop = kernel.course(
+            self.model, before, self.state, self.mode, stops, self.stop, self.total, self.past, room, self.work,
+            self.patience,
+        )  # fmt: skip
         if self.heed is not None:
             self.heed()
         passed = until(before, self.clock, self.table.motion.period)
@@ -333,8 +333,8 @@ class _Log:
         return self.columns.part(0, self.count)
 
 
-def stops_of(table: Tables | Tape, laps: float, offset: float) -> Any:
-    """The times to which the march goes in turn, with the signals that take new values at each start."""
+def stops_of(table: Tables | Tape, laps: float, offset: float) -> Stops:
+    """The instants to which the march goes in turn: the knots of the drive, and the end."""
     knots, end = table.motion.knots, table.motion.end
     if offset > end * (1 + 1e-12):
         raise ModelError(
@@ -343,13 +343,11 @@ def stops_of(table: Tables | Tape, laps: float, offset: float) -> Any:
             f"simulate {end:g} s at most, or record longer",
         )
     if knots is None:
-        yield (laps, offset), ([], [])
-        return
+        return Stops(np.array([[laps, offset]], dtype=float), np.array([], dtype=np.int64), np.zeros((1, 0)))
     places = [table.names.index(name) for name in table.motion.knotted]
-    ends = np.append(knots[1:, 0], np.inf)
-    for row, end in zip(knots, ends, strict=True):
-        if row[0] < offset:
-            yield (0.0, min(end, offset)), (places, row[1:])
+    begun = knots[knots[:, 0] < offset]
+    ends = np.append(begun[1:, 0], offset)
+    return Stops(np.column_stack([np.zeros(len(ends)), ends]), np.array(places, dtype=np.int64), begun[:, 1:].copy())
 
 
 def _at_rest(table: Tables, state: Array, mode: int) -> bool:

@@ -68,6 +68,15 @@ class JointMode(Mode):
                 yield contact, old, new
 
 
+class Stops(NamedTuple):
+    """Instants (K, 2), in laps and seconds, to which a march goes in turn, and the entries of the state (P,) that take
+    new values (K, P) as each begins to be gone to."""
+
+    ends: Array
+    places: NDArray[np.int64]
+    values: Array
+
+
 class Joint(NamedTuple):
     """Number of each contact's mode; contact and number (within its mode) of each exit, and the joint mode behind."""
 

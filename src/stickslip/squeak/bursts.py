@@ -414,7 +414,8 @@ def _unlike_a_contact(bursts: list[Squeak], claimed: list[Squeak]) -> str:
         return f"it goes on for more than {GOES_ON:g} s, as a drive or a whistle does"
     if 2 * len(claimed) <= len(tones):
         return "most of its tones lack what those of a rubbing contact have"
-    gaps = np.diff([tone.start for tone in tones])
+    # one that the record begins in began sooner, which is no interval
+    gaps = np.diff([tone.start for tone in tones if tone.start > EVENLY])
     if len(gaps) > 1 and np.ptp(gaps) < EVENLY:
         return "its bursts come at even intervals, as those of a signal do"
     return ""

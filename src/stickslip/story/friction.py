@@ -91,9 +91,12 @@ def _exact(findings: Findings) -> Iterator[str]:
 
 def _taken_exact(findings: Findings) -> bool:
     """Whether a trial took constants and gains as exact, as nobody stated how sure they are."""
-    record = findings.record
-    stated = bool(record.rig and record.rig.sd) or any(channel.gain_sd for channel in record.channels.values())
-    return findings.trial is not None and not stated
+    return findings.trial is not None and not _uncertain(findings.record)
+
+
+def _uncertain(record: Any) -> bool:
+    """Whether it is stated how sure a constant or a gain is."""
+    return bool(record.rig and record.rig.sd) or any(channel.gain_sd for channel in record.channels.values())
 
 
 def _remedy(findings: Findings) -> str:
@@ -188,6 +191,8 @@ def _of_level(findings: Findings) -> str:
     how = (
         ", not tried on twins" if findings.untried else ", with your constants exact" if _taken_exact(findings) else ""
     )
+    if findings.untried and _uncertain(findings.record):
+        how += ", which would count how sure your constants are"
     sure = f"95 %{how}"
     return f"the contact slides against {value_of(level)} of friction ({sure}: {interval_of(level)}){doubt}"
 
@@ -203,6 +208,11 @@ def _of_loops(findings: Findings) -> Iterator[str]:
             f"{value_of(findings.coefficient)}."
         )
     yield from _of_directions(loops.forward, loops.back)
+    falls = findings.trial is not None and math.isfinite(findings.trial.belief.fall_speed)
+    if falls:
+        belief = findings.trial.belief
+        static, speed = value_of(loops.level, belief.static), number(belief.fall_speed, 0.1 * belief.fall_speed, "m/s")
+        yield f"Friction falls from {static} at rest as it begins to slide, about a speed of {speed}."
     low, high = loops.slope.interval
     if loops.slope.status != "ok":
         return
@@ -211,7 +221,7 @@ def _of_loops(findings: Findings) -> Iterator[str]:
     elif math.isfinite(low + high):
         power = findings.trial and findings.trial.felt.get(loops.slope.name)
         seen = f": {value_of(loops.slope, power.felt)} would be" if power else ""
-        yield f"No change of friction with speed is resolved{seen}."
+        yield f"No {'other ' if falls else ''}change of friction with speed is resolved{seen}."
 
 
 def _of_sticks(findings: Findings) -> str:
@@ -231,7 +241,11 @@ def _of_sticks(findings: Findings) -> str:
     if sticks.share.value < RARELY:
         return "it hardly ever sticks"
     often = sticks.per_cycle.value
-    stops = f", with {often:.2g} stops in each cycle" if math.isfinite(often) and often > 0 else ""
+    stops = (
+        f", with {often:.2g} stop{'' if often == 1 else 's'} in each cycle"
+        if math.isfinite(often) and often > 0
+        else ""
+    )
     low, high = sticks.share.interval
     share = interval_of(sticks.share) if high - low > 0.01 else value_of(sticks.share)
     return f"it {'sticks' if stands(sticks.share.status) else 'seems to stick'} {share} of the time{stops}"

@@ -105,7 +105,7 @@ class Caution(str):
 def cautions(findings: Findings, said: Iterable[Estimate] = ()) -> list[Caution]:
     """What should keep the reader from trusting a number, but what the headline has `said` of those without a value."""
     untold = {estimate.name for estimate in said if not estimate.known}
-    statuses = [(estimate.name, estimate.status) for estimate in findings.estimates if estimate.name not in untold]
+    statuses = [(estimate.name, estimate.status) for estimate in findings.quoted if estimate.name not in untold]
     return [*flags([*statuses, *findings.doubts]), *faulty(findings.faults)]
 
 

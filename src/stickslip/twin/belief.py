@@ -153,6 +153,11 @@ class Belief:
         return -self.slope * self.sliding_speed > FALL * self.kinetic
 
     @property
+    def fall_speed(self) -> float:
+        """The speed about which friction falls from its static level to its sliding one [m/s]; NaN where none does."""
+        return math.exp(self.values[SPEED]) if SPEED in self.values else math.nan
+
+    @property
     def static(self) -> float:
         """Friction that the contact bears before it slides [N]."""
         return self.values.get(KINETIC, 0.0) + self.values.get(EXCESS, 0.0)
