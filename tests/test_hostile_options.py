@@ -50,6 +50,7 @@ CALLS: dict[str, list[str]] = {
     "stability": ["slider.toml", "--json"],
     "sweep": ["grid.toml", "--json"],
     "thesis": ["6"],
+    "tribometer": ["x.csv", "--json"],
     "wavelet": ["x.csv", "--json"],
 }
 MEANT = {("stability", "--speed"): {"-1"}}  # a face may run either way

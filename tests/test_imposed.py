@@ -56,8 +56,10 @@ def test_dahl_s_loop_under_an_imposed_motion_is_its_closed_form() -> None:
     assert np.trapezoid(friction, x) == pytest.approx(4 * level * (reach - full / stiffness), rel=1e-6)
 
 
-def test_a_curved_chain_under_an_imposed_motion_is_that_under_a_heavy_mass() -> None:
-    law = ss.laws.InSeries(ss.laws.Dahl(1.1, stiffness=5e5), stiffness=1e5, damping=50.0)
+@pytest.mark.parametrize("law", [ss.laws.Dahl(1.1, stiffness=5e5), ss.laws.StateVariable(1.1, rate=300.0)])
+def test_memory_behind_a_spring_is_that_on_a_moving_face_under_a_heavy_mass(law: Any) -> None:
+    """What remembers the friction's rate counts that the slider rides on the counter-face."""
+    law = ss.laws.InSeries(law, stiffness=1e5, damping=50.0)
     moved = ss.Oscillator(mass=HEAVY, stiffness=0, law=law, drive=ss.drives.MultiTone([(-2e-5, 2.5, 0.0)], on="face"))
     times = np.linspace(0.4, 1.2, 501)
     both = [

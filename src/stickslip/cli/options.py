@@ -14,6 +14,14 @@ if TYPE_CHECKING:
     from stickslip.systems import Case
 
 
+def number_of(text: str, si: str, option: str) -> float:
+    """A number in SI, or with its unit; what is none is refused by the name of its option."""
+    try:
+        return float(ss.Estimate.stated(option.lstrip("-"), text, si))
+    except ss.StickslipError as error:
+        raise click.BadParameter(f"{error.value}; {error.rule}", param_hint=option) from error
+
+
 def pair(text: str, option: str) -> tuple[str, str]:
     name, separator, value = text.partition("=")
     if not separator or not name.strip() or not value.strip():

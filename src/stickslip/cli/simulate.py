@@ -18,6 +18,7 @@ from stickslip.cli.options import (
     changes_option,
     folder_name,
     form_option,
+    number_of,
     result_options,
     usable,
     wanted_case,
@@ -171,7 +172,7 @@ def stability(
     stickslip stability "SQUEAK wet 6.13 N" --speed "20 mm/s"
     """
     wanted = _case(case, changes)
-    fast = None if speed is None else _number(speed, "m/s", "--speed")
+    fast = None if speed is None else number_of(speed, "m/s", "--speed")
     _answer(wanted, "stability", lambda: ss.stability(wanted.system, speed=fast), output, as_json, everything)
 
 
@@ -249,7 +250,7 @@ def dither(case: str, output: Path | None, as_json: bool, everything: bool, **op
     system = wanted.system
     if not isinstance(system, ss.Oscillator):
         raise click.BadParameter("dither is found for a single mass; give an oscillator", param_hint="CASE")
-    tones = [_number(frequency, "Hz", "--frequency") for frequency in options["frequencies"]] or None
+    tones = [number_of(frequency, "Hz", "--frequency") for frequency in options["frequencies"]] or None
     chosen = {key: options[key] for key in ("on", "cycles", "precision")}
     _answer(
         wanted, "dither", lambda: ss.dither(system, frequency=tones, start=wanted.start or None, **chosen),
@@ -259,14 +260,6 @@ def dither(case: str, output: Path | None, as_json: bool, everything: bool, **op
 
 def _case(name: str, changes: Sequence[str]) -> Case:
     return wanted_case(name, duration=None, cycles=None, changes=changes)
-
-
-def _number(text: str, si: str, option: str) -> float:
-    """A number in SI, or with its unit."""
-    try:
-        return float(ss.Estimate.stated(option.lstrip("-"), text, si))
-    except ss.StickslipError as error:
-        raise click.BadParameter(f"{error.value}; {error.rule}", param_hint=option) from error
 
 
 def _answer(

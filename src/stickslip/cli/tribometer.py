@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 import stickslip as ss
-from stickslip.cli.options import normal_option, reading_options, result_options
+from stickslip.cli.options import normal_option, number_of, reading_options, result_options
 from stickslip.cli.records import (
     answers,
     default_folder,
@@ -50,13 +50,14 @@ def tribometer(
     stickslip tribometer test.csv --channels "x=stroke [mm]" --channels "friction=Ft [N]" --normal 10
     stickslip tribometer "test_*.csv" --channels "friction=Ft [N]" --channels "normal=Fn [N]"
     """
+    strokes = None if frequency is None else number_of(frequency, "Hz", "--frequency")
     rig = rig_of(**options)
     groups = [group for argument in files for group in groups_of(argument)]
     require_fits(options["normal"], groups)
     folder = output or (None if as_json else default_folder(groups, "tribometer"))
 
     def ask(record: Record) -> Findings:
-        return ss.answers.analyze_tribometer(record, frequency=frequency, rig=rig)
+        return ss.answers.analyze_tribometer(record, frequency=strokes, rig=rig)
 
     with progress(2 * len(groups) + 1) as tell:
         found, refused = answers(groups, rig, ask, tell)

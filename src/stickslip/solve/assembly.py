@@ -216,12 +216,15 @@ class _Builder:
                 friction[:, c] = (self.forms[c].modes[numbers[c]][:, :1] @ known[c])[:, 0]
                 force -= contact.tangent[:, None] * friction[:, None, c]
         flow[:, :n], flow[:, n : 2 * n], friction[:, held] = self._moving(force, parts, held)
+        rates = [self.forms[c].modes[numbers[c]][:, 1 : 1 + len(own)] for c, own in enumerate(self.memory)]
+        follows = any(rate[:, :, [FRICTION_RATE, LOAD_RATE]].any() for rate in rates)
         for c, own in enumerate(known):
             own[:, FRICTION] = friction[:, c]
-            own[:, FRICTION_RATE], own[:, LOAD_RATE] = (_through(own[:, k], flow) for k in (FRICTION, 2))
-            rates = self.forms[c].modes[numbers[c]][:, 1 : 1 + len(self.memory[c])]
-            flow[:, self.memory[c].start : self.memory[c].stop] = rates @ own
-        for own in known:  # anew, with the memory that moves
+        for _ in range(1 + follows):  # memory that follows a force's rate, anew with the other memory that moves
+            for c, own in enumerate(known):
+                own[:, FRICTION_RATE], own[:, LOAD_RATE] = (_through(own[:, k], flow) for k in (FRICTION, 2))
+                flow[:, self.memory[c].start : self.memory[c].stop] = rates[c] @ own
+        for own in known:
             own[:, FRICTION_RATE], own[:, LOAD_RATE] = (_through(own[:, k], flow) for k in (FRICTION, 2))
         return flow, friction, known
 
