@@ -370,10 +370,11 @@ def march(model, clock, state, mode, limit, past, out, work, patience):
 
 
 @compiled(**OPTIONS)
-def course(model, clock, state, mode, stops, stop, span, past, out, work, patience):
+def course(model, clock, state, mode, stops, stop, past, out, work, patience):
     """As :func:`march`, on the way to stop `stop` of several (:class:`~stickslip.solve.tables.Stops`) and to those
-    behind it, `span` [s] in all; returns also the stop that it is on its way to."""
+    behind it; returns also the stop that it is on its way to."""
     done = np.int64(0)
+    last = Clock(stops.ends[-1, 0], stops.ends[-1, 1], 0.0)
     while True:
         end = Clock(stops.ends[stop, 0], stops.ends[stop, 1], 0.0)
         rest = Pieces(
@@ -387,7 +388,7 @@ def course(model, clock, state, mode, stops, stop, span, past, out, work, patien
         stop += 1
         for j in range(stops.places.shape[0]):
             state[stops.places[j]] = stops.values[stop, j]
-        came, mode = mode, begin(model.linear, mode, state, span, 1.0, work)
+        came, mode = mode, begin(model.linear, mode, state, until(clock, last, model.period), 1.0, work)
         if mode < 0:
             return CHATTER, done, came, clock, stop
 

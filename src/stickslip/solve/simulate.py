@@ -286,9 +286,8 @@ class _March:
             self.heed = self.holding.enter_context(held_back())
         before, room = self.clock, self.pieces.room()
         outcome, count, self.mode, self.clock, self.stop = kernel.course(
-            self.model, before, self.state, self.mode, stops, self.stop, self.total, self.past, room, self.work,
-            self.patience,
-        )  # fmt: skip
+            self.model, before, self.state, self.mode, stops, self.stop, self.past, room, self.work, self.patience
+        )
         if self.heed is not None:
             self.heed()
         passed = until(before, self.clock, self.table.motion.period)
