@@ -100,7 +100,8 @@ def test_the_best_law_says_what_it_leaves() -> None:
     share = found.best.left["x"] / float(np.std(found.fit.traces[0].measured["x"]))
     assert 0.05 < share < 0.3
     assert found.best.standing.verdict == f"best of those tried, leaves {share:.0%} of x"
-    assert found.verdict.startswith(f"The best of those tried leaves {share:.0%} of x. Among them the friction is")
+    assert found.verdict.startswith(f"Coulomb, the only law tried, leaves {share:.0%} of x, ")
+    assert "Confidence" not in found.verdict
 
 
 def test_a_damper_that_is_understated_makes_no_other_law() -> None:

@@ -338,6 +338,8 @@ def _fill(row: Complex, blocks: _Blocks, phases: int, width: float, centre: floa
         min(math.floor(middle + reach * width), blocks.length // 2) + 1,
     )
     window = (gain / phases * np.exp(-0.5 * ((bins - middle) / width) ** 2)).astype(row.real.dtype)
+    if 2 * bins[-1] == blocks.length:
+        window[-1] /= 2  # half of it is the same frequency's, turning back
     parts, inner = _folded(window, int(bins[0]), turns * short // TILE, short), short - 2 * margin
     around = row if phases == 1 else np.empty(LEAD + len(blocks.spectra) * inner + TAIL, dtype=row.dtype)
     laid = row if phases == 1 else around[LEAD:-TAIL]

@@ -18,6 +18,7 @@ from stickslip.estimate import Estimate, Result, stands
 from stickslip.figures.bench import plot_calibrations, plot_plan, plot_response
 from stickslip.figures.plate import Plate, plate
 from stickslip.files.write import require_form, write_record
+from stickslip.laws.guessing import family_of
 from stickslip.record.record import Record
 from stickslip.story.findings import of_comparison, of_findings, plain
 from stickslip.story.fit import of_laws
@@ -221,7 +222,9 @@ def _abstract(tour: Tour) -> list[str]:
     constants = known.require_constants()
     contact = _of(tour.laws.estimates, "contact stiffness")
     level = _of(tour.laws.estimates, "sliding friction")
-    first = tour.laws.verdict.partition(":")[0].partition(". ")[0].rstrip(".")
+    first = "None of the laws tried describes the friction"
+    if tour.laws.family is not None:
+        first = f"The friction is {family_of(tour.laws.candidates[0].name).said}"
     sentences = [
         f"{first}"
         + (f": it slides at {value_of(level)}" if level else "")
