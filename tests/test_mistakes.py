@@ -278,3 +278,11 @@ def test_a_unit_that_ends_a_columns_name_is_read() -> None:
     told = ask("analyze", path, "--channels", "x=Weg_um", "--channels", "z=Tisch_um", *RIG)
     assert "no unit" not in told.stdout
     assert right(" ".join(told.stdout.split()))
+
+
+def test_a_mass_that_friction_carries_on_a_shaken_table_is_stated_rightly() -> None:
+    slider = ss.Oscillator(
+        mass=1.0, stiffness=4.0, law=ss.laws.Coulomb(1.5), drive=ss.drives.HarmonicBase(4e-3, 5.0, contact="base")
+    )
+    record = ss.Rig.perfect("x", "z").measure(ss.simulate(slider, duration=6.0), fs=1000, rng=1, start=3.0)
+    assert ss.analyze(record, mass=1.0, stiffness=4.0, contact="base").contradiction == ""

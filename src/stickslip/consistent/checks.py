@@ -146,6 +146,7 @@ class Amplitudes:
     rig: Mapping[str, float]
     damper: str
     tolerance: float
+    contact: str = "ground"
 
     @property
     def knows(self) -> bool:
@@ -239,7 +240,7 @@ def _of_the_balance(balance: Amplitudes) -> Iterator[Slip]:
     if x > SWUNG and balance.angular**2 * x > HURLED and balance.of_one_size and "a" not in balance.values:
         yield _in_unit(("x", "z"), "mm", 1e-3)
         return
-    if not balance.knows:
+    if not balance.knows or balance.contact == "base":  # a face that moves may drive the mass by friction alone
         return
     idle = balance.lag > ELASTIC and balance.idle < IDLE
     slips = [(slip, BROUGHT) for slip in _of_constants(balance.rig)] if idle else []

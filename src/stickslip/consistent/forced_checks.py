@@ -42,6 +42,7 @@ class Seen:
     at: int
     trips: float  # work of the load cell's force over the record, in its largest force times the stroke
     channels_told: Mapping[str, Channel]
+    contact: str
 
     @classmethod
     def of(cls, record: Record, names: list[str], rig: Mapping[str, Any], tolerance: float, question: str) -> Seen:
@@ -58,7 +59,8 @@ class Seen:
             w = 2 * np.pi * lines.frequency
             made["load"] = made["load"] - channels["load"].inertia * made.get("a", -(w**2) * made["x"])
         at = 0 if lines.cycles is not None else int(np.argmax(np.abs(made["x"]).mean(axis=0) * lines.frequency))
-        return cls(lines, made, known, str(rig.get("damper", "ground")), tolerance, at, _trips(record), channels)
+        return cls(lines, made, known, str(rig.get("damper", "ground")), tolerance, at, _trips(record), channels,
+                   str(contact or "ground"))  # fmt: skip
 
     @property
     def angular(self) -> float:
@@ -113,7 +115,7 @@ class Seen:
         values = {
             name: complex(read[:, self.at].mean()) for name, read in self.lines.amplitudes.items() if name not in RATES
         }
-        return Amplitudes(values, self.angular, self.rig, self.damper, self.tolerance)
+        return Amplitudes(values, self.angular, self.rig, self.damper, self.tolerance, self.contact)
 
 
 def _rates(x: Array, fs: float) -> tuple[Array, Array]:
