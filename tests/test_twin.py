@@ -133,6 +133,8 @@ def test_stuck_time_is_counted_without_the_bias_of_a_threshold() -> None:
     quick, tried = asked(STOPS)
     true = tried.record.truth["stuck share of the time"]
     assert abs(tried.sticks.share.value - true) < 0.02 * true < abs(quick.sticks.share.value - true)
+    captions = {plate.name: plate.caption for plate in ss.summary(tried).plates}
+    assert "not yet corrected by twins" in captions["record"]  # the grey is the quick one's, beside a corrected share
 
 
 def test_a_contact_that_gives_way_is_found_with_its_stiffness() -> None:
