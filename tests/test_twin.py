@@ -257,6 +257,21 @@ def test_a_contact_of_another_kind_is_unlike_its_twins() -> None:
     assert not any(stands(e.status) for e in tried.loops.estimates if e.name != "forcing frequency")
 
 
+def test_a_force_that_drives_the_mass_is_written_by_its_twins_too() -> None:
+    # twins without it answered nothing of the loops, and the quick answers stood untried
+    record = stepped.record(STOPS, np.random.default_rng(11))
+    pushed = ss.Record.of({"x": record["x"], "force": STOPS.stiffness * record["z"]}, fs=record.fs, truth=record.truth)
+    quick = ss.analyze(pushed, **STOPS.stated)
+    assert quick.regression is None
+    assert any(note.startswith("Regression: a mass on a spring") for note in quick.notes)
+    tried = ss.tried(quick, twins=8)
+    assert not tried.trial.unlike
+    for name in ("sliding friction", "sliding friction forward", "energy per cycle"):
+        answer = estimate(tried, name)
+        assert stands(answer.status), str(answer)
+        assert answer.value == pytest.approx(record.truth.get(name, STOPS.kinetic), rel=0.01)
+
+
 def test_the_same_seed_gives_the_same_answers() -> None:
     quick, _ = asked(SLIDES)
     first, again, other = (ss.tried(quick, twins=8, rng=seed) for seed in (3, 3, 4))
