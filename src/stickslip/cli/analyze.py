@@ -129,8 +129,8 @@ def _sure(
     from concurrent.futures import ThreadPoolExecutor
 
     with ThreadPoolExecutor(1) as beside:  # drawn here, while other processes look for the twins
-        first = partial(ss.publish, together(all_findings), folder=folder, figures=False, **context)
-        quick = beside.submit(first) if folder is not None else None
+        first = folder and partial(ss.publish, together(all_findings), folder=folder, figures=False, **context)
+        quick = beside.submit(first) if first else None
         try:
             results = together([_tried(findings, twins, tell) for findings in all_findings])
             tell("drawing and writing")
