@@ -11,7 +11,7 @@ import click
 import stickslip as ss
 from stickslip.cli.options import reading_options, result_options
 from stickslip.cli.records import answers, default_folder, groups_of, name_left_out, read, rig_of, with_left_out
-from stickslip.cli.show import show
+from stickslip.cli.show import publish, show
 from stickslip.cli.terminal import progress
 
 if TYPE_CHECKING:
@@ -78,6 +78,6 @@ def joint(
         results = ss.answers.compare_joints(logs, **asked) if len(logs) > 1 else logs[0]
         results = with_left_out(results, refused)
         tell("drawing and writing", 2 * len(groups))
-        written = ss.publish(results, folder=folder) if folder else None
+        written = publish(results, folder)
     name_left_out(refused)
     show(results, written, as_json=as_json, everything=everything)

@@ -13,7 +13,7 @@ import stickslip as ss
 from stickslip.cli.options import together
 from stickslip.cli.records import answers as answers_of
 from stickslip.cli.records import checksum, name_left_out, names_of, read, with_left_out
-from stickslip.cli.show import show
+from stickslip.cli.show import publish, show
 from stickslip.cli.terminal import progress
 
 if TYPE_CHECKING:
@@ -116,7 +116,7 @@ def answer_many(
     """Ask all records, write what was found into `folder` (not of JSON alone), show it, forget what was kept of it."""
     with progress(len(groups)) as tell:
         batch = ask_many(question, groups, rig, query, places, folder=folder, tell=tell)
-    written = ss.publish(batch, folder=folder) if output or not shown["as_json"] else None
+    written = publish(batch, folder if output or not shown["as_json"] else None)
     if places.table is not None:
         ss.story.write_table(batch, places.table)
     _kept(folder).unlink(missing_ok=True)
@@ -143,7 +143,7 @@ def answer_all(
         findings, refused = answers_of(groups, rig, lambda record: ASK[question](record, rig, **query), tell)
         tell("drawing and writing", 2 * len(groups))
         results = with_left_out(compare(findings) if len(findings) > 1 else findings[0], refused)
-        written = ss.publish(results, folder=folder) if output or not shown["as_json"] else None
+        written = publish(results, folder if output or not shown["as_json"] else None)
     name_left_out(refused)
     show(results, written, **shown)
 

@@ -18,7 +18,7 @@ from stickslip.cli.records import (
     rig_of,
     with_left_out,
 )
-from stickslip.cli.show import show
+from stickslip.cli.show import publish, show
 from stickslip.cli.terminal import progress
 
 if TYPE_CHECKING:
@@ -63,6 +63,6 @@ def tribometer(
         found, refused = answers(groups, rig, ask, tell)
         results = with_left_out(ss.answers.compare_tribometers(found) if len(found) > 1 else found[0], refused)
         tell("drawing and writing", 2 * len(groups))
-        written = ss.publish(results, folder=folder) if folder else None
+        written = publish(results, folder)
     name_left_out(refused)
     show(results, written, as_json=as_json, everything=everything)
