@@ -130,8 +130,9 @@ def predict(
 
     LAW is the folder that stickslip fit wrote, its law/law.toml, or a file of a system as stickslip simulate reads it.
     FILES are records that the law was not fitted to, read by the columns of the one that it was unless stated: the
-    base's motion z or the applied force drives the simulation as it was recorded, and the sensors read it as --config states them. Nothing is fitted to a record but how its motion
-    begins and each sensor's zero. Several records are a table, one row a file.
+    base's motion z or the applied force drives the simulation as it was recorded, and the sensors read it as --config
+    states them. Nothing is fitted to a record but how its motion begins and each sensor's zero. Several records are a
+    table, one row a file.
 
     Told is of each channel 100 (1 - |y - yhat| / |y - mean y|) %, the fit of system identification.
 
