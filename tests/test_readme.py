@@ -52,7 +52,8 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_the_readme_has_what_it_promises() -> None:
-    assert {"make demo", "make test"} <= {line.partition("#")[0].strip() for block in blocks(README, "sh") for line in lines(block)}
+    typed = {line.partition("#")[0].strip() for block in blocks(README, "sh") for line in lines(block)}
+    assert {"make demo", "make test"} <= typed
     pictures = re.findall(r"!\[[^\]]+\]\(([^)]+)\)", README)
     assert len(pictures) == 1
     assert (ROOT / pictures[0]).is_file()
