@@ -11,7 +11,7 @@ from typing import Any
 from stickslip.balance.impact import ImpactTest
 from stickslip.balance.mounts import ACCELEROMETER, CELL, Resonance
 from stickslip.bench.calibration import Calibration, SpringByWeights
-from stickslip.bench.free import FreeVibration, MassAndSpring, OntoStick, added_mass, best_constants
+from stickslip.bench.free import FreeVibration, MassAndSpring, OntoStick, added_mass, best_constants, damper_of
 from stickslip.bench.response import ModalFit
 from stickslip.bench.rest import AtRest, DischargeTest
 from stickslip.errors import EstimateError
@@ -142,19 +142,7 @@ class Known:
     def damping(self) -> Estimate | None:
         """Of the suspension [N s/m], by the damping ratio of the free vibration."""
         free, known = self.of("free", FreeVibration), self.constants
-        if free is None or known is None:
-            return None
-        factor = 2 * math.sqrt(known.mass.value * known.stiffness.value)
-        ratio = free.damping_ratio
-        part = math.hypot(known.mass.sd / known.mass.value, known.stiffness.sd / known.stiffness.value) / 2
-        sd = factor * math.hypot(ratio.spread, ratio.value * part)
-        return Estimate.normal(
-            "damping of the suspension",
-            factor * ratio.value,
-            sd=sd,
-            unit="N s/m",
-            method="damping ratio times 2 sqrt(k m)",
-        ).within(0.0)
+        return None if free is None or known is None else damper_of(free.damping_ratio, known)
 
     # ---- rig.toml
 
