@@ -188,6 +188,17 @@ def test_modal_fit_finds_a_force_driven_oscillator(damping: float) -> None:
     assert found.status == "ok"
 
 
+def test_white_noise_serves_once_the_sensor_s_own_is_stated() -> None:
+    force = np.random.default_rng(2).standard_normal(12_002)
+    drive = ss.drives.Recorded(force, 200.0, on="force")
+    slider = ss.Oscillator(mass=2.42, stiffness=2310, damping=3.0, law=ss.laws.Coulomb(0.0), drive=drive)
+    record = ss.Rig.perfect("x", "force").measure(ss.simulate(slider, duration=60.0), fs=200)
+    with pytest.raises(ss.errors.EstimateError, match=r"state the sensor's own: with_details\('force', noise=\)"):
+        bench.modal_fit(record, channels=("force", "x"))
+    found = bench.modal_fit(record.with_details("force", noise=1e-3), channels=("force", "x"))
+    assert found.damping.value == pytest.approx(3.0, rel=1e-3)
+
+
 def test_modal_fit_of_a_base_needs_a_mass_and_finds_delays_and_gains() -> None:
     record = _driven("base", 3.0)
     assert bench.modal_fit(record).mass is None
