@@ -242,6 +242,10 @@ class Estimate:
         """Whether the 95 % interval holds `value`."""
         return self.interval[0] <= value <= self.interval[1]
 
+    def doubted(self, status: str) -> Estimate:
+        """The same with this status, where it has none of its own yet."""
+        return replace(self, status=status) if self.status == "ok" else self
+
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON; what is not finite becomes ``None``."""
         return dict(plain(vars(self)))

@@ -138,8 +138,8 @@ def samples_of(
     A coefficient of friction is turned into a force where the load `normal` [N] is known.
     """
     if isinstance(data, Loops):
-        asked = {"contact": contact, "frequency": frequency, "normal": normal}
-        if given := [f"{name}=" for name, value in asked.items() if value is not None]:
+        query = {"contact": contact, "frequency": frequency, "normal": normal}
+        if given := [f"{name}=" for name, value in query.items() if value is not None]:
             raise EstimateError(
                 f"{' and '.join(given)} of friction_loops' answer",
                 "its mean cycle holds a force over a known motion",

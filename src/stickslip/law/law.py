@@ -135,7 +135,7 @@ class LawFit(Result):
             "misfit": dict(self.misfit),
             "status": self.status,
             "checks": list(self.checks),
-            "estimates": [each.to_dict() for each in self.estimates],
+            "estimates": [estimate.to_dict() for estimate in self.estimates],
         }
 
 
@@ -221,16 +221,16 @@ def fit_law(
         raise ModelError(f"surface = '{surface}'", "a surface is 'even' or 'rough'", "choose one, or leave it out")
     tell = _teller(progress)
     names = free_names(oscillator, free)
-    shown = [Shown.of(each, channels_of(each, channels), oscillator) for each in records]
+    shown = [Shown.of(one, channels_of(one, channels), oscillator) for one in records]
     if nuisance is None:
         nuisance = usual_nuisance(oscillator, names, shown) if names else ()
     require_apart(oscillator, names, nuisance, shown)
     stretches = []
-    for number, each in enumerate(shown):
-        each.require_sliding()
-        rows = each.slides()
-        stretches.append(each.stretch(number, (int(rows[0]), len(each.record) - 1)))
-    fastest = max(each.fastest for each in shown)
+    for number, motion in enumerate(shown):
+        motion.require_sliding()
+        rows = motion.slides()
+        stretches.append(motion.stretch(number, (int(rows[0]), len(motion.record) - 1)))
+    fastest = max(motion.fastest for motion in shown)
     oscillator, profile = better_start(oscillator, names, shown), None
     if names:
         dampers = [oscillator.damping, *([seen_damping(oscillator, shown).damping] if "damping" in nuisance else [])]
@@ -319,8 +319,8 @@ def answered(problem: Problem, point: Point, sure: Surety | None, shown: Sequenc
 
 def _between(problem: Problem, sure: Surety | None) -> Array:
     """Correlations of what is reported."""
-    told = [k for k, knob in enumerate(problem.knobs) if knob.kind != "profile"]
-    return sure.correlations[np.ix_(told, told)] if sure else np.eye(len(told))
+    kept = [k for k, knob in enumerate(problem.knobs) if knob.kind != "profile"]
+    return sure.correlations[np.ix_(kept, kept)] if sure else np.eye(len(kept))
 
 
 def _mean_friction(problem: Problem, point: Point, level: float) -> Estimate:
@@ -335,21 +335,23 @@ def _mean_friction(problem: Problem, point: Point, level: float) -> Estimate:
 
 
 def _parameters(problem: Problem, point: Point, sure: Surety | None, system: Oscillator) -> dict[str, Estimate]:
-    found = {}
-    for k, each in enumerate(problem.knobs):
-        if each.kind == "profile":
+    parameters = {}
+    for k, turned in enumerate(problem.knobs):
+        if turned.kind == "profile":
             continue
-        values = [_value(each, u, system) for u in ((point.u[k], *sure.ends[k]) if sure else (point.u[k],) * 3)]
-        unit = {"gain": "1", "delay": "s"}.get(each.kind) or unit_of(system, each.name)
-        sd = abs(_value(each, point.u[k] + 1e-6, system) - values[0]) / 1e-6 * float(sure.sd[k]) if sure else math.nan
+        values = [_value(turned, u, system) for u in ((point.u[k], *sure.ends[k]) if sure else (point.u[k],) * 3)]
+        unit = {"gain": "1", "delay": "s"}.get(turned.kind) or unit_of(system, turned.name)
+        sd = abs(_value(turned, point.u[k] + 1e-6, system) - values[0]) / 1e-6 * float(sure.sd[k]) if sure else math.nan
         interval = (values[1], values[2]) if sure else (math.nan, math.nan)
-        word = _words(each, system)
-        key = each.name if each.stretch is None else f"{each.name}.{each.stretch + 1}"
-        found[key] = Estimate(word, values[0], interval, sd, unit, METHOD, _told(each, word, values, unit, sure))
-    return found
+        word = _label_of(turned, system)
+        key = turned.name if turned.stretch is None else f"{turned.name}.{turned.stretch + 1}"
+        parameters[key] = Estimate(
+            word, values[0], interval, sd, unit, METHOD, _status_of(turned, word, values, unit, sure)
+        )
+    return parameters
 
 
-def _words(knob: Knob, system: Oscillator) -> str:
+def _label_of(knob: Knob, system: Oscillator) -> str:
     """What a parameter is called."""
     if knob.kind not in OF_SENSORS:
         return named(system, knob.name).name or knob.name
@@ -363,7 +365,7 @@ def _value(knob: Knob, u: float, system: Oscillator) -> float:
     return float(getattr(system.law, "kinetic", 1.0)) * (1 + value) if knob.kind == "above" else value
 
 
-def _told(knob: Knob, word: str, values: Sequence[float], unit: str, sure: Surety | None) -> str:
+def _status_of(knob: Knob, word: str, values: Sequence[float], unit: str, sure: Surety | None) -> str:
     """What the records can say of a parameter, in words."""
     if sure is None:
         return "not asked how sure"

@@ -127,13 +127,13 @@ def _end(problem: Problem, point: Point, k: int, side: float, allowed: float, te
     def holds(u: float) -> bool:
         tell()
         try:
-            held = _held(problem, k, u)
+            fixed = _held(problem, k, u)
         except ModelError:  # a kinetic friction above a static one that is held, where the releases tell it
             return False
         ceiling = point.chi2 + allowed
-        near = held.at(np.delete(point.u, k), point.starts)
+        near = fixed.at(np.delete(point.u, k), point.starts)
         if ceiling < near.chi2 < math.inf:
-            near = descend(held, near, passes=CLOSE, settled=CLEAR * allowed, share=2 * SHARE, enough=ceiling)
+            near = descend(fixed, near, passes=CLOSE, settled=CLEAR * allowed, share=2 * SHARE, enough=ceiling)
         return near.chi2 <= ceiling
 
     inside = float(point.u[k])
@@ -159,6 +159,6 @@ def _held(problem: Problem, k: int, u: float) -> Problem:
     every = np.zeros(len(problem.knobs))
     every[k] = u
     only: Sequence[Knob] = (problem.knobs[k],)
-    held = replace(problem, knobs=tuple(only))
+    fixed = replace(problem, knobs=tuple(only))
     others = tuple(knob for j, knob in enumerate(problem.knobs) if j != k)
-    return replace(problem, oscillator=held.system(np.array([u])), knobs=others)
+    return replace(problem, oscillator=fixed.system(np.array([u])), knobs=others)
