@@ -82,9 +82,9 @@ def axis_record(record: Record, *, axis: str | None = None) -> Record:
     columns = list(_columns(record))
     axes = list(dict.fromkeys(column.axis for column in columns if column.kind == "theta"))
     if not axes:
-        asked = "" if axis is None else f"axis = {axis!r}: "
+        stated = "" if axis is None else f"axis = {axis!r}: "
         raise RecordError(
-            f"{asked}no column is called a position: {', '.join(_called(record, name) for name in record)}",
+            f"{stated}no column is called a position: {', '.join(_called(record, name) for name in record)}",
             "a joint's log has its position, and a torque, a current or a reference",
             'name the columns: --channels "theta=COLUMN [rad]" --channels "force=COLUMN [N m]"',
         )
@@ -105,40 +105,40 @@ def _called(record: Record, name: str) -> str:
 
 def _columns(record: Record) -> Iterator[_Column]:
     for name in record:
-        words = re.findall(r"[a-z]+|\d+", re.sub(r"[\[(][^\[(]*[\])]\s*$", "", _called(record, name).lower()))
-        if OTHERS & set(words):
+        parts = re.findall(r"[a-z]+|\d+", re.sub(r"[\[(][^\[(]*[\])]\s*$", "", _called(record, name).lower()))
+        if OTHERS & set(parts):
             continue
         kinds = [
-            (len(alias.split()), kind, words[:at] + words[at + len(alias.split()) :])
+            (len(alias.split()), kind, parts[:at] + parts[at + len(alias.split()) :])
             for kind, aliases in NAMES.items()
             for alias in aliases
-            for at in range(len(words))
-            if words[at : at + len(alias.split())] == alias.split()
+            for at in range(len(parts))
+            if parts[at : at + len(alias.split())] == alias.split()
         ]
         if not kinds:
             continue
         _, kind, others = max(kinds, key=lambda one: one[0])
-        if kind in ("force", "current") and WANTED & set(words):
+        if kind in ("force", "current") and WANTED & set(parts):
             continue
-        if kind == "theta" and WANTED & set(words):
+        if kind == "theta" and WANTED & set(parts):
             kind, others = "reference", [word for word in others if word not in WANTED]
         yield _Column(name, kind, "_".join(word for word in others if word not in SOURCES))
 
 
 def _fits(name: str, axis: str) -> bool:
     """Whether an axis is named so, by all words of its name or by some of them in a row."""
-    words, asked = (re.findall(r"[a-z]+|\d+", text.lower()) for text in (name, axis))
-    return any(words[at : at + len(asked)] == asked for at in range(len(words)))
+    name_parts, axis_parts = (re.findall(r"[a-z]+|\d+", text.lower()) for text in (name, axis))
+    return any(name_parts[at : at + len(axis_parts)] == axis_parts for at in range(len(name_parts)))
 
 
 def _renamed(record: Record, columns: list[_Column], axis: str) -> Record:
-    samples, channels, told = {}, {}, {}
+    samples, channels, titles = {}, {}, {}
     straight = any(record.channels[column.channel].unit == "m" for column in columns)
     for kind in TURNING:
         fitting = [column for column in columns if column.kind == kind]
         if len(fitting) > 1:
             raise RecordError(
-                f"{' and '.join(_called(record, each.channel) for each in fitting)} both tell the {kind}",
+                f"{' and '.join(_called(record, column.channel) for column in fitting)} both tell the {kind}",
                 "one column tells one quantity of an axis",
                 f'name the one meant: --channels "{kind}=COLUMN"',
             )
@@ -147,8 +147,8 @@ def _renamed(record: Record, columns: list[_Column], axis: str) -> Record:
             name = "x" if straight and kind == "theta" else kind
             usual = TURNING[kind].replace("rad", "m").replace("N m", "N") if straight else TURNING[kind]
             unit, unstated = (usual, True) if known.unit == "1" else (known.unit, known.assumed)
-            samples[name], told[name] = record[column.channel], _called(record, column.channel)
-            words = VOCABULARY[name].words
-            channels[name] = replace(known, name=name, unit=unit, quantity=words, assumed=unstated)
-    step = Step("axis_record", told, f"axis {axis}" if axis else "one axis")
+            samples[name], titles[name] = record[column.channel], _called(record, column.channel)
+            quantity = VOCABULARY[name].words
+            channels[name] = replace(known, name=name, unit=unit, quantity=quantity, assumed=unstated)
+    step = Step("axis_record", titles, f"axis {axis}" if axis else "one axis")
     return replace(record, samples=samples, channels=channels, history=(*record.history, step))

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from stickslip.answers.axes import axis_record
-from stickslip.answers.findings import Asked, Comparison, Findings, flagged, record_name, require_several, with_doubt
+from stickslip.answers.findings import Comparison, Findings, Inquiry, flagged, record_name, require_several, with_doubt
 from stickslip.cycle.joint import JointFriction, regress_joint
 from stickslip.cycle.joint_logs import regress_joint_logs
 from stickslip.cycle.joint_onset import joint_breakaway
@@ -81,19 +81,19 @@ def analyze_joint(
     """
     require_record(record)
     given = {"inertia": inertia, "kp": kp, "kd": kd, "torque_constant": torque_constant}
-    faults, name, asked = tuple(record.check()), record_name(record), Asked()
+    faults, name, inquiry = tuple(record.check()), record_name(record), Inquiry()
     log = axis_record(record, axis=axis)
     log = without_delays(log, question="the friction of a joint")
     joint = regress_joint(log, gravity=gravity, **given)
     whole = _with_friction(log, joint)
-    breakaway = asked.ask("Breakaway", partial(joint_breakaway, whole, joint=joint), aside=True)
-    sticks = asked.ask("Sticks and slips", partial(find_sticks, whole, method="speed"), aside=True)
+    breakaway = inquiry.ask("Breakaway", partial(joint_breakaway, whole, joint=joint), aside=True)
+    sticks = inquiry.ask("Sticks and slips", partial(find_sticks, whole, method="speed"), aside=True)
     results = {"joint": joint, "breakaway": breakaway, "sticks": with_doubt(sticks, TURNS)}
-    unstated = [f"{key} is read as {each.unit}" for key, each in log.channels.items() if each.assumed]
+    unstated = [f"{key} is read as {channel.unit}" for key, channel in log.channels.items() if channel.assumed]
     if unstated:
         doubt = f"nobody stated a unit: {' and '.join(unstated)}"
         results = {key: flagged(result, doubt) for key, result in results.items()}
-    return Findings(name, whole, faults, notes=tuple(asked.notes), settings=_settings(joint, given), results=results)
+    return Findings(name, whole, faults, notes=tuple(inquiry.notes), settings=_settings(joint, given), results=results)
 
 
 def compare_joints(
@@ -174,9 +174,9 @@ def episodes(record: Record) -> Iterator[Record]:
 
 
 def _settings(joint: JointFriction, given: Mapping[str, Any]) -> dict[str, Any]:
-    told = {name: str(value) for name, value in given.items() if value is not None}
+    stated = {name: str(value) for name, value in given.items() if value is not None}
     return {
-        **told,
+        **stated,
         "torque": {"reference": "of the controller", "current": "of the current"}.get(joint.source, "measured"),
     }
 

@@ -71,7 +71,7 @@ def fit(
     """
     rig = rig_of(**options)
     groups = [group for argument in files for group in groups_of(argument)]
-    _require_one_question(groups, curve, asked=laws is not None or system is not None)
+    _require_one_question(groups, curve, has_law=laws is not None or system is not None)
     folder = output or (None if as_json else default_folder(groups, "fit"))
     names = laws.split(",") if laws is not None else None
     count = f"{len(names) if names else 'six'} laws"
@@ -88,8 +88,8 @@ def fit(
     show(result, written, as_json=as_json, everything=everything, record=records)
 
 
-def _require_one_question(groups: list[list[Path]], curve: str | None, *, asked: bool) -> None:
-    if curve is not None and asked:
+def _require_one_question(groups: list[list[Path]], curve: str | None, *, has_law: bool) -> None:
+    if curve is not None and has_law:
         raise click.BadParameter(
             "a curve or laws are fitted, not both; leave one out", param_hint="--curve, --laws, --system"
         )

@@ -56,7 +56,7 @@ def joint(
     stickslip joint episode.parquet --axis 2 --kp "17.8 N m/rad" --units "observation.state.2=deg"
     """
     names, axis = ("inertia", "kp", "kd", "torque_constant", "gravity"), options.pop("axis")
-    asked = {name: options.pop(name) for name in names}
+    stated = {name: options.pop(name) for name in names}
     if propose is not None and propose.exists():
         raise click.BadParameter(f"'{propose}' is there already; name another file", param_hint="--propose")
     rig = rig_of(**options)
@@ -66,16 +66,16 @@ def joint(
     def ask(record: Record) -> list[Findings]:
         parts = list(ss.answers.episodes(record))
         names = [f", {part.history[-1].outcome}" if len(parts) > 1 else "" for part in parts]
-        told = [ss.answers.analyze_joint(part, **asked, axis=axis) for part in parts]
-        return [replace(one, name=one.name + name) for one, name in zip(told, names, strict=True)]
+        joints = [ss.answers.analyze_joint(part, **stated, axis=axis) for part in parts]
+        return [replace(one, name=one.name + name) for one, name in zip(joints, names, strict=True)]
 
     with progress(2 * len(groups) + 1) as tell:
         if propose is not None:
             log = ss.answers.axis_record(next(ss.answers.episodes(read(groups[0], rig))), axis=axis)
             ss.write_record(ss.cycle.telling_motion(log), propose)
-        found, refused = answers(groups, rig, ask, tell)
-        logs = [one for part in found for one in part]
-        results = ss.answers.compare_joints(logs, **asked) if len(logs) > 1 else logs[0]
+        findings, refused = answers(groups, rig, ask, tell)
+        logs = [one for part in findings for one in part]
+        results = ss.answers.compare_joints(logs, **stated) if len(logs) > 1 else logs[0]
         results = with_left_out(results, refused)
         tell("drawing and writing", 2 * len(groups))
         written = ss.publish(results, folder=folder) if folder else None

@@ -60,8 +60,8 @@ def tribometer(
         return ss.answers.analyze_tribometer(record, frequency=strokes, rig=rig)
 
     with progress(2 * len(groups) + 1) as tell:
-        found, refused = answers(groups, rig, ask, tell)
-        results = with_left_out(ss.answers.compare_tribometers(found) if len(found) > 1 else found[0], refused)
+        findings, refused = answers(groups, rig, ask, tell)
+        results = with_left_out(ss.answers.compare_tribometers(findings) if len(findings) > 1 else findings[0], refused)
         tell("drawing and writing", 2 * len(groups))
         written = ss.publish(results, folder=folder) if folder else None
     name_left_out(refused)

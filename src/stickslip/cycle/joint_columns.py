@@ -110,7 +110,7 @@ def sliding(position: Array, fs: float) -> Sliding:
 
 
 @dataclass(frozen=True)
-class Told:
+class Log:
     """What a joint's log tells, as it enters the balance.
 
     Attributes
@@ -127,7 +127,9 @@ class Told:
     reference: Array | None
     sliding: Sliding
 
-    def columns(self, terms: tuple[str, ...], load: float, pull: tuple[float, float], *, told: bool = False) -> Array:
+    def columns(
+        self, terms: tuple[str, ...], load: float, pull: tuple[float, float], *, steered: bool = False
+    ) -> Array:
         r"""The balance's columns at the rows.
 
         Of :math:`\tau = J \ddot q + F_v \dot q + F_u |\dot q| \pm F_c + g_s \sin q + g_c \cos q +
@@ -141,10 +143,10 @@ class Told:
             The load part about which gravity's columns are linear.
         pull : (float, float)
             Gravity's sine and cosine part.
-        told : bool
+        steered : bool
             From the reference in place of the position: the instruments.
         """
-        position = self.reference if told and self.reference is not None else self.position
+        position = self.reference if steered and self.reference is not None else self.position
         side, window = self.sliding.side, self.sliding.window
         carried = pull[0] * np.sin(position) + pull[1] * np.cos(position)
         stronger = 1 + load * side * np.sign(carried)
@@ -158,15 +160,15 @@ class Told:
             "sine": lambda: window.apply(np.sin(position) * stronger),
             "cosine": lambda: window.apply(np.cos(position) * stronger),
             "load": lambda: window.apply(side * np.abs(carried)),
-            "damping": lambda: self._error_rate(told),
+            "damping": lambda: self._error_rate(steered),
         }
         return np.column_stack([made[term]()[self.sliding.rows] for term in terms])
 
-    def _error_rate(self, told: bool) -> Array:
+    def _error_rate(self, steered: bool) -> Array:
         """How the error of the position changes; its instrument is what inertia makes of the reference."""
         window, fs = self.sliding.window, self.sliding.window.fs
         if self.reference is None:
             raise EstimateError("no channel reference", "a controller follows one", "name the column of the reference")
-        if told:
+        if steered:
             return window.apply(five_point_difference(self.reference, 1) * fs, 2)
         return window.apply(self.position - self.reference, 1)

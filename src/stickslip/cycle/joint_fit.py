@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from stickslip.cycle.joint_asked import Asked
+from stickslip.cycle.joint_data import JointData
 from stickslip.cycle.regression import TURNING, UNITS
 from stickslip.errors import EstimateError
 from stickslip.estimate import NORMAL_95, Doubt, Estimate, Status
@@ -49,12 +49,12 @@ OPTIONAL: tuple[tuple[str, ...], ...] = (
 Fitted = tuple[LeastSquares, tuple[str, ...], tuple[float, float]]  # with its terms and gravity's sine and cosine part
 
 
-def fitted(asked: Asked) -> tuple[LeastSquares, tuple[str, ...], tuple[float, float], tuple[str, ...]]:
+def fitted(data: JointData) -> tuple[LeastSquares, tuple[str, ...], tuple[float, float], tuple[str, ...]]:
     """The regression, with viscous friction of each direction where these differ surely."""
-    fit, terms, pull, left_out = _separable(asked)
+    fit, terms, pull, left_out = _separable(data)
     try:
         richer = (*terms, "uneven")
-        fit_both, pull_both = about_load(asked, richer)
+        fit_both, pull_both = about_load(data, richer)
     except EstimateError:
         return fit, terms, pull, left_out
     uneven = fit_both.combined(np.eye(len(richer))[-1], "", "", "")
@@ -62,29 +62,29 @@ def fitted(asked: Asked) -> tuple[LeastSquares, tuple[str, ...], tuple[float, fl
     return (fit_both, richer, pull_both, left_out) if sure else (fit, terms, pull, left_out)
 
 
-def _separable(asked: Asked) -> tuple[LeastSquares, tuple[str, ...], tuple[float, float], tuple[str, ...]]:
+def _separable(data: JointData) -> tuple[LeastSquares, tuple[str, ...], tuple[float, float], tuple[str, ...]]:
     """The regression with as many terms as the motion tells apart, and what was left out."""
-    terms, left_out = asked.terms, list[str]()
+    terms, left_out = data.terms, list[str]()
     for optional in (*OPTIONAL, ()):
         try:
-            fit, pull = about_load(asked, terms)
+            fit, pull = about_load(data, terms)
             return fit, terms, pull, tuple(left_out)
         except EstimateError:
             if not set(optional) & set(terms):
                 if optional:
                     continue
-                raise _inseparable(asked, terms) from None
+                raise _inseparable(data, terms) from None
             terms = tuple(term for term in terms if term not in optional)
             left_out.append(f"{' and '.join(WORDS[term] for term in optional)}: {ADVICE[optional[0]]}")
-    raise _inseparable(asked, terms)
+    raise _inseparable(data, terms)
 
 
-def about_load(asked: Asked, terms: tuple[str, ...]) -> tuple[LeastSquares, tuple[float, float]]:
+def about_load(data: JointData, terms: tuple[str, ...]) -> tuple[LeastSquares, tuple[float, float]]:
     """The regression, linear about its own load part: of those that settle the one that leaves least."""
     if "load" not in terms:
-        fit = _solved(asked, terms, 0.0, (0.0, 0.0))
+        fit = _solved(data, terms, 0.0, (0.0, 0.0))
         return fit, _pull(fit, terms)
-    settled = [one for start in STARTS if (one := _settled(asked, terms, start)) is not None]
+    settled = [one for start in STARTS if (one := _settled(data, terms, start)) is not None]
     if not settled:
         raise EstimateError(
             "the load part does not settle", "gravity's torque is known while it slides", ADVICE["load"]
@@ -92,28 +92,28 @@ def about_load(asked: Asked, terms: tuple[str, ...]) -> tuple[LeastSquares, tupl
     return min(settled, key=lambda one: float(np.linalg.norm(one[0].residual)))
 
 
-def _settled(asked: Asked, terms: tuple[str, ...], start: float) -> tuple[LeastSquares, tuple[float, float]] | None:
+def _settled(data: JointData, terms: tuple[str, ...], start: float) -> tuple[LeastSquares, tuple[float, float]] | None:
     """From a load part that is guessed; gravity's torque is first that of a joint with just so much of it."""
     bare = tuple(term for term in terms if term != "load")
-    pull = _pull(_solved(asked, bare, 0.0, (0.0, 0.0)), bare)
+    pull = _pull(_solved(data, bare, 0.0, (0.0, 0.0)), bare)
     for _ in range(2 if start else 0):
-        pull = _pull(_solved(asked, bare, start, pull), bare)
+        pull = _pull(_solved(data, bare, start, pull), bare)
     share = start
     for _ in range(ROUNDS):
-        fit = _solved(asked, terms, share, pull)
+        fit = _solved(data, terms, share, pull)
         before, share, pull = share, float(fit.coefficients[terms.index("load")]), _pull(fit, terms)
         if abs(share - before) < SETTLED:
             return fit, pull
     return None
 
 
-def _solved(asked: Asked, terms: tuple[str, ...], share: float, pull: tuple[float, float]) -> LeastSquares:
-    columns = asked.columns(terms, share, pull)
-    data = asked.torque - asked.known
+def _solved(data: JointData, terms: tuple[str, ...], share: float, pull: tuple[float, float]) -> LeastSquares:
+    columns = data.columns(terms, share, pull)
+    torque = data.torque - data.known
     if "load" in terms:  # linear about `share`: its column stands in gravity's already
-        data = data + share * columns[:, terms.index("load")]
-    instruments = None if not asked.followed else asked.columns(terms, share, pull, told=True)
-    return least_squares(columns, data, instruments=instruments)
+        torque = torque + share * columns[:, terms.index("load")]
+    instruments = None if not data.followed else data.columns(terms, share, pull, steered=True)
+    return least_squares(columns, torque, instruments=instruments)
 
 
 def _pull(fit: LeastSquares, terms: Sequence[str]) -> tuple[float, float]:
@@ -122,9 +122,9 @@ def _pull(fit: LeastSquares, terms: Sequence[str]) -> tuple[float, float]:
     return float(fit.coefficients[terms.index("sine")]), float(fit.coefficients[terms.index("cosine")])
 
 
-def _inseparable(asked: Asked, terms: tuple[str, ...]) -> EstimateError:
+def _inseparable(data: JointData, terms: tuple[str, ...]) -> EstimateError:
     """Which terms are one column to this motion, by the weakest singular vector of the columns."""
-    columns = asked.columns(terms, 0.0, (0.0, 0.0))
+    columns = data.columns(terms, 0.0, (0.0, 0.0))
     lengths = np.linalg.norm(columns, axis=0)
     if not np.all(lengths > 0):
         mixed = [term for term, length in zip(terms, lengths, strict=True) if length == 0]
@@ -142,7 +142,7 @@ def _inseparable(asked: Asked, terms: tuple[str, ...]) -> EstimateError:
 class Telling:
     """Coefficients and their sums as Estimates."""
 
-    asked: Asked
+    data: JointData
     fit: LeastSquares
     terms: tuple[str, ...]
     turning: bool
@@ -161,11 +161,11 @@ class Telling:
     def sum(self, weights: dict[str, float], name: str) -> Estimate:
         """A sum of coefficients."""
         row = np.array([weights.get(term, 0.0) for term in self.terms])
-        beside = math.hypot(*(float(row @ self.fit.projection @ column) for column in self.asked.unsure), 0.0)
+        beside = math.hypot(*(float(row @ self.fit.projection @ column) for column in self.data.unsure), 0.0)
         units = {**(TURNING if self.turning else UNITS), "load": "1"}
         kind = {"forward": "coulomb", "back": "coulomb", "sine": "coulomb", "cosine": "coulomb", "damping": "viscous"}
         unit = units[kind.get(next(iter(weights)), next(iter(weights)))]
-        how = "instruments of the reference" if self.asked.followed else "least squares"
+        how = "instruments of the reference" if self.data.followed else "least squares"
         checks = (
             f"condition number {self.fit.condition:.3g}",
             f"residuals are worth {self.fit.independent:.0f} independent samples",

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from stickslip.cycle.joint_asked import Asked, asked_of, pooled, turning
+from stickslip.cycle.joint_data import JointData, joint_data, pooled, turning
 from stickslip.cycle.joint_fit import Telling, about_load, fitted
 from stickslip.errors import EstimateError, RecordError
 from stickslip.estimate import Constant, Estimate, Result
@@ -121,19 +121,19 @@ def regress_joint_logs(
     >>> [bool(one.error < one.plain) for one in together.predictions]
     [True, True, True]
     """
-    asked = [asked_of(record, gravity, **constants)[1] for record in records]
-    if len(asked) < 2 or len({(one.source, one.terms) for one in asked}) > 1:
+    data = [joint_data(record, gravity, **constants)[1] for record in records]
+    if len(data) < 2 or len({(one.source, one.terms) for one in data}) > 1:
         raise RecordError(
-            f"{len(asked)} log{'s' * (len(asked) != 1)}, with torque by {', '.join(one.source for one in asked)}",
+            f"{len(data)} log{'s' * (len(data) != 1)}, with torque by {', '.join(one.source for one in data)}",
             "several logs are told together by torques of one source",
             "give two logs or more, of one robot and one kind",
         )
-    fit, terms, _, left_out = fitted(pooled(asked))
-    tell = Telling(pooled(asked), fit, terms, turning(records[0]), "ok")
+    fit, terms, _, left_out = fitted(pooled(data))
+    tell = Telling(pooled(data), fit, terms, turning(records[0]), "ok")
     known = {term: tell.one(term) for term in terms if term != "uneven"}
     predictions = [
-        _predicted(log, pooled(asked[:place] + asked[place + 1 :]), record)
-        for place, (log, record) in enumerate(zip(asked, records, strict=True))
+        _predicted(log, pooled(data[:place] + data[place + 1 :]), record)
+        for place, (log, record) in enumerate(zip(data, records, strict=True))
     ]
     return JointLogs(
         known["forward"].within(0.0), known["back"].within(0.0), known["viscous"],
@@ -142,7 +142,7 @@ def regress_joint_logs(
     )  # fmt: skip
 
 
-def _predicted(log: Asked, others: Asked, record: Record) -> JointPrediction:
+def _predicted(log: JointData, others: JointData, record: Record) -> JointPrediction:
     """A log's torque by the regression of the others, and by a plain one."""
     fit, terms, pull, _ = fitted(others)
     predicted = log.model(fit, terms, pull)

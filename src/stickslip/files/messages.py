@@ -93,16 +93,16 @@ def joined(path: Path, streams: Sequence[Stream], notes: Sequence[str] = ()) -> 
     begin = int(np.searchsorted(clock.heard, max(stream.heard[0] for stream in kept)))
     stamps = clock.stamps if clock.stamps is not None and np.all(np.diff(clock.stamps) > 0) else clock.heard
     arrays, columns = {"time": stamps[begin:]}, [Column("time", "s", len(stamps) - begin)]
-    told = [f"the clock is that of {clock.topic}", *notes]
+    history = [f"the clock is that of {clock.topic}", *notes]
     for stream, names in zip(kept, _titles(kept), strict=True):
         rows = np.searchsorted(stream.heard, clock.heard[begin:], side="right") - 1
         if stream is not clock:
-            told.append(f"{stream.topic} is read as last heard")
+            history.append(f"{stream.topic} is read as last heard")
         for name, (own, values) in zip(names, stream.columns.items(), strict=True):
             arrays[name] = values[begin:] if stream is clock else values[rows]
             columns.append(Column(name, stream.units.get(own), len(rows)))
-    told += [f"{stream.topic} is heard too late, left out" for stream in streams if stream.heard[0] > latest]
-    return Table(tuple(columns), slices(arrays), notes=tuple(told))
+    history += [f"{stream.topic} is heard too late, left out" for stream in streams if stream.heard[0] > latest]
+    return Table(tuple(columns), slices(arrays), notes=tuple(history))
 
 
 def _titles(streams: Sequence[Stream]) -> list[list[str]]:

@@ -21,7 +21,7 @@ AS_WRITTEN = "a record as it was written"
 
 
 @dataclass(frozen=True)
-class Asked:
+class Query:
     """What was asked: of which records, read how, with which options.
 
     Attributes
@@ -43,7 +43,7 @@ class Asked:
     say: Callable[[str, float], None]
 
     @classmethod
-    def of(cls, ask: Mapping[str, Any], say: Callable[[str, float], None]) -> Asked:
+    def of(cls, ask: Mapping[str, Any], say: Callable[[str, float], None]) -> Query:
         records = [[Path(path) for path in record] for record in ask["records"]]
         return cls(records, ask["names"], ask["reading"], ask["options"], say)
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stickslip.balance.motion import require_fit
-from stickslip.cycle.joint_columns import Sliding, Told, sliding
+from stickslip.cycle.joint_columns import Log, Sliding, sliding
 from stickslip.errors import EstimateError, ModelError, RecordError
 from stickslip.estimate import Constant, Estimate
 from stickslip.record.record import Record, Step, require_record
@@ -25,10 +25,10 @@ ROWS = 20  # instants at which it slides
 
 
 @dataclass(frozen=True)
-class Asked:
+class JointData:
     """What is regressed: the torque at the rows, and what was stated, each with its standard deviation's column."""
 
-    logs: tuple[Told, ...]
+    logs: tuple[Log, ...]
     torque: Array
     terms: tuple[str, ...]
     source: str
@@ -42,9 +42,11 @@ class Asked:
         """Whether every log has the reference, whose columns are the instruments."""
         return all(log.reference is not None for log in self.logs)
 
-    def columns(self, terms: tuple[str, ...], load: float, pull: tuple[float, float], *, told: bool = False) -> Array:
+    def columns(
+        self, terms: tuple[str, ...], load: float, pull: tuple[float, float], *, steered: bool = False
+    ) -> Array:
         """The columns of all logs, one below the other."""
-        return np.concatenate([log.columns(terms, load, pull, told=told) for log in self.logs])
+        return np.concatenate([log.columns(terms, load, pull, steered=steered) for log in self.logs])
 
     def model(self, fit: LeastSquares, terms: tuple[str, ...], pull: tuple[float, float]) -> Array:
         """What a fit, of these logs or of others, makes of the torque."""
@@ -54,21 +56,21 @@ class Asked:
         return np.asarray(self.known + columns @ fit.coefficients[[terms.index(term) for term in bare]])
 
 
-def pooled(asked: Sequence[Asked]) -> Asked:
+def pooled(data: Sequence[JointData]) -> JointData:
     """Several logs as one."""
-    first = asked[0]
-    joined = {name: np.concatenate([getattr(one, name) for one in asked]) for name in ("torque", "raw", "known")}
-    unsure = tuple(np.concatenate(columns) for columns in zip(*(one.unsure for one in asked), strict=True))
-    logs = tuple(log for one in asked for log in one.logs)
-    return Asked(logs, terms=first.terms, source=first.source, unsure=unsure, stated=first.stated, **joined)
+    first = data[0]
+    joined = {name: np.concatenate([getattr(one, name) for one in data]) for name in ("torque", "raw", "known")}
+    unsure = tuple(np.concatenate(columns) for columns in zip(*(one.unsure for one in data), strict=True))
+    logs = tuple(log for one in data for log in one.logs)
+    return JointData(logs, terms=first.terms, source=first.source, unsure=unsure, stated=first.stated, **joined)
 
 
-def asked_of(record: Record, gravity: bool | None, **given: Constant | None) -> tuple[Record, Asked]:
+def joint_data(record: Record, gravity: bool | None, **given: Constant | None) -> tuple[Record, JointData]:
     """The record with its torque, and what is asked of it under what is stated."""
     require_record(record)
     constants = _constants(record, **given)
     record = _torqued(record, constants)
-    return record, _asked(record, constants, turning(record) if gravity is None else gravity)
+    return record, _data_of(record, constants, turning(record) if gravity is None else gravity)
 
 
 def turning(record: Record) -> bool:
@@ -115,7 +117,7 @@ def _torqued(record: Record, constants: dict[str, Estimate]) -> Record:
     return record
 
 
-def _asked(record: Record, constants: dict[str, Estimate], gravity: bool) -> Asked:
+def _data_of(record: Record, constants: dict[str, Estimate], gravity: bool) -> JointData:
     position = record["theta" if turning(record) else "x"]
     followed = "reference" in record
     reference = record["reference"] if followed else None
@@ -123,7 +125,7 @@ def _asked(record: Record, constants: dict[str, Estimate], gravity: bool) -> Ask
         raise EstimateError("the position never changes", f"{QUESTION} needs motion", "check the column")
     slides = sliding(position, record.fs)
     _refuse_still(slides, record)
-    told = Told(position, reference, slides)
+    log = Log(position, reference, slides)
     window, rows = slides.window, slides.rows
     terms = ["viscous", "forward", "back", *(("sine", "cosine", "load") if gravity else ())]
     known, unsure = np.zeros(len(rows)), []
@@ -152,7 +154,7 @@ def _asked(record: Record, constants: dict[str, Estimate], gravity: bool) -> Ask
         unsure.append(scale.sd / scale.value * torque)
     gain_sd = max((record.channels[name].gain_sd for name in ("force", "current") if name in record), default=0.0)
     unsure.append(gain_sd * torque)
-    return Asked((told,), torque, tuple(terms), source, np.asarray(raw), known, tuple(unsure), constants)
+    return JointData((log,), torque, tuple(terms), source, np.asarray(raw), known, tuple(unsure), constants)
 
 
 def _refuse_still(slides: Sliding, record: Record) -> None:
