@@ -10,7 +10,7 @@ import click
 
 import stickslip as ss
 from stickslip.cli.options import constants_options, reading_options, result_options
-from stickslip.cli.records import answers, default_folder, groups_of, name_left_out, read, rig_of
+from stickslip.cli.records import answer_together, default_folder, groups_of, read, rig_of
 from stickslip.cli.show import show
 from stickslip.cli.terminal import progress
 
@@ -70,7 +70,7 @@ def fit(
     stickslip fit sweep.csv --channels "v=speed [mm/s]" --channels "friction=F [N]" --curve stribeck
     """
     rig = rig_of(**options)
-    groups = [group for argument in files for group in groups_of(argument)]
+    groups = groups_of(*files)
     _require_one_question(groups, curve, has_law=laws is not None or system is not None)
     folder = output or (None if as_json else default_folder(groups, "fit"))
     names = laws.split(",") if laws is not None else None
@@ -134,20 +134,14 @@ def predict(
     """
     rig = rig_of(**options)
     oscillator = ss.answers.read_fitted(law, rig=rig)
-    groups = [group for argument in files for group in groups_of(argument)]
+    groups = groups_of(*files)
     folder = output or (None if as_json else default_folder(groups, "predicted"))
+
+    def together(predictions: list[Predictions]) -> Predictions:
+        return replace(predictions[0], parts=tuple(part for one in predictions for part in one.parts))
 
     def ask(record: Record) -> Predictions:
         return ss.answers.predict(record, oscillator, rig=rig, plain=plain)
 
-    with progress(2 * len(groups) + 1) as tell:
-        predictions, refused = answers(groups, rig, ask, tell)
-        parts, notes = (
-            [part for prediction in predictions for part in prediction.parts],
-            [f"Left out: {error}" for error in refused],
-        )
-        results = replace(predictions[0], parts=tuple(parts), notes=tuple(notes))
-        tell("drawing and writing", 2 * len(groups))
-        written = ss.publish(results, folder=folder) if folder else None
-    name_left_out(refused)
-    show(results, written, as_json=as_json, everything=everything)
+    shown = {"as_json": as_json, "everything": everything}
+    answer_together(groups, rig, ask, together=together, folder=folder, **shown)

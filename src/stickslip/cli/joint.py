@@ -10,13 +10,11 @@ import click
 
 import stickslip as ss
 from stickslip.cli.options import reading_options, result_options
-from stickslip.cli.records import answers, default_folder, groups_of, name_left_out, read, rig_of, with_left_out
-from stickslip.cli.show import show
-from stickslip.cli.terminal import progress
+from stickslip.cli.records import answer_together, default_folder, groups_of, read, rig_of
 
 if TYPE_CHECKING:
     from stickslip import Record
-    from stickslip.answers import Findings
+    from stickslip.answers import Comparison, Findings
 
 
 @click.command()
@@ -60,7 +58,7 @@ def joint(
     if propose is not None and propose.exists():
         raise click.BadParameter(f"'{propose}' is there already; name another file", param_hint="--propose")
     rig = rig_of(**options)
-    groups = [group for argument in files for group in groups_of(argument)]
+    groups = groups_of(*files)
     folder = output or (None if as_json else default_folder(groups, "joint"))
 
     def ask(record: Record) -> list[Findings]:
@@ -69,15 +67,12 @@ def joint(
         joints = [ss.answers.analyze_joint(part, **stated, axis=axis) for part in parts]
         return [replace(one, name=one.name + name) for one, name in zip(joints, names, strict=True)]
 
-    with progress(2 * len(groups) + 1) as tell:
-        if propose is not None:
-            log = ss.answers.axis_record(next(ss.answers.episodes(read(groups[0], rig))), axis=axis)
-            ss.write_record(ss.cycle.telling_motion(log), propose)
-        findings, refused = answers(groups, rig, ask, tell)
-        logs = [one for part in findings for one in part]
-        results = ss.answers.compare_joints(logs, **stated) if len(logs) > 1 else logs[0]
-        results = with_left_out(results, refused)
-        tell("drawing and writing", 2 * len(groups))
-        written = ss.publish(results, folder=folder) if folder else None
-    name_left_out(refused)
-    show(results, written, as_json=as_json, everything=everything)
+    def together(findings: list[list[Findings]]) -> Findings | Comparison:
+        logs = [log for part in findings for log in part]
+        return ss.answers.compare_joints(logs, **stated) if len(logs) > 1 else logs[0]
+
+    if propose is not None:
+        log = ss.answers.axis_record(next(ss.answers.episodes(read(groups[0], rig))), axis=axis)
+        ss.write_record(ss.cycle.telling_motion(log), propose)
+    shown = {"as_json": as_json, "everything": everything}
+    answer_together(groups, rig, ask, together=together, folder=folder, **shown)

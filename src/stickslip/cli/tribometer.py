@@ -3,27 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
 import stickslip as ss
 from stickslip.cli.options import normal_option, number_of, reading_options, result_options
-from stickslip.cli.records import (
-    answers,
-    default_folder,
-    groups_of,
-    name_left_out,
-    require_fits,
-    rig_of,
-    with_left_out,
-)
-from stickslip.cli.show import show
-from stickslip.cli.terminal import progress
-
-if TYPE_CHECKING:
-    from stickslip import Record
-    from stickslip.answers import Findings
+from stickslip.cli.records import answer_together, default_folder, groups_of, require_fits, rig_of
 
 
 @click.command()
@@ -52,17 +38,16 @@ def tribometer(
     """
     strokes = None if frequency is None else number_of(frequency, "Hz", "--frequency")
     rig = rig_of(**options)
-    groups = [group for argument in files for group in groups_of(argument)]
+    groups = groups_of(*files)
     require_fits(options["normal"], groups)
     folder = output or (None if as_json else default_folder(groups, "tribometer"))
 
-    def ask(record: Record) -> Findings:
-        return ss.answers.analyze_tribometer(record, frequency=strokes, rig=rig)
-
-    with progress(2 * len(groups) + 1) as tell:
-        findings, refused = answers(groups, rig, ask, tell)
-        results = with_left_out(ss.answers.compare_tribometers(findings) if len(findings) > 1 else findings[0], refused)
-        tell("drawing and writing", 2 * len(groups))
-        written = ss.publish(results, folder=folder) if folder else None
-    name_left_out(refused)
-    show(results, written, as_json=as_json, everything=everything)
+    answer_together(
+        groups,
+        rig,
+        lambda record: ss.answers.analyze_tribometer(record, frequency=strokes, rig=rig),
+        together=lambda tests: ss.answers.compare_tribometers(tests) if len(tests) > 1 else tests[0],
+        folder=folder,
+        as_json=as_json,
+        everything=everything,
+    )

@@ -335,7 +335,7 @@ def _answer(fit: _Fit, against: Estimate | None, record: Record) -> Cause:
 def _named(
     residuals: tuple[float, float, float, float], spread: float, *, is_late: bool, is_soft: bool, measured: bool
 ) -> str:
-    """The cause, or that it can not be told: from what each leaves; `measured` is a lag that the accelerometer tells."""
+    """The cause, or that it can not be told: from what each leaves; `measured`: the accelerometer tells the lag."""
     neither, lagging, _, both = residuals
     good = math.sqrt(EXPLAINED) * spread
     if is_soft:
