@@ -48,14 +48,14 @@ from stickslip.bench.runs import read_runs as read_runs
 from stickslip.bench.runs import run_list as run_list
 from stickslip.bench.sim import Fault as Fault
 from stickslip.bench.sim import Sim as Sim
-from stickslip.bench.simulated import SimulatedBench as SimulatedBench
-from stickslip.bench.simulated import sweep_of as sweep_of
 from stickslip.bench.steps import STEPS as STEPS
 from stickslip.bench.steps import BenchStep as BenchStep
 from stickslip.bench.steps import Commissioned as Commissioned
 from stickslip.bench.steps import commission as commission
 from stickslip.bench.steps import step_named as step_named
+from stickslip.bench.through import SimulatedBench as SimulatedBench
 from stickslip.bench.through import Tour as Tour
+from stickslip.bench.through import sweep_of as sweep_of
 from stickslip.bench.through import tour as tour
 
 __all__: list[str]

@@ -103,7 +103,7 @@ def analyze(
             of_parts=lambda parts, say: ss.answers.analyze_blocks(parts, rig=rig, method=method, progress=say),
         )
 
-        def together(findings: list[Findings]) -> Findings | Comparison:
+        def together(findings: list[Findings]) -> Any:
             return with_left_out(ss.compare(findings) if len(findings) > 1 else findings[0], refused)
 
         tell("drawing and writing", 2 * len(groups))

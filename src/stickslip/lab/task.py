@@ -25,8 +25,7 @@ def main() -> int:
 
     ask = json.loads(Path(ASK).read_text(encoding="utf-8"))
     limit(**ask.pop("limits"))
-    from stickslip.lab.query import Query, on_the_page
-    from stickslip.lab.questions import QUESTIONS
+    from stickslip.lab.questions import QUESTIONS, Query, on_the_page
 
     say = _line_by_line()
     try:

@@ -12,12 +12,11 @@ from numpy.typing import NDArray
 
 from stickslip.errors import EstimateError, ModelError
 from stickslip.estimate import NORMAL_95, Doubt, Estimate
-from stickslip.law.law import LawFit, answered
+from stickslip.law.law import LawFit, answered, surety
 from stickslip.law.search import descend
 from stickslip.law.standing import CALIBRATIONS, Evidence, Misfit, Standing, standings, undescribed
 from stickslip.law.start import CALIBRATION, Shown, require_apart, seen_damping, too_few, usual_nuisance
 from stickslip.law.stretch import Stretch, channels_of
-from stickslip.law.surety import surety
 from stickslip.law.trials import (
     PASSES,
     Seen,
