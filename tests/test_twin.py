@@ -133,6 +133,8 @@ def test_stuck_time_is_counted_without_the_bias_of_a_threshold() -> None:
     quick, tried = asked(STOPS)
     true = tried.record.truth["stuck share of the time"]
     assert abs(tried.sticks.share.value - true) < 0.02 * true < abs(quick.sticks.share.value - true)
+    captions = {plate.name: plate.caption for plate in ss.summary(tried).plates}
+    assert "not yet corrected by twins" in captions["record"]  # the grey is the quick one's, beside a corrected share
 
 
 def test_a_contact_that_gives_way_is_found_with_its_stiffness() -> None:
@@ -253,6 +255,21 @@ def test_a_contact_of_another_kind_is_unlike_its_twins() -> None:
     assert tried.trial.unlike
     assert ASTRAY in kinds(tried.loops.level.status)
     assert not any(stands(e.status) for e in tried.loops.estimates if e.name != "forcing frequency")
+
+
+def test_a_force_that_drives_the_mass_is_written_by_its_twins_too() -> None:
+    # twins without it answered nothing of the loops, and the quick answers stood untried
+    record = stepped.record(STOPS, np.random.default_rng(11))
+    pushed = ss.Record.of({"x": record["x"], "force": STOPS.stiffness * record["z"]}, fs=record.fs, truth=record.truth)
+    quick = ss.analyze(pushed, **STOPS.stated)
+    assert quick.regression is None
+    assert any(note.startswith("Regression: a mass on a spring") for note in quick.notes)
+    tried = ss.tried(quick, twins=8)
+    assert not tried.trial.unlike
+    for name in ("sliding friction", "sliding friction forward", "energy per cycle"):
+        answer = estimate(tried, name)
+        assert stands(answer.status), str(answer)
+        assert answer.value == pytest.approx(record.truth.get(name, STOPS.kinetic), rel=0.01)
 
 
 def test_the_same_seed_gives_the_same_answers() -> None:

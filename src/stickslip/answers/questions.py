@@ -24,7 +24,7 @@ from stickslip.contact.sliding_onset import coupled_frequency, transition_speed
 from stickslip.cycle.before_slip import presliding
 from stickslip.cycle.loops import friction_loops
 from stickslip.cycle.onset import breakaway
-from stickslip.cycle.regression import regress_friction
+from stickslip.cycle.regression import Regression, regress_friction
 from stickslip.cycle.sticks import find_sticks
 from stickslip.errors import TOO_SHORT, EstimateError, StickslipError
 from stickslip.estimate import Constant, Doubt
@@ -173,13 +173,25 @@ def _answer(question: Question, whole: Record, fused: Callable[[], Record], slid
     return question.ask(fused() if question.fused else whole, slid)
 
 
+def _regression(record: Record, *, symmetric: bool = True) -> Regression:
+    """Where no spring holds the mass: its force, which goes with the acceleration, would be told as inertia."""
+    spring = 0.0 if record.rig is None else record.rig.stiffness or 0.0
+    if spring > 0 and "x" in record:
+        raise EstimateError(
+            f"a mass on a spring of {spring:.3g} N/m",
+            "the regression knows of inertia, damping and friction alone",
+            "see the friction loops, which take the spring's force off",
+        )
+    return regress_friction(record, symmetric=symmetric)
+
+
 FORCE = ("load", "force", "friction")
 QUESTIONS = (
     Question("loops", "Friction loops", (("friction",), MOTION), lambda r, on: friction_loops(r, contact=on)),
-    Question("regression", "Regression", (("force",), MOTION), lambda r, on: regress_friction(r)),
+    Question("regression", "Regression", (("force",), MOTION), lambda r, on: _regression(r)),
     Question(
         "asymmetric", "Regression of each direction", (("force",), MOTION),
-        lambda r, on: regress_friction(r, symmetric=False), follows="regression",
+        lambda r, on: _regression(r, symmetric=False), follows="regression",
     ),
     Question("sticks", "Sticks and slips", (MOTION,), lambda r, on: find_sticks(r, contact=on)),
     Question("breakaway", "Breakaway", (("friction",), MOTION), lambda r, on: breakaway(r, contact=on)),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -120,14 +121,18 @@ def _sure(
     tell: Callable[..., None],
     **context: Any,
 ) -> tuple[Findings | Comparison, Path | None]:
-    """The results, tried on twins and written; the quick ones are written first, and stay where that is interrupted."""
+    """The results, tried on twins and written; the quick ones are written first, and stay where that is interrupted.
+
+    Figures are drawn once, with what stays: they take longer than the quick answers do.
+    """
     if not twins:
         results = together(all_findings)
         return results, folder and ss.publish(results, folder=folder, **context)
     from concurrent.futures import ThreadPoolExecutor
 
     with ThreadPoolExecutor(1) as beside:  # drawn here, while other processes look for the twins
-        quick = None if folder is None else beside.submit(ss.publish, together(all_findings), folder=folder, **context)
+        first = folder and partial(ss.publish, together(all_findings), folder=folder, figures=False, **context)
+        quick = beside.submit(first) if first else None
         try:
             results = together([_tried(findings, twins, tell) for findings in all_findings])
             tell("drawing and writing")
@@ -135,7 +140,7 @@ def _sure(
         except KeyboardInterrupt:
             if quick is None:
                 raise
-            complain(f"interrupted: {quick.result()} has the quick answers, not tried on twins.")
+            complain(f"interrupted: {quick.result()} has the quick answers, not tried on twins, without figures.")
             sys.exit(INTERRUPTED)
 
 

@@ -20,6 +20,7 @@ from stickslip.solve.simulate import simulate
 
 Array = NDArray[np.float64]
 
+DRIVES = {"z": "base", "force": "force"}  # channels of what moves the mass, and what each moves
 HARMONICS = 5
 AS_GOOD = 1.15  # times its noise that a sum of tones may stray from what was measured
 COARSE = (128, 64, 32, 16, 8, 4, 2)  # samples from knot to knot of a motion without tones, tried in turn
@@ -97,10 +98,13 @@ def measured_drive(record: Record, given: Drive) -> DriveFrom:
     The base's motion z, or the applied force, is a tone with its harmonics where these reach its noise; any other
     motion of the base is smoothed and followed as it was recorded. A record of neither is driven as `given`.
     """
-    for channel, on in (("z", "base"), ("force", "force")):
-        if channel in record and np.ptp(record[channel]) > 0:
-            return _driven(record, channel, on, getattr(given, "contact", "ground"))
-    return Known(given)
+    channel = driving(record)
+    return Known(given) if channel is None else _driven(record, channel, getattr(given, "contact", "ground"))
+
+
+def driving(record: Record) -> str | None:
+    """The channel of what moves the mass: of the base's motion z, or of a force on it; None where neither changes."""
+    return next((name for name in DRIVES if name in record and np.ptp(record[name]) > 0), None)
 
 
 def as_driven(record: Record, given: Drive) -> Record:
@@ -121,8 +125,8 @@ def face_of(given: Drive, record: Record) -> tuple[Array | float, Array | float]
     return speed * np.arange(len(record), dtype=np.float64) / record.fs, speed
 
 
-def _driven(record: Record, channel: str, on: str, contact: str) -> DriveFrom:
-    values, late = record[channel], record.channels[channel].delay
+def _driven(record: Record, channel: str, contact: str) -> DriveFrom:
+    on, values, late = DRIVES[channel], record[channel], record.channels[channel].delay
     record.require_clean(channel, question="a fitted law", samples=LEAST)
     stated = record.channels[channel].noise  # before the counts, which are in what is measured
     noise = math.hypot(stated, quantisation_step(values) / 12**0.5) if stated else noise_level(values, record.fs)

@@ -7,6 +7,7 @@ import json
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -75,9 +76,14 @@ def report(result: Any, path: str | Path, **context: Any) -> Path:
     return Path(path)
 
 
-def sections(story: Story, *, png: bool = False) -> list[Story]:
-    """The sections of the page, with their figures drawn; as PNG too where these are asked for."""
-    return [part.drawn(png=png) for part in (story, *story.parts)]
+def sections(story: Story, *, png: bool = False, figures: bool = True) -> list[Story]:
+    """The sections of the page, with their figures drawn, as PNG too where asked for; or as soon as can be."""
+    return [part.drawn(png=png) if figures else _quick(part) for part in (story, *story.parts)]
+
+
+def _quick(story: Story) -> Story:
+    """What the page draws itself, else the figure that leads: all others take longer than the answers."""
+    return replace(story, draw=tuple) if story.scope else replace(story, draw=lambda: story.plates[:1]).drawn()
 
 
 def render(stories: Sequence[Story]) -> str:
@@ -166,7 +172,7 @@ PROGRAM = "stickslip"
 NUMBERS = "results.json"
 
 
-def publish(result: Any, *, folder: str | Path, **context: Any) -> Path:
+def publish(result: Any, *, folder: str | Path, figures: bool = True, **context: Any) -> Path:
     """Write ``report.html``, ``results.json``, the figures as SVG and PNG, and what else a result has into a folder.
 
     That is each burst as WAV, and a fitted law for other programs. The folder appears when all is written, and is on
@@ -179,6 +185,9 @@ def publish(result: Any, *, folder: str | Path, **context: Any) -> Path:
         As in :func:`summary`.
     folder : path
         The folder to make.
+    figures : bool
+        Whether figures are drawn. Without them the folder is there three times as soon, and the page shows the record
+        with its loop, which it draws itself.
     **context
         As in :func:`summary`: of a fit ``record`` tells what it was fitted to, and how the law's system moved.
 
@@ -206,12 +215,13 @@ def publish(result: Any, *, folder: str | Path, **context: Any) -> Path:
     folder = Path(folder)
     check_folder(folder)
     story = summary(result, **context)
-    stories = sections(story, png=True)
+    stories = sections(story, png=True, figures=figures)
     with results_folder(folder, story.data()) as draft:
         (draft / "report.html").write_text(render(stories), encoding="utf-8")
         for number, part in enumerate(stories):
             prefix = f"{number}-{_fit_for_a_file(part.title)}-" if len(stories) > 1 else ""
-            write_figures(draft / "figures", prefix, part.plates)
+            if figures:
+                write_figures(draft / "figures", prefix, part.plates)
             _write_sounds(draft / "sounds", prefix, part.clips)
         story.write(draft)
     return folder

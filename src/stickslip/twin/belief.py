@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stickslip.errors import StickslipError
-from stickslip.law.drive import DriveFrom
+from stickslip.law.drive import DriveFrom, driving
 from stickslip.laws.compliant import CompliantContact
 from stickslip.laws.coulomb import LinearSlope
 from stickslip.laws.lugre import LuGre
@@ -367,7 +367,9 @@ class Belief:
         gains = {
             name: 1 + channels[name].gain_sd * rng.standard_normal() for name in ("v", "a", "load") if name in channels
         }
-        gains |= {"x": self.gain, "z": 1 / (1 + self.values.get(DRIVE[0], 0.0))}  # what z wrote, it writes again
+        gains["x"] = self.gain
+        if (moves := driving(self.record)) is not None:  # what it wrote, it writes again
+            gains[moves] = 1 / (1 + self.values.get(DRIVE[0], 0.0))
         rig = Rig(tuple(replace(s, gain=gains.get(s.channel, 1.0)) for s in self.rig.sensors))
         written = rig.measure(self._run(), fs=self.record.fs, rng=rng)
         for name in written:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from stickslip.balance.motion import is_measured
 from stickslip.drives.kinds import HarmonicBase
 from stickslip.errors import EstimateError, StickslipError
-from stickslip.law.drive import DriveFrom, measured_drive
+from stickslip.law.drive import DriveFrom, driving, measured_drive
 from stickslip.laws.coulomb import LinearSlope
 from stickslip.oscillator import Oscillator
 from stickslip.record.flaws import saturated
@@ -61,7 +61,7 @@ SEARCHED = 4000  # samples in which it is searched where a law's valley lies
 HALVINGS = 6  # of a step that leads away, before the descent ends
 LEARNS = 0.5  # of what was left, that a step leaves at most where its slopes are learned from it and not taken anew
 SETTLED = 0.9999  # of what is left, from which a pass gains nothing; 0.999 stopped in bristles' valleys (seed 911)
-SENSED = ("x", "z", "v", "a", "load")  # channels that a virtual rig writes
+SENSED = ("x", "z", "force", "v", "a", "load")  # channels that a virtual rig writes
 LAWS = 3  # that are tried beside the simplest
 CLOSE = 6.6  # chi-squared by which one law leads another, one in a hundred by chance
 CHANCE = 0.01  # that a part which is not there is believed in
@@ -152,7 +152,7 @@ def lacking(record: Record) -> StickslipError | None:
         record.require("x", "v", question=QUESTION)
     except StickslipError as error:
         return error
-    if not any(name in record and np.ptp(record[name]) > 0 for name in ("z", "force")):
+    if driving(record) is None:
         return EstimateError(
             "neither a motion z of the base nor an applied force",
             f"{QUESTION} is moved as the record was",
@@ -465,15 +465,15 @@ def _slope_of(belief: Belief, name: str) -> Array:
 
 def _unsure(record: Record, drive: DriveFrom) -> dict[str, float]:
     """Standard deviation of each constant that may be off: as stated, and as the drive was measured."""
-    rig, gains = record.rig, {name: record.channels[name].gain_sd for name in record if name in "xz"}
+    rig, gains, moves = record.rig, {name: record.channels[name].gain_sd for name in record}, driving(record)
     assert rig is not None
     stated = {MASS: ("mass", rig.mass), SPRING: ("stiffness", rig.stiffness), DAMPER: ("damping", 1.0)}
     unsure = {part: rig.sd[name] / scale for part, (name, scale) in stated.items() if rig.sd.get(name) and scale}
-    if gains.get("x"):
+    if gains["x"]:
         unsure[GAIN] = gains["x"]
     drives = dict(zip(DRIVE, drive.unsure, strict=False))
-    if gains.get("z") and drives:  # the first way in which a drive may be off is its size
-        drives[DRIVE[0]] = math.hypot(drives[DRIVE[0]], gains["z"])
+    if moves and gains[moves] and drives:  # the first way in which a drive may be off is its size
+        drives[DRIVE[0]] = math.hypot(drives[DRIVE[0]], gains[moves])
     return {**unsure, **drives}
 
 
