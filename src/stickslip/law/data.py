@@ -150,6 +150,13 @@ def samples_of(
         raise EstimateError(
             f"a curve of {type(data).__name__}", "it is fitted to a Record or to friction_loops of one", "give either"
         )
+    return _of_record(data, contact, frequency, smoothed, normal)
+
+
+def _of_record(
+    data: Record, contact: str | None, frequency: float | str | None, smoothed: bool, normal: float | None
+) -> tuple[Samples, Samples]:
+    """The friction over the motion of the contact, cycle by cycle where it has any."""
     question = "the fit of a friction curve"
     rubs = "coefficient" if "coefficient" in data and "friction" not in data else "friction"
     data.require_clean(rubs, question=question, samples=LEAST)

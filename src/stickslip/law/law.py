@@ -29,7 +29,7 @@ from stickslip.law.start import (
     usual_nuisance,
     value_of,
 )
-from stickslip.law.stretch import Sensor, channels_of
+from stickslip.law.stretch import Sensor, Stretch, channels_of
 from stickslip.laws.base import Law
 from stickslip.laws.curved import CurvedLaw
 from stickslip.oscillator import Oscillator
@@ -44,7 +44,7 @@ METHOD = "least squares of what the sensors read, the motion simulated"
 MISFIT = 1.2  # times its noise that a channel's residual may be
 STIFFEST = 1e-5  # of the stroke: what a contact gives way at least
 UNEVEN = 0.1  # of its mean, that a surface strays
-WORK = 60.0  # calls of progress that a fit is taken for
+WORK = 24.0  # calls of progress after which most of a fit is taken to be done
 UNSURE = 0.25  # of a coordinate: a wider deviation is looked at by the likelihood itself
 REACH = (0.7, 1.6, 3.2, 7.0)  # steps of the coordinate that the look takes, to three decades away
 FAINT = 1e-12  # of the sharpest direction: below it a direction is not seen at all
@@ -224,17 +224,13 @@ def fit_law(
         raise EstimateError("no record", "a law is fitted to one record at least", "give one")
     if surface not in ("even", "rough"):
         raise ModelError(f"surface = '{surface}'", "a surface is 'even' or 'rough'", "choose one, or leave it out")
-    tell = _teller(progress)
+    tell = teller(progress, WORK)
     names = free_names(oscillator, free)
     shown = [Shown.of(one, channels_of(one, channels), oscillator) for one in records]
     if nuisance is None:
         nuisance = usual_nuisance(oscillator, names, shown) if names else ()
     require_apart(oscillator, names, nuisance, shown)
-    stretches = []
-    for number, motion in enumerate(shown):
-        motion.require_sliding()
-        rows = motion.slides()
-        stretches.append(motion.stretch(number, (int(rows[0]), len(motion.record) - 1)))
+    stretches = [_sliding_stretch(motion, number) for number, motion in enumerate(shown)]
     fastest = max(motion.fastest for motion in shown)
     oscillator, profile = better_start(oscillator, names, shown), None
     if names:
@@ -245,13 +241,26 @@ def fit_law(
         names = tuple(name for name in names if name != "kinetic")
     knobs = [bounded(knob(oscillator, name), oscillator, stretches, STIFFEST) for name in names]
     knobs += nuisance_knobs(oscillator, nuisance, stretches)
-    if profile:
-        knobs += [
-            Knob(f"profile {j}", "profile", value, 0.01, prior=UNEVEN / 0.01) for j, value in enumerate(profile.values)
-        ]
+    heights = enumerate(profile.values if profile else ())
+    knobs += [Knob(f"profile {j}", "profile", height, 0.01, prior=UNEVEN / 0.01) for j, height in heights]
     problem = Problem.of(oscillator, stretches, knobs, profile)
-    point = problem.begin(np.zeros(len(knobs)))
-    if profile:
+    point = _descended(problem, tell)
+    sure = surety(problem, point, tell) if intervals else None
+    if progress:
+        progress(1.0)
+    return answered(problem, point, sure, shown)
+
+
+def _sliding_stretch(motion: Shown, number: int) -> Stretch:
+    """A record from its first fast sliding to its end."""
+    motion.require_sliding()
+    return motion.stretch(number, (int(motion.slides()[0]), len(motion.record) - 1))
+
+
+def _descended(problem: Problem, tell: Callable[[], None]) -> Point:
+    """Where the search ends; that of a rough surface begins where one by a part of the readings ends."""
+    point = problem.begin(np.zeros(len(problem.knobs)))
+    if problem.profile:
         few = thinned_out(problem)
         first = descend(few, few.begin(point.u), tell=tell)
         states = zip(first.starts, point.starts, strict=True)
@@ -259,17 +268,14 @@ def fit_law(
     point = descend(problem, point, tell=tell)
     if not math.isfinite(point.chi2):
         raise EstimateError(
-            f"{oscillator.law!r} can not be simulated along this record",
+            f"{problem.oscillator.law!r} can not be simulated along this record",
             "the search starts from a motion that exists",
             "start from other values of the law",
         )
-    sure = surety(problem, point, tell) if intervals else None
-    if progress:
-        progress(1.0)
-    return answered(problem, point, sure, shown)
+    return point
 
 
-def _teller(progress: Callable[[float], object] | None) -> Callable[[], None]:
+def teller(progress: Callable[[float], object] | None, expected: float) -> Callable[[], None]:
     """Progress that comes nearer to its end with each call, as nobody knows how many there will be."""
     calls = 0
 
@@ -277,7 +283,7 @@ def _teller(progress: Callable[[float], object] | None) -> Callable[[], None]:
         nonlocal calls
         calls += 1
         if progress:
-            progress(1 - math.exp(-2.5 * calls / WORK))
+            progress(1 - math.exp(-calls / expected))
 
     return tell
 

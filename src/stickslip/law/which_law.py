@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from stickslip.errors import EstimateError, ModelError
 from stickslip.estimate import NORMAL_95, Doubt, Estimate
-from stickslip.law.law import LawFit, answered, surety
+from stickslip.law.law import LawFit, answered, surety, teller
 from stickslip.law.search import descend
 from stickslip.law.standing import CALIBRATIONS, Evidence, Misfit, Standing, standings, undescribed
 from stickslip.law.start import CALIBRATION, Shown, require_apart, seen_damping, too_few, usual_nuisance
@@ -131,7 +131,7 @@ def compare_laws(
     require_apart(oscillator, (), nuisance or (), shown)
     known = tuple(nuisance) if nuisance is not None else usual_nuisance(oscillator, (), shown)
     systems = [oscillator, *([seen_damping(oscillator, shown)] if "damping" in known else [])]
-    search = _Search(kinds, _seen(records, systems), known, calibration, _teller(progress, len(kinds)))
+    search = _Search(kinds, _seen(records, systems), known, calibration, teller(progress, CALLS * len(kinds)))
     trials, looked = search.trials(shown)
     rests = search.seen[-1][1].rests  # of the balance with the likelier damper
     misfits = [
@@ -362,19 +362,6 @@ def _continued(name: str, before: Mapping[str, Trial]) -> list[Oscillator]:
     nearest = min(before.values(), key=lambda trial: trial.point.chi2)
     stated = nearest.problem.oscillator.having(damping=nearest.system.damping)
     return [replace(stated, law=law) for law in known.continued(before)]
-
-
-def _teller(progress: Callable[[float], object] | None, laws: int) -> Callable[[], None]:
-    """Progress that comes nearer to its end with each call, as nobody knows how many there will be."""
-    calls = 0
-
-    def tell() -> None:
-        nonlocal calls
-        calls += 1
-        if progress:
-            progress(1 - math.exp(-calls / (CALLS * laws)))
-
-    return tell
 
 
 def _kinds(laws: Sequence[Any] | None) -> list[tuple[str, list[Any]]]:

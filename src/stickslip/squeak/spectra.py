@@ -337,7 +337,7 @@ def burst_clips(squeaks: Squeaks, *, most: int | None = None) -> tuple[Clip, ...
 
     Parameters
     ----------
-    found : Squeaks
+    squeaks : Squeaks
         What :func:`find_squeaks` returned.
     most : int, optional
         The loudest so many, in the order of time; all where left out.
