@@ -175,11 +175,9 @@ class Row:
     @classmethod
     def of_dict(cls, data: Mapping[str, Any]) -> Row:
         """A row from plain data."""
-        level = data["level"]
-        return cls(**{
-            **data, "estimates": tuple(_estimate(estimate) for estimate in data["estimates"]),
-            "level": None if level is None else _estimate(level), "picture": tuple(data["picture"]),
-        })  # fmt: skip
+        estimates = tuple(map(_estimate, data["estimates"]))
+        level = data["level"] and _estimate(data["level"])
+        return cls(**{**data, "estimates": estimates, "level": level, "picture": tuple(data["picture"])})
 
 
 def _estimate(data: Mapping[str, Any]) -> Estimate:

@@ -284,8 +284,8 @@ def modal_fit(
     fit = solve(lines.misfit, begin, x_scale=np.maximum(np.abs(begin), 1e-6))
     power = float(fit.fun @ fit.fun) / (len(fit.fun) - len(begin))
     cover = max(1.0, power) * np.linalg.inv(fit.jac.T @ fit.jac)[:4, :4]
-    given = {name: Estimate.stated(name, value, unit) for name, value, unit in (
-        ("mass", mass, "kg"), ("stiffness", stiffness, "N/m")) if value is not None}  # fmt: skip
+    stated = (("mass", mass, "kg"), ("stiffness", stiffness, "N/m"))
+    given = {name: Estimate.stated(name, value, unit) for name, value, unit in stated if value is not None}
     doubt = Doubt(
         f"the answer leaves {power:.2g} times the noise: more than one mass on one spring, or friction", "model"
     )

@@ -172,10 +172,9 @@ def answered(task: Task) -> Row:
     try:
         record = read(task.files, task.rig, task.names)
         findings = ASK[task.question](record, task.rig, **task.options)
-        return ss.answers.Row(
-            name, task.key, ss.summary(findings).answer, findings.quoted, findings.level, findings.normal,
-            picture=PICTURES[task.question](findings),
-        )  # fmt: skip
+        answer, picture = ss.summary(findings).answer, PICTURES[task.question](findings)
+        quoted, level = findings.quoted, findings.level
+        return ss.answers.Row(name, task.key, answer, quoted, level, findings.normal, picture=picture)
     except ss.errors.ModelError:
         raise
     except ss.StickslipError as error:

@@ -131,10 +131,9 @@ def presliding(record: Record, *, contact: str | None = None) -> Presliding:
     untold = verdict == "can not be told"
     slopes = [slope.unknown(evidence) if untold else slope.within(0.0, otherwise=evidence) for slope in slopes]
     status = evidence if untold else "ok"
-    return Presliding(
-        _inverse(_both(slopes), "presliding stiffness") if gives else None,
-        sides[0], sides[1], _backlash(strokes) if gives else None, slopes[0], slopes[1], verdict, evidence, status,
-    )  # fmt: skip
+    stiffness = _inverse(_both(slopes), "presliding stiffness") if gives else None
+    (forward, back), backlash = sides, _backlash(strokes) if gives else None
+    return Presliding(stiffness, forward, back, backlash, slopes[0], slopes[1], verdict, evidence, status)
 
 
 def _branch(stroke: Stroke, low: float, high: float) -> tuple[float, float] | None:

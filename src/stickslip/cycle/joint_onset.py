@@ -104,10 +104,8 @@ def joint_breakaway(record: Record, *, joint: JointFriction) -> JointBreakaway:
             f"{QUESTION} needs {EVENTS}, before which the torque rises slowly enough for the encoder",
             "let the reference rest and then creep, by ramps of a few seconds, with a finer encoder or a faster log",
         )
-    mean = mean_of_cycles(
-        "static over sliding friction", [ratio for ratio, _ in ends], unit="1", of="rest",
-        method="torque at rest as the encoder first moves",
-    )  # fmt: skip
+    ratios, method = [ratio for ratio, _ in ends], "torque at rest as the encoder first moves"
+    mean = mean_of_cycles("static over sliding friction", ratios, unit="1", of="rest", method=method)
     shared = float(np.mean([spread for _, spread in ends])) / math.sqrt(12)
     inexact = math.hypot(shared, joint.level.sd / joint.level.value)
     half = (mean.interval[1] - mean.interval[0]) / 2
@@ -224,10 +222,8 @@ def _parts(size: float, fastest: float, fs: float) -> list[Array]:
         way = 1.0 if place <= 0 else -1.0
         crept = place + way * CREEP * fastest * CREEPS
         goal = way * size * (0.5 + 0.4 * number / RESTS)
-        parts += [
-            np.full(round(PAUSE * fs), place), np.linspace(place, crept, round(CREEPS * fs)),
-            _stroke(crept, goal, fastest, fs),
-        ]  # fmt: skip
+        rest, creep = np.full(round(PAUSE * fs), place), np.linspace(place, crept, round(CREEPS * fs))
+        parts += [rest, creep, _stroke(crept, goal, fastest, fs)]
         place = goal
     return parts
 

@@ -142,10 +142,9 @@ def breakaway(record: Record, *, contact: str | None = None) -> Breakaway:
     rings = ringing_of(strokes.strokes, record.fs) if is_measured(record, "friction") else None  # a balance rings too
     heard = (None, None, None) if rings is None else (rings.forward, rings.back, rings.difference)
     swings = [_swing(record, [stroke for stroke in borne.strokes if stroke.way == way], side) for way, side in SIDES]
-    return Breakaway(
-        _flagged(levels[0], status), _flagged(levels[1], status), _flagged(ratio, status) or ratio, *heard,
-        swings[0], swings[1], len(borne.strokes), status,
-    )  # fmt: skip
+    forward, back = (_flagged(level, status) for level in levels)
+    ratio = _flagged(ratio, status) or ratio
+    return Breakaway(forward, back, ratio, *heard, swings[0], swings[1], len(borne.strokes), status)
 
 
 def _level(borne: _Borne, strokes: Strokes, way: int, side: str) -> Estimate | None:

@@ -272,8 +272,8 @@ class Problem:
         motion = sensitivity(
             point.runs[j], neighbours, step=STEP, starts=starts, scaled=scaled, outputs=stretch.outputs
         )
-        order = [*range(len(nearby)), *range(len(nearby) + len(off), len(motion.flow)),
-                 *range(len(nearby), len(nearby) + len(off))]  # fmt: skip
+        begin, end = len(nearby), len(nearby) + len(off)
+        order = [*range(begin), *range(end, len(motion.flow)), *range(begin, end)]
         delays = self.sensor_knobs(point.u, "delay", j)
         return [sensor.changed(motion, delays.get(sensor.channel.name, 0.0))[:, order] for sensor in stretch.sensors]
 

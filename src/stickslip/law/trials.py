@@ -238,10 +238,8 @@ def unexplained(trial: Trial, shown: Sequence[Shown]) -> dict[str, float]:
 
 def tuned(shown: Sequence[Shown], trial: Trial, stretch: Callable[[Shown, int], Stretch], tell: Tell) -> list[Shown]:
     """The records with each mount's resonance where a law leaves least, within what a calibration is off."""
-    mounts = {
-        name: motion.record.channels[name].mount for motion in shown for name in motion.channels
-        if motion.record.channels[name].mount
-    }  # fmt: skip
+    named = ((name, motion.record.channels[name].mount) for motion in shown for name in motion.channels)
+    mounts = {name: mount for name, mount in named if mount}
     best, motions = list(shown), _motions(trial)
     for name, mount in mounts.items():
         assert mount is not None
@@ -332,10 +330,9 @@ class Seen(Observed):
                 else "correct the signs of the channels, or mass= and stiffness=",
             )
         way, around = float(np.std(np.concatenate(ways))), Rests.together(rests)
-        return cls(
-            np.concatenate(slips), speed, friction, np.concatenate(steps), level,
-            _excess(speed, friction, level, around), float(np.std(speed)) / way, oscillator.mass, around,
-        )  # fmt: skip
+        excess, turns = _excess(speed, friction, level, around), float(np.std(speed)) / way
+        slip, step = np.concatenate(slips), np.concatenate(steps)
+        return cls(slip, speed, friction, step, level, excess, turns, oscillator.mass, around)
 
 
 def _excess(speed: Array, friction: Array, level: float, rests: Rests) -> float:
@@ -357,10 +354,8 @@ def _rests(record: Record, speed: Array, friction: Array, way: Array) -> Rests:
 
 def _balanced(record: Record, oscillator: Oscillator) -> Record:
     method = "fusion" if {"a", "load"} & set(record) else "smoother"
-    return friction_force(
-        record, mass=oscillator.mass, stiffness=oscillator.stiffness, damping=oscillator.damping,
-        damper=oscillator.damper, method=method, contact=getattr(oscillator.drive, "contact", "ground"),
-    )  # fmt: skip
+    constants = {name: getattr(oscillator, name) for name in ("mass", "stiffness", "damping", "damper")}
+    return friction_force(record, **constants, method=method, contact=getattr(oscillator.drive, "contact", "ground"))
 
 
 @dataclass(frozen=True, eq=False)

@@ -261,20 +261,16 @@ def _excess(fit: LawFit) -> Estimate:
     """By what part the static friction of a fitted Stribeck curve exceeds the kinetic."""
     level, static = fit.parameters["kinetic"].value, fit.parameters["static"]
     low, high = (end / level - 1 for end in static.interval)
-    return replace(
-        static, name="excess of static friction", value=static.value / level - 1, interval=(max(0.0, low), high),
-        sd=static.sd / level, unit="1",
-    )  # fmt: skip
+    value, ends, sd = static.value / level - 1, (max(0.0, low), high), static.sd / level
+    return replace(static, name="excess of static friction", value=value, interval=ends, sd=sd, unit="1")
 
 
 def _with_static(fit: LawFit, excess: Estimate) -> LawFit:
     """The fit with the static friction that the releases tell."""
     level = fit.parameters["kinetic"].value
     low, high = (level * (1 + end) for end in excess.interval)
-    static = replace(
-        excess, name="static friction", value=level * (1 + excess.value), interval=(low, high), sd=level * excess.sd,
-        unit="N",
-    )  # fmt: skip
+    value, sd = level * (1 + excess.value), level * excess.sd
+    static = replace(excess, name="static friction", value=value, interval=(low, high), sd=sd, unit="N")
     correlations = np.eye(len(fit.correlations) + 1)
     correlations[1:, 1:] = fit.correlations
     return replace(fit, parameters={"static": static, **fit.parameters}, correlations=correlations)
@@ -342,10 +338,8 @@ def _widened(estimate: Estimate, share: float, times: float) -> Estimate:
     more, (low, high) = share * abs(estimate.value), estimate.interval
     ends = (estimate.value - low, high - estimate.value)
     below, above = (times * math.hypot(end, NORMAL_95 * more) for end in ends)
-    return replace(
-        estimate, interval=(max(min(0.0, low), estimate.value - below), estimate.value + above),
-        sd=times * math.hypot(estimate.sd, more),
-    )  # fmt: skip
+    interval = (max(min(0.0, low), estimate.value - below), estimate.value + above)
+    return replace(estimate, interval=interval, sd=times * math.hypot(estimate.sd, more))
 
 
 def _guessed(name: str, given: Sequence[Any], seen: Seen) -> list[Any]:

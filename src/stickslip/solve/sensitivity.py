@@ -63,10 +63,8 @@ class Sensitivity:
         out = np.empty((count, len(times)))
         forms = np.ascontiguousarray(run.rows(name)[:, 0]), self.rows[name]
         series = np.empty((DEGREE + 1, 1 + count))
-        sample_tangents(
-            run.table.linear, self.flow, (run.starts, run.modes, run.states, self.begun), times, forms, out, series,
-            np.empty((3, 1 + count, size)),
-        )  # fmt: skip
+        pieces, work = (run.starts, run.modes, run.states, self.begun), np.empty((3, 1 + count, size))
+        sample_tangents(run.table.linear, self.flow, pieces, times, forms, out, series, work)
         return out
 
     def jumps(self, name: str) -> Array:
@@ -123,10 +121,8 @@ def sensitivity(
     begun[0, first:last, signals] += np.outer(scaled, run.states[0, signals])
     for k, (name, unit) in enumerate(starts.items(), start=last):
         begun[0, k, table.names.index(name)] = unit
-    carry_parameters(
-        table.linear, changes.of_events, table.leap, (run.modes, run.states, run.durations, run.exits),
-        (knotted, grown), begun, later, np.empty((4, 1 + count, size)),
-    )  # fmt: skip
+    pieces, work = (run.modes, run.states, run.durations, run.exits), np.empty((4, 1 + count, size))
+    carry_parameters(table.linear, changes.of_events, table.leap, pieces, (knotted, grown), begun, later, work)
     return Sensitivity(run, changes.flow, changes.rows, begun, later)
 
 
