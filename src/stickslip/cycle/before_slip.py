@@ -148,11 +148,8 @@ def _branch(stroke: Stroke, low: float, high: float) -> tuple[float, float] | No
 
 def _blurred(strokes: Strokes) -> bool:
     """Whether the friction builds up faster than a balance of forces can follow, in most strokes."""
-    rows = [
-        np.count_nonzero((stroke.friction > LOW * stroke.level) & (stroke.friction < HIGH * stroke.level)
-                         & (np.arange(len(stroke.friction)) <= stroke.slip))
-        for stroke in strokes.strokes
-    ]  # fmt: skip
+    before = [(stroke.friction[: stroke.slip + 1], stroke.level) for stroke in strokes.strokes]
+    rows = [np.count_nonzero((force > LOW * level) & (force < HIGH * level)) for force, level in before]
     return float(np.median(rows)) < BLURRED * strokes.motion.blur
 
 

@@ -65,13 +65,10 @@ def streams_of(path: Path, messages: Iterable[Message]) -> list[Stream]:
     for (topic, names), part in rows.items():
         values = np.array([row for _, _, row in part], dtype=np.float64).reshape(len(part), len(names))
         stamps = np.array([stamp for _, stamp, _ in part], dtype=np.int64)
-        streams.append(
-            Stream(
-                topic.strip("/"), _seconds(np.array([heard for heard, _, _ in part], dtype=np.int64) - first),
-                dict(zip(names, values.T, strict=True)), _seconds(stamps - stamps[0]) if np.all(stamps > 0) else None,
-                (topic, names) in named,
-            )
-        )  # fmt: skip
+        times = _seconds(np.array([heard for heard, _, _ in part], dtype=np.int64) - first)
+        own = _seconds(stamps - stamps[0]) if np.all(stamps > 0) else None
+        columns = dict(zip(names, values.T, strict=True))
+        streams.append(Stream(topic.strip("/"), times, columns, own, (topic, names) in named))
     return streams
 
 

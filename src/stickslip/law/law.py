@@ -321,11 +321,10 @@ def answered(problem: Problem, point: Point, sure: Surety | None, shown: Sequenc
             f"{worst} is left with {times:.3g} times its noise: the law is not the whole of it, or mass=, stiffness= "
             "or a unit is wrong"
         )
-    return LawFit(
-        replace(system, drive=problem.oscillator.drive), parameters, _between(problem, sure), noise, residual,
-        point.chi2, sum(counts.values()), len(problem.knobs), tuple(traces), "rough" if problem.profile else "even",
-        Status(*worries), checks,
-    )  # fmt: skip
+    system, surface = replace(system, drive=problem.oscillator.drive), "rough" if problem.profile else "even"
+    size, count, correlations = sum(counts.values()), len(problem.knobs), _between(problem, sure)
+    fit = LawFit(system, parameters, correlations, noise, residual, point.chi2, size, count, tuple(traces), surface)
+    return replace(fit, status=Status(*worries), checks=checks)
 
 
 def _between(problem: Problem, sure: Surety | None) -> Array:
@@ -338,11 +337,10 @@ def _mean_friction(problem: Problem, point: Point, level: float) -> Estimate:
     """The mean of the profile; how sure, by how the profile varies along the surface."""
     values = level * np.array([k.value(u) for k, u in zip(problem.knobs, point.u, strict=True) if k.kind == "profile"])
     sd, freedom = mean_uncertainty(values[1:-1])
-    return Estimate.normal(
-        "sliding friction", float(values[1:-1].mean()), sd=sd, unit="N", quantile=student(freedom),
-        method="mean of the friction along the surface",
-        checks=(f"it varies by {100 * np.std(values[1:-1]) / values[1:-1].mean():.2g} % along the surface",),
-    )  # fmt: skip
+    mean, method = float(values[1:-1].mean()), "mean of the friction along the surface"
+    checks = (f"it varies by {100 * np.std(values[1:-1]) / values[1:-1].mean():.2g} % along the surface",)
+    quantile = student(freedom)
+    return Estimate.normal("sliding friction", mean, sd=sd, unit="N", quantile=quantile, method=method, checks=checks)
 
 
 def _parameters(problem: Problem, point: Point, sure: Surety | None, system: Oscillator) -> dict[str, Estimate]:

@@ -173,12 +173,12 @@ def standings(
             return f"rejected: {_why(law, best, ratios, worse[law.name])}"
         return "best" if law is best and alone else "not rejected"
 
-    ranking = [
-        Standing(law.name, law.family, ratios[law.name], worse[law.name], odds[law.name],
-                 odds[law.name] > UNLIKELY, verdict(law), law.name in limits)
-        for law in order
-    ]  # fmt: skip
-    return ranking, _confidence(inner, others)
+    def standing(law: Misfit) -> Standing:
+        name, chance = law.name, odds[law.name]
+        kept, limit = chance > UNLIKELY, law.name in limits
+        return Standing(name, law.family, ratios[name], worse[name], chance, kept, verdict(law), limit)
+
+    return [standing(law) for law in order], _confidence(inner, others)
 
 
 def _confidence(inner: Mapping[str, float], others: Mapping[str, float]) -> float:

@@ -19,7 +19,7 @@ from stickslip.law.drive import Sampled, as_driven, face_of
 from stickslip.law.search import Knob, Point, Problem, descend, rows_of
 from stickslip.law.standing import Evidence, Key, independent
 from stickslip.law.start import Shown, bounded, free_names, knob, nuisance_knobs, thinned
-from stickslip.law.stretch import Motion, Stretch, attempted
+from stickslip.law.stretch import Motion, Sensor, Stretch, attempted
 from stickslip.laws.guessing import LEAST_EXCESS, STIFF, STIFFEST, Observed
 from stickslip.oscillator import Oscillator
 from stickslip.record.record import Record
@@ -130,11 +130,13 @@ def weighed(
         last = min(last, shown.turned(first, TURNS))
     every = shown.stretch(number, (first, last))
     stretch = every if whole else thinned(every)
-    sensors = tuple(
-        replace(sensor, noise=evidence.weight((sensor.channel.name, number), len(sensor.time)) if evidence
-                else math.hypot(sensor.noise, calibration * float(np.std(sensor.readings))))
-        for sensor in stretch.sensors
-    )  # fmt: skip
+
+    def noise(sensor: Sensor) -> float:
+        if evidence is None:
+            return math.hypot(sensor.noise, calibration * float(np.std(sensor.readings)))
+        return evidence.weight((sensor.channel.name, number), len(sensor.time))
+
+    sensors = tuple(replace(sensor, noise=noise(sensor)) for sensor in stretch.sensors)
     drive = stretch.drive
     if isinstance(drive, Sampled) and not whole:
         drive = drive.coarser(COARSE * calibration)
