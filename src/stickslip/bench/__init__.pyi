@@ -21,7 +21,6 @@ from stickslip.bench.free import added_mass as added_mass
 from stickslip.bench.free import best_constants as best_constants
 from stickslip.bench.free import free_vibration as free_vibration
 from stickslip.bench.free import onto_stick as onto_stick
-from stickslip.bench.known import Known as Known
 from stickslip.bench.monitor import Cycle as Cycle
 from stickslip.bench.monitor import Flaw as Flaw
 from stickslip.bench.monitor import Monitor as Monitor
@@ -51,6 +50,7 @@ from stickslip.bench.sim import Sim as Sim
 from stickslip.bench.steps import STEPS as STEPS
 from stickslip.bench.steps import BenchStep as BenchStep
 from stickslip.bench.steps import Commissioned as Commissioned
+from stickslip.bench.steps import Known as Known
 from stickslip.bench.steps import commission as commission
 from stickslip.bench.steps import step_named as step_named
 from stickslip.bench.through import SimulatedBench as SimulatedBench
