@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from stickslip.balance.motion import stretches
 from stickslip.cycle.joint import JointFriction
-from stickslip.cycle.joint_columns import sliding
+from stickslip.cycle.joint_data import sliding
 from stickslip.errors import EstimateError
 from stickslip.estimate import NORMAL_95, Estimate, Result
 from stickslip.parameters import finite
