@@ -269,11 +269,12 @@ def _doubt(record: Record, given: Record, rig: RigSettings, *, aligned: bool) ->
     """What is not known of the rig and its sensors behind a friction force that was not measured."""
     if "friction" in record and record.channels["friction"].source not in ("friction_force", "load"):
         return None
-    unknown = [
-        f"the mount of {name}{FOUND if record.channels[name].mount is not None else ''}"
+    sensors = [
+        f"{name}{FOUND if record.channels[name].mount is not None else ''}"
         for name in ("a", "load")
         if is_measured(record, name) and given.channels[name].mount is None
     ]
+    unknown = [f"how {' and '.join(sensors)} {'is' if len(sensors) == 1 else 'are'} mounted"] if sensors else []
     if aligned:
         unknown.append(f"the delay of x{FOUND}")
     unknown += [
@@ -283,8 +284,11 @@ def _doubt(record: Record, given: Record, rig: RigSettings, *, aligned: bool) ->
     ]
     if not unknown:
         return None
-    omission = f"{' and '.join(unknown)} {'is' if len(unknown) == 1 else 'are'} not stated"
-    return Doubt(f"{omission}: it may be wrong by some per cent, which the interval leaves out", UNSTATED, lesser=True)
+    listed = " and ".join(filter(None, (", ".join(unknown[:-1]), unknown[-1])))
+    omission = f"{listed} {'is' if len(unknown) == 1 else 'are'} not stated"
+    return Doubt(
+        f"{omission}: the value may be wrong by some per cent, which the interval leaves out", UNSTATED, lesser=True
+    )
 
 
 def _tell_unused(rig: RigSettings, inquiry: Inquiry) -> None:

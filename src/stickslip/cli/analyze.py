@@ -5,7 +5,6 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -26,7 +25,7 @@ from stickslip.cli.records import (
     rig_of,
     with_left_out,
 )
-from stickslip.cli.show import show
+from stickslip.cli.show import publish, show
 from stickslip.cli.terminal import complain, progress
 from stickslip.errors import INTERRUPTED
 from stickslip.workers import processors
@@ -127,18 +126,17 @@ def _sure(
     """
     if not twins:
         results = together(all_findings)
-        return results, folder and ss.publish(results, folder=folder, **context)
+        return results, publish(results, folder, **context)
     from concurrent.futures import ThreadPoolExecutor
 
     with ThreadPoolExecutor(1) as beside:  # drawn here, while other processes look for the twins
-        first = folder and partial(ss.publish, together(all_findings), folder=folder, figures=False, **context)
-        quick = beside.submit(first) if first else None
+        quick = beside.submit(publish, together(all_findings), folder, figures=False, **context)
         try:
             results = together([_tried(findings, twins, tell) for findings in all_findings])
             tell("drawing and writing")
-            return results, None if quick is None else ss.publish(results, folder=quick.result(), **context)
+            return results, publish(results, quick.result(), **context)
         except KeyboardInterrupt:
-            if quick is None:
+            if folder is None:
                 raise
             complain(f"interrupted: {quick.result()} has the quick answers, not tried on twins, without figures.")
             sys.exit(INTERRUPTED)
@@ -206,5 +204,5 @@ def impact(file: str, output: Path | None, as_json: bool, everything: bool, **op
         tell(f"reading {file}", 0)
         record = read(files, rig)
         test = ss.balance.impact_test(record, mass=rig.mass)
-        written = ss.publish(test, folder=folder, record=record) if folder else None
+        written = publish(test, folder, record=record)
     show(test, written, as_json=as_json, everything=everything, record=record)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -224,22 +223,9 @@ def _settings(
 
 
 def _toml(settings: Mapping[str, Any], files: Sequence[Path]) -> Iterator[str]:
-    """Plain values first, then the tables."""
     yield f"# The rig of {' + '.join(path.name for path in files)}, as stickslip init wrote it. A bare number is in SI."
     yield '# State how sure a constant is as in mass = "2.42 ± 0.02 kg", and a gain as in a = "acc [g] ± 1 %".'
-    tables = {key: value for key, value in settings.items() if isinstance(value, Mapping)}
-    yield from (f"{key} = {_value(value)}" for key, value in settings.items() if key not in tables)
-    for key, table in tables.items():
-        plain = {name: value for name, value in table.items() if not isinstance(value, Mapping)}
-        if plain:
-            yield from ("", f"[{key}]", *(f"{json.dumps(name)} = {_value(value)}" for name, value in plain.items()))
-        for name in table.keys() - plain.keys():
-            inner = (f"{word} = {_value(value)}" for word, value in table[name].items() if value is not None)
-            yield from ("", f"[{key}.{json.dumps(name)}]", *inner)
-
-
-def _value(value: Any) -> str:
-    return json.dumps(list(value) if isinstance(value, tuple) else value, ensure_ascii=False)
+    yield from ss.rig.rig_toml(settings)
 
 
 # ---- what comes of it

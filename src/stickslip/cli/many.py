@@ -12,7 +12,7 @@ import click
 import stickslip as ss
 from stickslip.cli.options import together
 from stickslip.cli.records import answer_together, checksum, names_of, read
-from stickslip.cli.show import show
+from stickslip.cli.show import publish, show
 from stickslip.cli.terminal import progress
 
 if TYPE_CHECKING:
@@ -115,7 +115,7 @@ def answer_many(
     """Ask all records, write what was found into `folder` (not of JSON alone), show it, forget what was kept of it."""
     with progress(len(groups)) as tell:
         batch = ask_many(question, groups, rig, query, places, folder=folder, tell=tell)
-    written = ss.publish(batch, folder=folder) if output or not shown["as_json"] else None
+    written = publish(batch, folder if output or not shown["as_json"] else None)
     if places.table is not None:
         ss.story.write_table(batch, places.table)
     _kept(folder).unlink(missing_ok=True)

@@ -17,7 +17,7 @@ import click
 
 import stickslip as ss
 from stickslip.cli.options import pair
-from stickslip.cli.show import show
+from stickslip.cli.show import publish, show
 from stickslip.cli.terminal import complain, progress, spoken
 from stickslip.printing import printable
 
@@ -297,7 +297,7 @@ def answer_together(
         found, refused = answers(groups, rig, ask, tell)
         results = with_left_out(together(found), refused)
         tell("drawing and writing", 2 * len(groups))
-        written = ss.publish(results, folder=folder) if folder else None
+        written = publish(results, folder)
     name_left_out(refused)
     show(results, written, **shown)
 

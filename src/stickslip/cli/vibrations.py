@@ -21,7 +21,7 @@ from stickslip.cli.records import (
     require_fits,
     rig_of,
 )
-from stickslip.cli.show import show
+from stickslip.cli.show import publish, show
 from stickslip.cli.terminal import progress
 
 if TYPE_CHECKING:
@@ -155,7 +155,7 @@ def wavelet(
         query |= {"mass": rig.mass, "stiffness": rig.stiffness}
         findings = ss.answers.time_frequency(parts, frequencies=frequencies, **query)
         tell("drawing and writing", 2)
-        written = ss.publish(findings, folder=folder) if folder else None
+        written = publish(findings, folder)
     show(findings, written, as_json=as_json, everything=everything)
 
 
