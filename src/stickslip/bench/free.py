@@ -129,10 +129,8 @@ def free_vibration(
         if old
         else decay.damping_ratio.unknown("the decrement method is refused")
     )
-    return FreeVibration(
-        decay.frequency, decay.damping_ratio, ratio, decay.dry_displacement, phases, delays,
-        _inertia(record, decay) if "load" in record else None, Status(*doubts),
-    )  # fmt: skip
+    inertia, dry = _inertia(record, decay) if "load" in record else None, decay.dry_displacement
+    return FreeVibration(decay.frequency, decay.damping_ratio, ratio, dry, phases, delays, inertia, Status(*doubts))
 
 
 def _inertia(record: Record, decay: DecayFit) -> Estimate:
