@@ -16,6 +16,8 @@ from stickslip.cli.options import all_option, constants_options, normal_option, 
 from stickslip.cli.records import (
     answers,
     default_folder,
+    files_of,
+    folder_after,
     groups_of,
     name_left_out,
     read,
@@ -84,7 +86,7 @@ def analyze(
     """
     places, shown = Places.of(options), {"as_json": as_json, "everything": everything}
     rig = rig_of(**options)
-    groups = [group for argument in files for group in groups_of(argument)]
+    groups = groups_of(*files)
     require_fits(options["normal"], groups)
     folder = output or default_folder(groups)
     if places.wanted(groups):
@@ -101,7 +103,7 @@ def analyze(
             of_parts=lambda parts, say: ss.answers.analyze_blocks(parts, rig=rig, method=method, progress=say),
         )
 
-        def together(findings: list[Findings]) -> Findings | Comparison:
+        def together(findings: list[Findings]) -> Any:
             return with_left_out(ss.compare(findings) if len(findings) > 1 else findings[0], refused)
 
         tell("drawing and writing", 2 * len(groups))
@@ -196,13 +198,11 @@ def impact(file: str, output: Path | None, as_json: bool, everything: bool, **op
     stickslip impact tap.csv --mass 2.42
     """
     rig = rig_of(**options)
-    groups = groups_of(file)
-    if len(groups) != 1:
-        raise click.BadParameter(f"'{file}' fits {len(groups)} records; a tap is one", param_hint="FILE")
-    folder = output or (None if as_json else default_folder(groups, "impact"))
+    files = files_of(file, "a tap is one")
+    folder = output or (None if as_json else folder_after(files[0], "impact"))
     with progress(1) as tell:
         tell(f"reading {file}", 0)
-        record = read(groups[0], rig)
+        record = read(files, rig)
         test = ss.balance.impact_test(record, mass=rig.mass)
         written = publish(test, folder, record=record)
     show(test, written, as_json=as_json, everything=everything, record=record)

@@ -11,7 +11,7 @@ import click
 
 import stickslip as ss
 from stickslip.cli.options import all_option, constants_options, reading_options
-from stickslip.cli.records import RIG_FILE, collected, groups_of, read, rig_of
+from stickslip.cli.records import RIG_FILE, collected, files_of, groups_of, read, rig_of
 from stickslip.cli.terminal import aligned, complain, say, spoken, wrapped
 
 if TYPE_CHECKING:
@@ -46,14 +46,12 @@ def check(file: str, **options: Any) -> None:
 @reading_options
 def convert(file: str, out: Path, force: bool, **options: Any) -> None:
     """Read FILE and write it as OUT: CSV, HDF5 or Parquet by its suffix, with units and history."""
-    groups = groups_of(file)
-    if len(groups) != 1:
-        raise click.BadParameter(f"'{file}' fits {len(groups)} records; one is converted at a time", param_hint="FILE")
-    if out.exists() and any(out.samefile(path) for path in groups[0]):
+    files = files_of(file, "one is converted at a time")
+    if out.exists() and any(out.samefile(path) for path in files):
         raise click.BadParameter(f"'{out}' is the file to be read", param_hint="OUT")
     if out.exists() and not force:
         raise click.BadParameter(f"'{out}' is there already; --force writes over it", param_hint="OUT")
-    say(ss.write_record(read(groups[0], rig_of(**options)), out, overwrite=force))
+    say(ss.write_record(read(files, rig_of(**options)), out, overwrite=force))
 
 
 @click.command()
@@ -109,7 +107,7 @@ def init(files: tuple[str, ...], yes: bool, output: Path, force: bool, **options
     """
     if output.exists() and not force:
         raise click.BadParameter(f"'{output}' is there already; --force writes over it", param_hint="--output")
-    groups = [group for argument in files for group in groups_of(argument)]
+    groups = groups_of(*files)
     stated = rig_of(**{**options, "here": False})
     record = read(groups[0], stated)
     guesses = [] if stated.channels else ss.rig.guess_columns(record)

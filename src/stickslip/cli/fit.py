@@ -10,7 +10,7 @@ import click
 
 import stickslip as ss
 from stickslip.cli.options import constants_options, reading_options, result_options
-from stickslip.cli.records import RIG_FILE, answers, default_folder, groups_of, name_left_out, read, rig_of
+from stickslip.cli.records import RIG_FILE, answer_together, default_folder, groups_of, read, rig_of
 from stickslip.cli.show import publish, show
 from stickslip.cli.terminal import complain, progress
 
@@ -70,8 +70,8 @@ def fit(
     stickslip fit sweep.csv --channels "v=speed [mm/s]" --channels "friction=F [N]" --curve stribeck
     """
     rig = rig_of(**options)
-    groups = [group for argument in files for group in groups_of(argument)]
-    _require_one_question(groups, curve, asked=laws is not None or system is not None)
+    groups = groups_of(*files)
+    _require_one_question(groups, curve, has_law=laws is not None or system is not None)
     folder = output or (None if as_json else default_folder(groups, "fit"))
     names = laws.split(",") if laws is not None else None
     count = f"{len(names) if names else 'six'} laws"
@@ -88,8 +88,8 @@ def fit(
     show(result, written, as_json=as_json, everything=everything, record=records)
 
 
-def _require_one_question(groups: list[list[Path]], curve: str | None, *, asked: bool) -> None:
-    if curve is not None and asked:
+def _require_one_question(groups: list[list[Path]], curve: str | None, *, has_law: bool) -> None:
+    if curve is not None and has_law:
         raise click.BadParameter(
             "a curve or laws are fitted, not both; leave one out", param_hint="--curve, --laws, --system"
         )
@@ -144,20 +144,14 @@ def predict(
     """
     rig = rig_of(**{**options, "config": options["config"] or _read_as_fitted(law, options["channels"])})
     oscillator = ss.answers.read_fitted(law, rig=rig)
-    groups = [group for argument in files for group in groups_of(argument)]
+    groups = groups_of(*files)
     folder = output or (None if as_json else default_folder(groups, "predicted"))
+
+    def together(predictions: list[Predictions]) -> Predictions:
+        return replace(predictions[0], parts=tuple(part for one in predictions for part in one.parts))
 
     def ask(record: Record) -> Predictions:
         return ss.answers.predict(record, oscillator, rig=rig, plain=plain)
 
-    with progress(2 * len(groups) + 1) as tell:
-        predictions, refused = answers(groups, rig, ask, tell)
-        parts, notes = (
-            [part for prediction in predictions for part in prediction.parts],
-            [f"Left out: {error}" for error in refused],
-        )
-        results = replace(predictions[0], parts=tuple(parts), notes=tuple(notes))
-        tell("drawing and writing", 2 * len(groups))
-        written = publish(results, folder)
-    name_left_out(refused)
-    show(results, written, as_json=as_json, everything=everything)
+    shown = {"as_json": as_json, "everything": everything}
+    answer_together(groups, rig, ask, together=together, folder=folder, **shown)

@@ -189,7 +189,7 @@ def join(first: str, second: str, output: Path | None, as_json: bool, everything
     own = [options.pop(f"{which}_channels") for which in ("first", "second")]
     if options["channels"] and any(own):
         raise click.BadParameter("columns are named for both, or for each", param_hint="--channels")
-    groups = [group for argument in (first, second) for group in groups_of(argument)]
+    groups = groups_of(first, second)
     if len(groups) != 2:
         raise click.BadParameter(f"{len(groups)} records; two are joined", param_hint="FIRST SECOND")
     seconds = None if shift is None else float(ss.Estimate.stated("offset", shift, "s"))
