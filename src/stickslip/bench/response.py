@@ -334,7 +334,7 @@ class _Lines:
             raise EstimateError(
                 f"{kept.sum()} lines that {channels[0]} excites",
                 f"{MODAL} needs {LEAST_LINES}",
-                "sweep, or shake longer",
+                f"sweep, or shake longer; of white noise state the sensor's own: with_details('{channels[0]}', noise=)",
             )
         turn = 2j * np.pi * frequency[kept]
         level = derivative_spectra(np.ones(len(record)), fs=record.fs, orders=[0])[0, kept]

@@ -17,6 +17,7 @@ from stickslip.bench.free import (
     OntoStick,
     added_mass,
     best_constants,
+    damper_of,
     free_vibration,
     onto_stick,
 )
@@ -406,19 +407,7 @@ class Known:
     def damping(self) -> Estimate | None:
         """Of the suspension [N s/m], by the damping ratio of the free vibration."""
         free, known = self.of("free", FreeVibration), self.constants
-        if free is None or known is None:
-            return None
-        factor = 2 * math.sqrt(known.mass.value * known.stiffness.value)
-        ratio = free.damping_ratio
-        part = math.hypot(known.mass.sd / known.mass.value, known.stiffness.sd / known.stiffness.value) / 2
-        sd = factor * math.hypot(ratio.spread, ratio.value * part)
-        return Estimate.normal(
-            "damping of the suspension",
-            factor * ratio.value,
-            sd=sd,
-            unit="N s/m",
-            method="damping ratio times 2 sqrt(k m)",
-        ).within(0.0)
+        return None if free is None or known is None else damper_of(free.damping_ratio, known)
 
     # ---- rig.toml
 
