@@ -86,6 +86,7 @@ def test_a_scenario_is_shown_with_its_known_answers() -> None:
         assert answer["found"] == pytest.approx(answer["known"], rel=1e-12)
 
 
+@pytest.mark.figures
 def test_a_file_gives_a_folder_that_holds_the_motion() -> None:
     result = run("slider.toml")
     assert result.exit_code == 0, result.output
