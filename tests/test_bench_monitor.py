@@ -75,11 +75,10 @@ def test_a_sensor_that_is_late_is_named(channel: str, late: tuple[str, ...]) -> 
         rig = rig.having(name, lag=3e-3)
     _, cycles = watched(Sim(rig=rig, fast=True), 3.0)
     assert {flaw.channel for cycle in cycles for flaw in cycle.flaws} == {channel}
-    assert cycles[-1].flaws[0].words.startswith(f"{channel} comes 3.00 ± 0.")
     assert cycles[1].flaws  # as soon as two cycles are there, though the motion does not repeat yet
     for flaw in (flaw for cycle in cycles for flaw in cycle.flaws):  # while the motion settles, too
         late_by, doubt = map(float, re.findall(r"[\d.]+(?= ±| ms)", flaw.words))
-        assert abs(late_by - 3.0) <= doubt, flaw.words
+        assert abs(late_by - 3.0) <= min(doubt, 0.08), flaw.words
 
 
 @pytest.mark.parametrize("channels", [("sound",), ("x", "friction", "sound")], ids=["a microphone", "the whole rig"])

@@ -316,6 +316,14 @@ def test_few_cycles_are_told_once_and_last() -> None:
     assert doubts([alone]) == ["One: only 5 turns: the interval is crude."]
 
 
+def test_a_method_is_told_once() -> None:
+    """The text on least squares stood eleven times on the page of a fit."""
+    same = {"sd": 0.1, "unit": "N", "method": "least squares"}
+    rows = [Estimate.normal(name, 1.0, checks=checks, **same) for name, checks in (("a", ("b",)), ("c", ("b", "d")))]
+    story = summary(rows)
+    assert [story.how(line) for line in story.lines] == [["least squares", "b"], ["as a", "d"]]
+
+
 def test_rounding_is_no_number_of_nanounits() -> None:
     assert value_of(Estimate.normal("slope", 3e-17, sd=1e-16, unit="N s/m", method="m")) == "0 N s/m"
     assert value_of(Estimate.normal("compliance", -3e-7, sd=2e-7, unit="m/N", method="m")) == "-300 nm/N"

@@ -14,11 +14,11 @@ from click.testing import CliRunner
 import stickslip as ss
 from stickslip.cli.program import main
 from stickslip.figures.law import law_plates
+from stickslip.law.law import _end
 from stickslip.law.search import Knob, Problem
 from stickslip.law.standing import CERTAIN, Evidence, Misfit, seen_above, standings
 from stickslip.law.start import Shown
 from stickslip.law.stretch import channels_of
-from stickslip.law.surety import _end
 from stickslip.law.trials import Seen
 from stickslip.laws.guessing import hypotheses
 from stickslip.record.record import Step

@@ -41,7 +41,7 @@ NOISY = 0.5  # of its deviation: so much noise is said from the beginning
 MATTERS = 0.001  # of its deviation: less than that may be the curvature of the motion, which grows with it
 STALLED = 1.6  # periods without a new cycle: then the channel that tells cycles is another one
 LEAST_CYCLES = 1.5  # that a window has to hold for a phase
-LATE = 4.0  # standard deviations
+LATE = 5.0  # standard deviations
 LEAST_LATE = 1.5  # samples
 TRUSTED = 0.005  # standard deviation of gains, mass and spring together, as parts: a commissioned rig's
 CLEAR = 0.2  # of the spring's force: a balance that leaves less tells no phase
@@ -111,6 +111,10 @@ class Monitor:
         rows = self._rows(self.after - period // 2, self.after)  # before that it still told cycles
         self.order.rotate(-1)
         self._afresh()
+        seen = self._rows(first, self.after)
+        span = np.empty(0) if seen is None else seen[self.order[0]][np.isfinite(seen[self.order[0]])]
+        if len(span):  # it may stick now: its motion is that of the last cycle, and not what it rings meanwhile
+            self.low, self.top = float(span.min()), float(span.max())
         self.begins.clear()
         if rows is None or rows.shape[1] < SHORTEST:
             return []
@@ -272,7 +276,9 @@ def _late(
 
 
 class _Lines(NamedTuple):
-    """Channels at a frequency [rad/s] and its neighbours, under a window that vanishes with its slope at both ends.
+    """Channels at a frequency [rad/s] and its next two, under a window that vanishes with its slope at both ends.
+
+    Two cycles hold it twice: the line below would hold of the zero of each sensor.
 
     By parts, the integral of a derivative times the window is that of the samples times the window's derivative; the
     motion need not repeat.
@@ -310,7 +316,7 @@ class _Lines(NamedTuple):
         count = len(next(iter(self.channels.values())))
         rate = math.tau * self.fs / count
         time = np.arange(count) / self.fs - delay
-        turns = -1j * (self.omega + rate * np.arange(-2, 3))
+        turns = -1j * (self.omega + rate * np.arange(-1, 4))
         waves = (-turns[:, None]) ** order * np.exp(turns[:, None] * time)
         kernels = 0.5 * waves[1:-1] - 0.25 * (waves[:-2] + waves[2:])
         return np.asarray(np.where((time >= 0) & (time * self.fs < count), kernels, 0.0))

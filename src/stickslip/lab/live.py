@@ -258,8 +258,9 @@ class Session:
             arrays[f"low {one.name}"], arrays[f"high {one.name}"] = rows.min(axis=1), rows.max(axis=1)
         oldest = time.time() - (time.monotonic() - block.clock) - block.samples.shape[1] / fs
         recorded = time.monotonic() - self.began if self.tape is not None else None
-        return frame({"kind": "block", "first": first, "step": size / fs, "start": first / fs, "oldest": oldest,
-                      "recorded": recorded, "said": self.said, "lost": self.monitor.lost}, arrays)  # fmt: skip
+        header = {"kind": "block", "first": first, "step": size / fs, "start": first / fs, "oldest": oldest}
+        header |= {"recorded": recorded, "said": self.said, "lost": self.monitor.lost}
+        return frame(header, arrays)
 
     def _ask(self) -> None:
         """Have the numbers of the last cycles found."""
