@@ -7,7 +7,6 @@ import io
 import re
 import shlex
 import shutil
-import sys
 from pathlib import Path
 
 import pytest
@@ -63,12 +62,8 @@ def test_the_readme_has_what_it_promises() -> None:
 
 @pytest.mark.parametrize("page", [ROOT / "README.md", *PAGES], ids=lambda page: page.name)
 def test_what_a_page_has_typed_works(folder: Path, page: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """As where the extra `sound` is not installed: its loudness takes five seconds at each second of a squeak.
-
-    `make smoke` types such lines in a shell.
-    """
+    """In this process; `make smoke` types such lines in a shell."""
     monkeypatch.chdir(folder)
-    monkeypatch.setitem(sys.modules, "mosqito", None)
     names: dict[str, object] = {"__name__": "__main__"}
     for language, block, shown in BLOCK.findall(page.read_text("utf-8")):
         with contextlib.redirect_stdout(io.StringIO()) as said:

@@ -304,6 +304,7 @@ def command(folder: Path, *options: str) -> list[str]:
     return ["analyze", str(path), "--twins", "8", "--output", str(folder / "out"), *constants, *options]
 
 
+@pytest.mark.figures
 def test_the_command_tries_and_tells(tmp_path: Path) -> None:
     result = CliRunner().invoke(main, command(tmp_path, "--json"))
     assert result.exit_code == 0, result.output

@@ -365,6 +365,7 @@ def test_one_way_without_a_stop_is_refused() -> None:
 # ---- the command
 
 
+@pytest.mark.figures
 def test_the_command_fits_and_writes_a_page(tmp_path: Path) -> None:
     file = ss.write_record(record("compliant"), tmp_path / "run.csv")
     answer = CliRunner().invoke(
