@@ -22,7 +22,7 @@ from scipy.signal import butter, sosfiltfilt
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 import joints
 import stickslip as ss
-from stickslip.cycle.joint_asked import asked_of
+from stickslip.cycle.joint_data import joint_data
 from stickslip.estimate import NORMAL_95
 
 TOLD = ("level", "viscous", "inertia")
@@ -51,10 +51,10 @@ def plainly(record: ss.Record, halves: list[ss.Record]) -> Answer:
 
     values, sds = fitted(record)
     told = dict(zip(("inertia", "viscous", "level"), zip(values, sds, strict=False), strict=False))
-    _, asked = asked_of(halves[1], None)
-    slides = asked.logs[0].sliding
+    _, data = joint_data(halves[1], None)
+    slides = data.logs[0].sliding
     predicted = slides.window.apply(plain_columns(halves[1]) @ fitted(halves[0])[0])[slides.rows]
-    missed = np.linalg.norm(asked.torque - predicted) / np.linalg.norm(asked.torque - asked.torque.mean())
+    missed = np.linalg.norm(data.torque - predicted) / np.linalg.norm(data.torque - data.torque.mean())
     return {name: (v, v - NORMAL_95 * sd, v + NORMAL_95 * sd) for name, (v, sd) in told.items()}, float(missed)
 
 

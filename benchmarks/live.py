@@ -1,7 +1,8 @@
 """How long from a sample to the screen in the live view, at 4 channels and 20 kHz?
 
 ``python benchmarks/live.py [SECONDS]`` watches a virtual rig in headless Chromium. The time runs from the oldest sample
-of what is drawn anew to the end of its drawing, by the clock that both programs share.
+of what is drawn anew to the frame after the one in which it was drawn, when it has been painted, by the clock that both
+programs share.
 """
 
 from __future__ import annotations
@@ -17,7 +18,11 @@ from typing import Any
 
 import numpy as np
 
-KEEP = "window.late = []; document.addEventListener('live-drawn', (event) => window.late.push(event.detail));"
+KEEP = """window.late = [];
+document.addEventListener('live-drawn', (event) => {
+  const drawn = performance.now();
+  requestAnimationFrame(() => window.late.push(event.detail + performance.now() - drawn));
+});"""
 
 
 def until(page: Any, what: str, seconds: float = 120.0) -> None:

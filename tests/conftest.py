@@ -5,11 +5,13 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 
 import pytest
 from hypothesis import settings
 
+import stickslip
 from stickslip import datasets
 from stickslip.errors import StickslipError
 
@@ -31,6 +33,20 @@ def _figures_closed() -> Iterator[None]:
     yield
     if "matplotlib.pyplot" in sys.modules:
         sys.modules["matplotlib.pyplot"].close("all")
+
+
+@pytest.fixture(autouse=True)
+def _figures_where_looked_at(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Folders of results without figures, which take four fifths of a command's time, but in tests marked `figures`."""
+    if request.node.get_closest_marker("figures") is None:
+        monkeypatch.setattr(stickslip, "publish", partial(stickslip.publish, figures=False))
+
+
+@pytest.fixture(autouse=True)
+def _loudness_where_heard(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As where the extra `sound` is not installed, but in tests marked `loudness`: a second of sound takes five."""
+    if request.node.get_closest_marker("loudness") is None:
+        monkeypatch.setitem(sys.modules, "mosqito", None)
 
 
 @pytest.fixture(scope="session")

@@ -49,6 +49,7 @@ def slide(path: str, *, friction: float = 1.5, rows: int = 4000) -> Path:
 MAP = ["--channels", "x=pos [mm]", "--channels", "friction=fr [N]"]
 
 
+@pytest.mark.figures
 def test_one_file_gives_a_table_and_a_folder() -> None:
     slide("run.csv")
     result = run("analyze", "run.csv", *MAP)
@@ -60,6 +61,7 @@ def test_one_file_gives_a_table_and_a_folder() -> None:
     assert run("analyze", "run.csv", *MAP).exit_code == 0, "its own results are replaced"
 
 
+@pytest.mark.figures
 def test_a_pattern_gives_one_report_with_the_coefficient() -> None:
     for load in (1, 2, 4):
         slide(f"load_{load}N.csv", friction=0.3 * load)

@@ -53,13 +53,14 @@ def test_stability_names_what_feeds_the_vibration() -> None:
     assert Path("out/report.html").is_file()
 
 
+@pytest.mark.figures
 def test_a_bifurcation_has_its_changes_where_python_has_them() -> None:
     words = ("bifurcation", "DH-3 b=0.5 r=0.8", "law.kinetic", "--from", "200 mN", "--to", "0.8", "--steps", "4")
-    told = json.loads(ask(*words, "--json").stdout)
+    text = ask(*words, "--output", "out").stdout
+    told = json.loads(Path("out/results.json").read_text("utf-8"))
     system = ss.scenarios.get("DH-3 b=0.5 r=0.8").system
     found = ss.bifurcation(system, "law.kinetic", values=np.linspace(0.2, 0.8, 4))
     assert [each["value"] for each in told["changes"]] == pytest.approx([each.value for each in found.changes])
-    text = ask(*words, "--output", "out").stdout
     assert "the motion changes its kind" in text
     assert "no stops" in text
     assert Path("out/figures/bifurcation.svg").is_file()

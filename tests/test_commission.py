@@ -80,6 +80,7 @@ def test_the_story_says_the_constants_first_and_the_truth_beside(done: bench.Com
     assert {plate.name for plate in story.plates} == {"calibration"}
 
 
+@pytest.mark.figures
 def test_the_command_writes_goes_on_and_answers_single_files(tmp_path: Path) -> None:
     folder, config = tmp_path / "commission", tmp_path / "devices.toml"
     config.write_text('[devices.desk]\nkind = "sim"\nfs = 1000\n', "utf-8")

@@ -80,6 +80,7 @@ def test_one_record_is_no_comparison():
         ss.answers.compare_decays([findings(1, method="thesis")])
 
 
+@pytest.mark.figures
 def test_records_together_have_a_page_and_figures(tmp_path):
     together = ss.answers.compare_decays([findings(1), findings(2, amplitude=0.9)])
     assert [plate.name for plate in ss.summary(together).plates] == ["damping-ratio", "dry-displacement"]

@@ -33,6 +33,7 @@ def run(*words):
 READ = ("--channels", "x=pos [mm]")
 
 
+@pytest.mark.figures
 @pytest.mark.parametrize("method", ["thesis", "waveform", "all"])
 def test_the_command_answers_and_leaves_a_page(release, method):
     answer = run(release, *READ, "--method", method, "--stiffness", "2 N/mm", "--output", "out", "--all")

@@ -10,7 +10,6 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from click.testing import CliRunner
 
 import stickslip as ss
 from printed import alike
@@ -131,17 +130,3 @@ def test_the_real_records_are_answered_as_their_page_shows(
 def test_every_command_stands_on_the_page_of_questions() -> None:
     page = (DOCS / "commands.md").read_text("utf-8")
     assert {f"`{name}`" for name in main.commands} - set(re.findall(r"`\w+`", page)) == LISTED_ELSEWHERE
-
-
-def test_the_tutorial_on_the_command_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Its files are made by its first block, its rig file by its toml block; its command is run as it stands there."""
-    page = DOCS / "tutorial.md"
-    monkeypatch.chdir(tmp_path)
-    exec(compile(blocks(page, "python")[0], "tutorial.md", "exec", dont_inherit=True), {})
-    (rig,) = blocks(page, "toml")
-    Path("bench.toml").write_text(rig, encoding="utf-8")
-    command = re.search(r"`stickslip (analyze [^`]+)`", page.read_text("utf-8"))
-    assert command
-    run = CliRunner().invoke(main, command[1].split())
-    assert run.exit_code == 0, run.output
-    assert (tmp_path / "findings" / "report.html").is_file()

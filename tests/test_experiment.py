@@ -151,6 +151,7 @@ def test_the_command_changes_sensors() -> None:
     assert not Path("slider-rig").exists()
 
 
+@pytest.mark.figures
 @pytest.mark.usefixtures("elsewhere")
 def test_the_command_plans() -> None:
     asked = ["slider.toml", "--plan", "--fs", "500", "--draws", "1", "--start", "0.8", "--output", "out"]

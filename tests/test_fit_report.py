@@ -34,6 +34,7 @@ def write(path: str, fs: float = 1000.0, **columns: np.ndarray) -> None:
     np.savetxt(path, np.column_stack([time, *columns.values()]), delimiter=",", header=heads, comments="", fmt="%.9g")
 
 
+@pytest.mark.figures
 def test_the_law_is_written_for_other_programs(tmp_path: Path) -> None:
     record = ss.friction_force(ss.datasets.demo(), mass=2.42, stiffness=2310)
     found = ss.fit_curve(record, curve="coulomb")

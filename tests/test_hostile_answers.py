@@ -42,6 +42,7 @@ def free_decay():
     return ss.Rig.perfect().having("x", white=1e-4).measure(run, fs=100, rng=1)
 
 
+@pytest.mark.figures
 def test_findings_outlive_a_figure_that_can_not_be_drawn(tmp_path, monkeypatch):
     found = ss.analyze_decay(free_decay(), method="thesis")
 
@@ -58,6 +59,7 @@ def test_findings_outlive_a_figure_that_can_not_be_drawn(tmp_path, monkeypatch):
     assert json.loads((folder / "results.json").read_text(encoding="utf-8"))["estimates"]
 
 
+@pytest.mark.figures
 def test_a_decay_without_a_finite_worst_case_is_drawn_and_written(tmp_path):
     found = ss.analyze_decay(free_decay(), method="thesis")
     unbounded = {name: np.full(len(found.decay.thesis.bounds.m), np.inf) for name in ("rate_worst", "dry_worst")}

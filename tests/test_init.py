@@ -100,7 +100,7 @@ def test_at_a_terminal_it_asks_and_takes_what_is_typed() -> None:
     }  # fmt: skip
 
 
-def typed(command: list[str], answers: list[tuple[str, str]], patience: float = 200.0) -> str:
+def typed(command: list[str], answers: list[tuple[str, str]], patience: float = 600.0) -> str:
     """What a program prints at a terminal, where it is answered question by question."""
     master, slave = pty.openpty()
     program = subprocess.Popen(command, stdin=slave, stdout=slave, stderr=slave, env={**os.environ, "TERM": "dumb"})
@@ -118,7 +118,7 @@ def typed(command: list[str], answers: list[tuple[str, str]], patience: float = 
         if left and left[0][0] in seen[place:]:
             place = len(seen)
             os.write(master, (left.pop(0)[1] + "\n").encode())
-    program.wait(10)
+    program.wait(600)
     os.close(master)
     assert not left, seen
     return seen

@@ -83,6 +83,7 @@ def test_logs_of_another_integrator_are_predicted_no_worse_than_by_a_plain_law()
     assert np.median(told / plain) < 0.7
 
 
+@pytest.mark.figures
 def test_command(tmp_path, monkeypatch) -> None:
     monkeypatch.chdir(tmp_path)
     for number, speed in enumerate((0.2, 0.35, 0.5)):

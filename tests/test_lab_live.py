@@ -67,12 +67,15 @@ def test_twenty_watch_and_one_records(client: TestClient, tmp_path: Path) -> Non
             until(page, "state", open="rig")
             header, arrays = until(page, "block")
             assert set(arrays) == {f"{edge} {name}" for edge in ("low", "high") for name in ("x", "z", "a", "load")}
-            assert header["step"] == 1 / 500
+            assert header["step"] == 1 / 250
         send(pages[3], "record")
         while until(pages[7], "block")[0]["recorded"] is None:
             pass
         send(pages[5], "mark", text="the <b>third</b> cycle")
         assert until(pages[0], "cycle")[1]["friction"].size > 100
+        rows = until(pages[0], "numbers")[0]["rows"]
+        assert rows[0][0] == "friction level"
+        assert 1.0 < rows[0][1] < 1.2  # N: the virtual rig's is 1.1
         send(pages[9], "drive", output="base", amplitude=1.0, frequency=float("1e9"))
         send(pages[2], "drive", output="table", amplitude=1.0, frequency=1.0)
         send(pages[0], "stop")

@@ -43,6 +43,7 @@ def ask(*words: str) -> Result:
     return CliRunner().invoke(main, list(words))
 
 
+@pytest.mark.figures
 def test_one_row_a_record_copies_and_refusals_named() -> None:
     written()
     result = ask("analyze", "run_*.csv", "--workers", "1", "--table", "all.xlsx", "--output", "out")

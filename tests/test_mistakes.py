@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import html
 import math
 import os
 import re
@@ -125,6 +126,17 @@ def test_a_mistake_is_named_first_and_the_command_printed_mends_it(name: str) ->
         assert right(again.stdout)
         return
     assert right(mended(result))
+
+
+def test_page_and_python_each_name_their_own_options(tmp_path: Path) -> None:
+    path = written("t,x [m],z [m],a [m/s^2]")
+    ask("analyze", path, *RIG, "--output", tmp_path / "out")
+    page = html.unescape((tmp_path / "out" / "report.html").read_text("utf-8"))
+    findings = ss.analyze(ss.read_record(path), mass=2.0, stiffness=3000.0, damping=1.0)
+    own = html.unescape(ss.report(findings, tmp_path / "own.html").read_text("utf-8"))
+    assert '--time "t [ms]"' in page
+    assert 'time="t [ms]"' in own
+    assert 'time="t [ms]"' not in page
 
 
 @pytest.mark.parametrize(("one", "other"), [("x", "a"), ("x", "z")])

@@ -48,6 +48,11 @@ def test_the_true_law_leaves_the_noise_and_a_wrong_one_more() -> None:
     (true,) = ss.answers.predict(record, STICKING).parts
     assert true.fit.residual["x"] == pytest.approx(NOISE, rel=0.1)
     assert true.follows["x"] == pytest.approx(100 * (1 - NOISE / np.std(record["x"])), abs=0.05)
+    scope = ss.summary(ss.answers.predict(record, STICKING, plain=False)).scope
+    assert [panel.name for panel in scope.panels] == ["x", "x, measured less model"]
+    left = scope.panels[1].lines["left"]
+    assert np.nanstd(left) == pytest.approx(NOISE, rel=0.1), "it stood in a figure that the page does not show"
+    assert scope.view is None, "of seven cycles and a half all are shown"
     assert true.plain["x"] < true.follows["x"] - 1, "static friction is not Coulomb's level and a damper"
     (wrong,) = ss.answers.predict(record, STICKING.having(static=1.1, kinetic=0.7)).parts
     assert wrong.follows["x"] < 95
@@ -93,6 +98,21 @@ def test_a_fit_is_tried_on_another_record_as_it_was_written(tmp_path: Path) -> N
     assert "as it was given" in page
     told = json.loads(Path("fast-predicted/results.json").read_text("utf-8"))
     assert told["records"][0]["channels"]["x"]["follows"] == pytest.approx(told["follows"]["x"])
+
+
+def test_columns_of_the_fit_are_those_of_the_next_record() -> None:
+    columns = {"x": "Weg [mm]", "z": "Tisch [mm]"}
+    for name, record in (("slow.csv", measured(STICKING)), ("fast.csv", measured(STICKING.having(frequency=4.0)))):
+        write(name, record)
+        text = Path(name).read_text("utf-8")
+        Path(name).write_text(text.replace("x [mm],z [mm]", "Weg [mm],Tisch [mm]"), "utf-8")
+    record = ss.read_record("slow.csv", channels=columns)
+    found = ss.fit_law(record, STICKING.having(kinetic=1.0), free=["kinetic"], nuisance=["damping"], intervals=False)
+    ss.publish(found, folder="slow-fit", record=record)
+    result = predict("slow-fit", "fast.csv", "--no-plain")
+    assert result.exit_code == 0, result.output
+    assert "columns by slow-fit/law/rig.toml" in result.stderr
+    assert "follows 99." in result.stdout
 
 
 def test_several_records_are_rows_and_what_can_not_be_asked_is_left_out() -> None:

@@ -7,7 +7,6 @@ import io
 import re
 import shlex
 import shutil
-import sys
 from pathlib import Path
 
 import pytest
@@ -26,13 +25,15 @@ def blocks(text: str, language: str) -> list[str]:
     return re.findall(rf"^```{language}\n(.*?)^```", text, flags=re.MULTILINE | re.DOTALL)
 
 
-def typed(page: Path) -> list[str]:
-    """What a page tells a reader to type in a shell, line by line."""
-    return [line for block in blocks(page.read_text("utf-8"), "sh") for line in block.splitlines() if line.strip()]
+def lines(block: str) -> list[str]:
+    """What is typed in a shell, command by command."""
+    return [line for line in block.splitlines() if line.strip()]
 
 
-BLOCK = re.MULTILINE | re.DOTALL
-PYTHON = blocks(README, "python")
+# a block of Python or of the shell, and what the page says that it prints
+BLOCK = re.compile(
+    r"^```(python|sh)\n(.*?)^```\n(?:\n<!-- prints -->\n\n```text\n(.*?)^```\n)?", re.MULTILINE | re.DOTALL
+)
 TARGETS = set(re.findall(r"^(\w+):", (ROOT / "Makefile").read_text("utf-8"), flags=re.MULTILINE))
 
 
@@ -50,54 +51,34 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_the_readme_has_what_it_promises() -> None:
-    assert {"make demo", "make test"} <= {line.partition("#")[0].strip() for line in typed(ROOT / "README.md")}
+    typed = {line.partition("#")[0].strip() for block in blocks(README, "sh") for line in lines(block)}
+    assert {"make demo", "make test"} <= typed
     pictures = re.findall(r"!\[[^\]]+\]\(([^)]+)\)", README)
     assert len(pictures) == 1
     assert (ROOT / pictures[0]).is_file()
-    assert len(PYTHON[0].splitlines()) < 15, "the first use in under fifteen lines"
+    assert len(README.splitlines()) <= 120
+    assert len(blocks(README, "python")[0].splitlines()) < 15, "the first use in under fifteen lines"
 
 
 @pytest.mark.parametrize("page", [ROOT / "README.md", *PAGES], ids=lambda page: page.name)
-def test_the_python_blocks_run(folder: Path, page: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """As where the extra `sound` is not installed: its loudness takes five seconds at each second of a squeak."""
+def test_what_a_page_has_typed_works(folder: Path, page: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """In this process; `make smoke` types such lines in a shell."""
     monkeypatch.chdir(folder)
-    monkeypatch.setitem(sys.modules, "mosqito", None)
     names: dict[str, object] = {"__name__": "__main__"}
-    text = page.read_text("utf-8")
-    for block in re.finditer(r"^```python\n(.*?)^```\n(?:\n<!-- prints -->\n\n```text\n(.*?)^```\n)?", text, BLOCK):
+    for language, block, shown in BLOCK.findall(page.read_text("utf-8")):
         with contextlib.redirect_stdout(io.StringIO()) as said:
-            exec(compile(block[1], page.name, "exec", dont_inherit=True), names)
-        if block[2] is not None:
-            assert alike(block[2], said.getvalue()), "python tools/fill_outputs.py writes it again"
-
-
-def test_the_first_use_leaves_a_report(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(folder)
-    exec(compile(PYTHON[0], "README.md", "exec", dont_inherit=True), {})
-    assert (folder / "report.html").stat().st_size > 10_000
-
-
-@pytest.mark.parametrize(
-    "page", [page for page in (ROOT / "README.md", *PAGES) if typed(page)], ids=lambda page: page.name
-)
-def test_the_commands_run(folder: Path, page: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """One page after the other, for its lines build on each other; `make smoke` types such in a shell."""
-    monkeypatch.chdir(folder)
-    monkeypatch.setitem(sys.modules, "mosqito", None)
-    for line in typed(page):
-        run(line)
-
-
-def test_the_readme_shows_what_the_command_prints(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(folder)
-    ((commands, shown),) = re.findall(r"^```sh\n([^`]*?)```\n\n<!-- prints -->\n\n```text\n(.*?)^```", README, BLOCK)
-    (line,) = [each for each in commands.splitlines() if each.startswith("stickslip analyze")]
-    assert alike(shown, CliRunner().invoke(main, shlex.split(line)[1:]).stdout)
-    assert len(README.splitlines()) <= 120
+            if language == "python":
+                exec(compile(block, page.name, "exec", dont_inherit=True), names)
+            for line in lines(block) if language == "sh" else ():
+                run(line)
+        if shown:
+            assert alike(shown, said.getvalue()), "python tools/fill_outputs.py writes it again"
+    if page.name == "README.md":
+        assert (folder / "report.html").stat().st_size > 10_000, "the first use leaves a report"
 
 
 def run(line: str) -> None:
-    """A line ends well, and says and leaves what its page promises."""
+    """A line ends well, prints, and says and leaves what its page promises."""
     command = shlex.split(line, comments=True)
     if command[0] == "make":
         assert set(command[1:]) <= TARGETS
@@ -108,6 +89,7 @@ def run(line: str) -> None:
     result = CliRunner().invoke(main, command[1:])
     assert result.exit_code == 0, result.output
     told = result.stdout
+    print(told, end="")
     if command[1] == "check":
         assert "samples" in told
         assert "nothing wrong was found" in told

@@ -86,6 +86,7 @@ def test_a_scenario_is_shown_with_its_known_answers() -> None:
         assert answer["found"] == pytest.approx(answer["known"], rel=1e-12)
 
 
+@pytest.mark.figures
 def test_a_file_gives_a_folder_that_holds_the_motion() -> None:
     result = run("slider.toml")
     assert result.exit_code == 0, result.output
@@ -137,6 +138,7 @@ def test_work_and_shares_are_those_of_the_exact_motion() -> None:
     assert decay["work against friction"] == pytest.approx(3.0, rel=1e-12), "1 N along 2 m and 1 m"
 
 
+@pytest.mark.figures
 def test_several_masses_are_told_shown_and_written() -> None:
     Path("squeal.toml").write_text(SQUEAL)
     result = run("squeal.toml", "--all")
@@ -263,6 +265,7 @@ def test_a_run_that_can_not_be_trusted_ends_with_1(monkeypatch: pytest.MonkeyPat
     )  # fmt: skip
 
 
+@pytest.mark.figures
 def test_an_error_while_writing_leaves_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     def full(*_: object, **__: object) -> None:
         raise OSError(28, "No space left on device")

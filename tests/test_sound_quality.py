@@ -9,6 +9,7 @@ import pytest
 
 import stickslip as ss
 
+pytestmark = pytest.mark.loudness
 FS = 48_000
 
 

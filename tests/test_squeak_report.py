@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import re
-import sys
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
@@ -21,12 +20,6 @@ from stickslip.cli.terminal import aligned, spoken
 CONDITIONS = [("dry", 6.13), ("wet", 6.13), ("dry", 1.23), ("wet", 1.23)]
 SLOPES = {"dry": 2.3, "wet": -0.26}  # s/m, of the rig's laws
 FS = 10_000.0
-
-
-@pytest.fixture(autouse=True)
-def without_loudness(monkeypatch: pytest.MonkeyPatch) -> None:
-    """As where the extra `sound` is not installed: it works for five seconds at each second of a sound."""
-    monkeypatch.setitem(sys.modules, "mosqito", None)
 
 
 @cache
@@ -256,8 +249,8 @@ def test_where_the_energy_is_not_told_the_lever_is_asked_for() -> None:
 # ---- sounds
 
 
-def test_a_calibrated_squeak_is_told_in_sone(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.delitem(sys.modules, "mosqito")
+@pytest.mark.loudness
+def test_a_calibrated_squeak_is_told_in_sone() -> None:
     pytest.importorskip("mosqito", reason="the extra sound is not installed")
     found = ss.analyze_squeaks(measured("wet", 6.13).between(0.4, 0.8))
     assert found.quality is not None
@@ -300,6 +293,7 @@ def test_bursts_are_cut_out_in_proportion() -> None:
 # ---- the command
 
 
+@pytest.mark.figures
 def test_a_record_becomes_a_page_with_its_sounds(tmp_path: Path) -> None:
     ss.write_record(measured("wet", 6.13), tmp_path / "wet.csv")
     result = run(tmp_path / "wet.csv", "--normal", "6.13 N", "--output", tmp_path / "out")
@@ -321,6 +315,7 @@ def test_a_record_becomes_a_page_with_its_sounds(tmp_path: Path) -> None:
     assert names == {"spectrogram", "spectra", "coherence", "forcing-cycle", "burst", "friction-velocity"}
 
 
+@pytest.mark.figures
 def test_several_records_are_compared(tmp_path: Path) -> None:
     for surface, load in CONDITIONS[1::2]:
         ss.write_record(measured(surface, load), tmp_path / f"{surface}_{load}.csv")

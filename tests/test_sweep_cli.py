@@ -89,6 +89,7 @@ def test_a_file_with_an_empty_grid_is_refused(file: Path) -> None:
         ss.maps.read_sweep(file)
 
 
+@pytest.mark.figures
 def test_the_command_maps_keeps_and_draws(file: Path, tmp_path: Path) -> None:
     store = tmp_path / "map.zarr"
     command = ["sweep", str(file), "--store", str(store), "--output", str(tmp_path / "maps"), "--json"]
@@ -136,6 +137,7 @@ def test_the_map_is_drawn_over_its_parameters() -> None:
         ss.figures.plot_map(atlas, variable="stick")
 
 
+@pytest.mark.figures
 def test_a_map_that_can_not_be_drawn_says_why(tmp_path: Path) -> None:
     slider = forced(0.8, 0.5)
     cube = {"frequency": [0.1, 0.13], "kinetic": [2.0, 3.0], ("mass", "stiffness"): [(1, 1), (2, 2)]}

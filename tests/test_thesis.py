@@ -157,11 +157,11 @@ def test_chapters_in_other_processes_are_the_same(tmp_path: Path) -> None:
     def nothing(words: str, done: float) -> None:
         pass
 
-    apart = page.reproduce(["appendices", "7"], folder=tmp_path / "apart", tell=nothing)
+    apart = page.reproduce(["6", "appendices"], folder=tmp_path / "apart", tell=nothing)
     here = page.run_chapter("appendices")
-    assert [chapter.name for chapter in apart] == ["appendices", "7"]
-    assert list(apart[0].entries()) == list(here.entries())
-    assert [plate.svg() for plate in apart[0].plates] == [plate.svg() for plate in here.plates]
+    assert [chapter.name for chapter in apart] == ["6", "appendices"]
+    assert list(apart[1].entries()) == list(here.entries())
+    assert [plate.svg() for plate in apart[1].plates] == [plate.svg() for plate in here.plates]
     assert len(list((tmp_path / "apart" / "figures").glob("*.png"))) == sum(len(one.plates) for one in apart)
 
 

@@ -338,6 +338,7 @@ def test_the_page_tells_no_micro_slips_against_its_verdict() -> None:
     assert "rings" not in stick.axes[0].get_legend_handles_labels()[1]
 
 
+@pytest.mark.figures
 def test_the_command_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     ss.write_record(noisy("two", 40, cycles=6), "run.csv")

@@ -138,6 +138,7 @@ def test_over_tests_the_scatter_between_them_counts() -> None:
     assert mean.interval[1] - mean.interval[0] > 5 * np.ptp(tests[0].tribometer.plateau.interval)
 
 
+@pytest.mark.figures
 def test_command(tmp_path, monkeypatch) -> None:
     monkeypatch.chdir(tmp_path)
     for number, level in enumerate((0.3, 0.31)):

@@ -14,11 +14,11 @@ from click.testing import CliRunner
 import stickslip as ss
 from stickslip.cli.program import main
 from stickslip.figures.law import law_plates
+from stickslip.law.law import _end
 from stickslip.law.search import Knob, Problem
 from stickslip.law.standing import CERTAIN, Evidence, Misfit, seen_above, standings
 from stickslip.law.start import Shown
 from stickslip.law.stretch import channels_of
-from stickslip.law.surety import _end
 from stickslip.law.trials import Seen
 from stickslip.laws.guessing import hypotheses
 from stickslip.record.record import Step
@@ -365,6 +365,7 @@ def test_one_way_without_a_stop_is_refused() -> None:
 # ---- the command
 
 
+@pytest.mark.figures
 def test_the_command_fits_and_writes_a_page(tmp_path: Path) -> None:
     file = ss.write_record(record("compliant"), tmp_path / "run.csv")
     answer = CliRunner().invoke(

@@ -97,8 +97,16 @@ def stands(status: str) -> bool:
     return all(doubt.lesser for doubt in doubts_of(status))
 
 
+class Plain:
+    """What JSON tells as the fields that it has."""
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data for JSON; what is not finite becomes ``None``."""
+        return dict(plain(vars(self)))
+
+
 @dataclass(frozen=True)
-class Estimate:
+class Estimate(Plain):
     """A number found in a record, with its 95 % interval.
 
     It counts as its value (``float(level)``, ``f"{level:.3f}"``); printed, it has the digits that its interval leaves.
@@ -242,9 +250,9 @@ class Estimate:
         """Whether the 95 % interval holds `value`."""
         return self.interval[0] <= value <= self.interval[1]
 
-    def to_dict(self) -> dict[str, Any]:
-        """Plain data for JSON; what is not finite becomes ``None``."""
-        return dict(plain(vars(self)))
+    def doubted(self, status: str) -> Estimate:
+        """The same with this status, where it has none of its own yet."""
+        return replace(self, status=status) if self.status == "ok" else self
 
     @property
     def spread(self) -> float:

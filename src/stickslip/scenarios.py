@@ -104,8 +104,8 @@ def get(name: str) -> Scenario:
     if name not in names():
         raise ModelError(f"no scenario is called '{name}'", f"there are {', '.join(names())}", "choose one")
     entry = _table()[name]
-    return Scenario(name, entry["about"], _system(entry), entry.get("start", {}), entry.get("run", {}), entry["known"],
-                    entry.get("tolerance", 1e-10))  # fmt: skip
+    start, run, tolerance = entry.get("start", {}), entry.get("run", {}), entry.get("tolerance", 1e-10)
+    return Scenario(name, entry["about"], _system(entry), start, run, entry["known"], tolerance)
 
 
 def answers(scenario: Scenario, *, run: Trajectory | None = None) -> dict[str, Any]:

@@ -59,10 +59,8 @@ class LeastSquares:
 
     def estimate(self, index: int, name: str, unit: str, method: str, **more: Any) -> Estimate:
         """Coefficient number `index` as an Estimate."""
-        return Estimate.normal(
-            name, self.coefficients[index], sd=self.sd[index], unit=unit, method=method,
-            quantile=student(float(self.freedom[index])), **more,
-        )  # fmt: skip
+        value, sd, quantile = self.coefficients[index], self.sd[index], student(float(self.freedom[index]))
+        return Estimate.normal(name, value, sd=sd, unit=unit, method=method, quantile=quantile, **more)
 
     def combined(
         self, weights: ArrayLike, name: str, unit: str, method: str, *, beside: float = 0.0, **more: Any
@@ -74,10 +72,8 @@ class LeastSquares:
         """
         form = np.asarray(weights, dtype=float) @ self.projection
         sd, freedom = mean_uncertainty(len(form) * form * self.residual / (1 - self.leverage))
-        return Estimate.normal(
-            name, float(np.asarray(weights) @ self.coefficients), sd=math.hypot(sd, beside), unit=unit, method=method,
-            quantile=student(freedom), **more,
-        )  # fmt: skip
+        value, sd = float(np.asarray(weights) @ self.coefficients), math.hypot(sd, beside)
+        return Estimate.normal(name, value, sd=sd, unit=unit, method=method, quantile=student(freedom), **more)
 
 
 def _influenced(form: Array, residual: Array, independent: float, terms: int) -> tuple[float, float]:
@@ -334,10 +330,10 @@ def least_squares(design: ArrayLike, data: ArrayLike, *, instruments: ArrayLike 
     leverage = np.einsum("ij,ji->i", unit, projection)
     sure = [_influenced(form, residual, independent, terms) for form in projection]
     sd = np.array([value for value, _ in sure]) / lengths
-    return LeastSquares(
-        scaled / lengths, sd, np.array([freedom for _, freedom in sure]), residual, condition, independent,
-        projection / lengths[:, None], np.clip(leverage * count / independent, 0.0, MOST_LEVERAGE),
-    )  # fmt: skip
+    freedoms = np.array([freedom for _, freedom in sure])
+    leverage = np.clip(leverage * count / independent, 0.0, MOST_LEVERAGE)
+    influence = projection / lengths[:, None]
+    return LeastSquares(scaled / lengths, sd, freedoms, residual, condition, independent, influence, leverage)
 
 
 def follows(measured: Array, model: Array) -> float:

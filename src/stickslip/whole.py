@@ -163,10 +163,10 @@ def _locked_beside(folder: Path) -> ExitStack | None:
             msvcrt.locking(file.fileno(), msvcrt.LK_NBLCK, 1)  # type: ignore[attr-defined]
         except OSError:
             return None
-        held = ExitStack()
-        held.callback(_remove_unless_open, path)
-        held.push(stack.pop_all())  # closed first
-        return held
+        lock = ExitStack()
+        lock.callback(_remove_unless_open, path)
+        lock.push(stack.pop_all())  # closed first
+        return lock
 
 
 def _remove_unless_open(path: Path) -> None:

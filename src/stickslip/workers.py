@@ -7,7 +7,11 @@ import signal
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from importlib import import_module
-from typing import Any
+from threading import Thread
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from concurrent.futures import ProcessPoolExecutor
 
 Map = Callable[..., Iterator[Any]]
 
@@ -32,18 +36,39 @@ def workers(count: int, module: str) -> Iterator[Map]:
     if count < 2:
         yield map
         return
+    processes = pool(count, module)
+    try:
+        yield processes.map
+    finally:
+        processes.shutdown(wait=False, cancel_futures=True)
+
+
+def pool(count: int, module: str) -> ProcessPoolExecutor:
+    """So many processes, which begin at once with the import of `module`, and end with this one whatever ends it."""
     from concurrent.futures import ProcessPoolExecutor
     from multiprocessing import get_context
 
     # begun afresh and not forked: a fork of a process with compiled threads may hang
-    pool = ProcessPoolExecutor(count, get_context("spawn"), initializer=unheard)
+    processes = ProcessPoolExecutor(count, get_context("spawn"), initializer=_begin)
     with _silent():
         for _ in range(count):
-            pool.submit(_load, module)  # a process begins with its first task
-    try:
-        yield pool.map
-    finally:
-        pool.shutdown(wait=False, cancel_futures=True)
+            processes.submit(_load, module)  # a process begins with its first task
+    return processes
+
+
+def _begin() -> None:
+    unheard()
+    Thread(target=_end_with_parent, daemon=True).start()
+
+
+def _end_with_parent() -> None:
+    """A process of a pool holds both ends of its queue: that the other side was killed it would never read there."""
+    from multiprocessing import parent_process
+
+    parent = parent_process()
+    assert parent is not None
+    parent.join()
+    os._exit(1)
 
 
 def _load(module: str) -> None:

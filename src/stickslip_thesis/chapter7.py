@@ -209,15 +209,22 @@ def merging(given: Given) -> tuple[float, float]:
 def rig_between(given: Given, wetness: float, load: float, power: float) -> ss.Structure:
     """The rig between dry (0) and wet (1), with a normal law of a power; at rest all are alike under the heavy load."""
     heavy = given["squeak"]["heavy"]
-    ends = [ss.squeak.squeak_rig(surface, heavy).contacts[0] for surface in ("dry", "wet")]
+    dry, wet = (_pad(surface, heavy) for surface in ("dry", "wet"))
     kinetic, slope = (
-        (1 - wetness) * getattr(ends[0].law, name) + wetness * getattr(ends[1].law, name)
-        for name in ("kinetic", "slope")
+        (1 - wetness) * getattr(dry.law, name) + wetness * getattr(wet.law, name) for name in ("kinetic", "slope")
     )
-    stiffness = ends[0].stiffness * (load / heavy) ** (1 - 1 / max(power, HERTZ))
+    law, stiffness = (
+        replace(dry.law, kinetic=kinetic, slope=slope),
+        dry.stiffness * (load / heavy) ** (1 - 1 / max(power, HERTZ)),
+    )
     rig = ss.squeak.squeak_rig("wet", load)
-    contacts = [replace(contact, stiffness=stiffness, power=power) for contact in rig.contacts]
-    return replace(rig, contacts=contacts).having(kinetic=kinetic, slope=slope)
+    return replace(rig, contacts=[replace(pad, law=law, stiffness=stiffness, power=power) for pad in rig.contacts])
+
+
+@functools.lru_cache(4)
+def _pad(surface: str, load: float) -> ss.Contact:
+    """One of the two contacts, which are alike in all that is read of it."""
+    return ss.squeak.squeak_rig(surface, load).contacts[0]
 
 
 @functools.lru_cache(64)

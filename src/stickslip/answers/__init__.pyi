@@ -1,4 +1,3 @@
-from stickslip.answers.axes import axis_record as axis_record
 from stickslip.answers.decays import Decay as Decay
 from stickslip.answers.decays import compare_decays as compare_decays
 from stickslip.answers.experiment import ExperimentPlan as ExperimentPlan
@@ -13,6 +12,7 @@ from stickslip.answers.fits import read_fitted as read_fitted
 from stickslip.answers.frequencies import TimeFrequency as TimeFrequency
 from stickslip.answers.frequencies import time_frequency as time_frequency
 from stickslip.answers.joints import analyze_joint as analyze_joint
+from stickslip.answers.joints import axis_record as axis_record
 from stickslip.answers.joints import compare_joints as compare_joints
 from stickslip.answers.joints import episodes as episodes
 from stickslip.answers.long_records import analyze_blocks as analyze_blocks

@@ -10,7 +10,7 @@ from typing import Any, Protocol, cast
 
 import numpy as np
 
-from stickslip.answers.findings import BY_DECREMENTS, Asked, Comparison, Findings, record_name, require_several
+from stickslip.answers.findings import BY_DECREMENTS, Comparison, Findings, Inquiry, record_name, require_several
 from stickslip.answers.mistakes import mistakes_of_decay
 from stickslip.decay.answer import DecayFit, rig_units
 from stickslip.decay.decrement import Decrement, decrement
@@ -289,13 +289,13 @@ def analyze_decay(
     first = releases.ring_downs[0]
     # a hold before the release is no drift
     faults = tuple(fault for fault in record.check() if (fault.kind, fault.channel) != ("drift", first.channel))
-    asked, constants = Asked(list(releases.notes)), _constants(first.channel, mass=mass, stiffness=stiffness)
+    inquiry, constants = Inquiry(list(releases.notes)), _constants(first.channel, mass=mass, stiffness=stiffness)
     way: dict[str, Any] = {"channel": first.channel, "restoring": restoring}
-    decay = _by_every_way(record, releases, asked, method, way, constants)
+    decay = _by_every_way(record, releases, inquiry, method, way, constants)
     slips = mistakes_of_decay(
         first.channel, abs(first.amplitude), decay.best.frequency.value, decay.mass, decay.stiffness
     )
-    notes, settings = tuple(dict.fromkeys(asked.notes)), {"method": method, **way, **constants}
+    notes, settings = tuple(dict.fromkeys(inquiry.notes)), {"method": method, **way, **constants}
     results = {"decay": decay, "slips": slips}
     return Findings(record_name(record), record, faults, notes=notes, settings=settings, results=results)
 
@@ -312,19 +312,19 @@ def _require_method(method: str, restoring: Restoring) -> None:
 
 
 def _by_every_way(
-    record: Record, releases: Releases, asked: Asked, method: str, way: dict[str, Any], constants: dict[str, Any]
+    record: Record, releases: Releases, inquiry: Inquiry, method: str, way: dict[str, Any], constants: dict[str, Any]
 ) -> Decay:
     """What the whole waveform, the decrements and the older methods say, as far as `method` asks them."""
     linear, displaced = way["restoring"] == "linear", releases.ring_downs[0].order == 0
     waveform = thesis = motion = refusal = None
     if method != "thesis":
-        waveform, motion, refusal = _by_waveform(record, asked, way, constants, displaced=displaced)
+        waveform, motion, refusal = _by_waveform(record, inquiry, way, constants, displaced=displaced)
     if method != "waveform" and linear:
-        thesis = asked.ask("The decrements", partial(decrement, record, channel=way["channel"]))
-    refusals = asked.refusals[-1:]
+        thesis = inquiry.ask("The decrements", partial(decrement, record, channel=way["channel"]))
+    refusals = inquiry.refusals[-1:]
     methods = {} if method != "all" or not displaced else OLDER if linear else FOR_PENDULUMS
     answers = {
-        name: asked.ask(name.capitalize(), partial(older, record, channel=way["channel"]))
+        name: inquiry.ask(name.capitalize(), partial(older, record, channel=way["channel"]))
         for name, older in methods.items()
     }
     older = {name: answer for name, answer in answers.items() if answer is not None}
@@ -341,21 +341,21 @@ def _constants(channel: str, **stated: Constant | None) -> dict[str, Any]:
 
 
 def _by_waveform(
-    record: Record, asked: Asked, way: dict[str, Any], constants: dict[str, Any], *, displaced: bool
+    record: Record, inquiry: Inquiry, way: dict[str, Any], constants: dict[str, Any], *, displaced: bool
 ) -> tuple[DecayFit | None, DecayMotion | None, StickslipError | None]:
     """The whole waveform, and of a displacement which motion it was; the latter alone where nothing fits the former."""
     fit = partial(fit_decay, record, **way, **constants)
-    waveform = asked.ask("Which motion", partial(fit, candidates="all")) if displaced else None
-    waveform = waveform or asked.ask("The whole waveform", fit)
+    waveform = inquiry.ask("Which motion", partial(fit, candidates="all")) if displaced else None
+    waveform = waveform or inquiry.ask("The whole waveform", fit)
     if waveform is None:
-        refusal = asked.refusals[-1]
-        return None, asked.ask("Which motion", partial(choose_motion, record, **way)) if displaced else None, refusal
+        refusal = inquiry.refusals[-1]
+        return None, inquiry.ask("Which motion", partial(choose_motion, record, **way)) if displaced else None, refusal
     motion = waveform.motions[0] if waveform.motions else None
-    waveform = asked.ask("The whole waveform", partial(_followed, waveform, way["restoring"]))
+    waveform = inquiry.ask("The whole waveform", partial(_followed, waveform, way["restoring"]))
     if waveform is not None:
         return waveform, motion, None
     unsure = motion is not None and motion.choice.status != "ok"
-    return None, None if unsure else motion, asked.refusals[-1]
+    return None, None if unsure else motion, inquiry.refusals[-1]
 
 
 def _followed(fit: DecayFit, restoring: Restoring) -> DecayFit:
@@ -418,7 +418,7 @@ def compare_decays(findings: Sequence[Findings]) -> Comparison:
     (True, {})
     """
     require_several(findings)
-    apart, log = _apart(findings), Asked()
+    apart, log = _apart(findings), Inquiry()
     ways = {key: [finding.settings.get(key) for finding in findings] for key in ASKED}
     mixed = [key for key, values in ways.items() if len(set(values)) > 1]
     joint = None

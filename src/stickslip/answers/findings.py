@@ -35,7 +35,7 @@ BY_DECREMENTS = ", by decrements"  # behind the name of a number that another me
 
 
 @dataclass(frozen=True)
-class Asked:
+class Inquiry:
     """What came of the questions so far: notes in words, and the errors behind those that failed.
 
     A question aside (how late a sensor is, whether two forces agree) helps the others along. Where it has no answer

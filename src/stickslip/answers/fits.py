@@ -88,7 +88,7 @@ def fit_records(
     sliding friction 1.102 N (95 %: 1.100 to 1.104)
     """
     records = [with_sensors(record, rig) for record in records]
-    curve = curve or _only_curve(records[0], asked=bool(laws or system))
+    curve = curve or _only_curve(records[0], has_law=bool(laws or system))
     if curve is not None and len(records) > 1:
         raise ModelError(f"a curve and {len(records)} records", "a curve is fitted to one", "give one of them alone")
     if curve is not None:
@@ -98,9 +98,9 @@ def fit_records(
     return comparison, list(records)
 
 
-def _only_curve(record: Record, *, asked: bool) -> str | None:
+def _only_curve(record: Record, *, has_law: bool) -> str | None:
     """The curve of a record that holds friction and velocity alone, unless laws were asked for."""
-    if not asked and "x" not in record and FRICTION & set(record):
+    if not has_law and "x" not in record and FRICTION & set(record):
         return UNASKED
     if not {"x", "v"} & set(record):
         raise RecordError(

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+import functools
 import itertools
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from stickslip.answers.findings import record_name
+from stickslip.answers.findings import Inquiry, record_name
 from stickslip.balance.motion import is_measured
 from stickslip.contact.frequency_transition import Transition, transition_of
 from stickslip.contact.mechanisms import UNTOLD, Mechanism, mechanism_of
@@ -28,7 +29,6 @@ from stickslip.units import parse_range
 if TYPE_CHECKING:
     import xarray as xr
 
-Answer = TypeVar("Answer")
 Array = NDArray[np.float64]
 
 CHOSEN = ("a", "sound", "force", "load", "friction", "v", "x")  # the channel that is looked at, the first that is there
@@ -197,16 +197,9 @@ def _spikes_and_sticks(
     answers: dict[str, Any] = {"spikes": find_spikes(record, name)}
     clocks = [channel for channel in record if name not in CHOSEN and _runs_on(record[channel])]
     notes = [f"Channel {clock} only rises or only falls, as times do: {name} is mapped." for clock in clocks[:1]]
-
-    def asked(what: str, question: Callable[[], Answer]) -> Answer | None:
-        try:
-            return question()
-        except EstimateError as error:
-            notes.append(f"{what}: {error}")
-            return None
-
+    ask = functools.partial(Inquiry(notes).ask, aside=True)
     if name == "friction" and is_measured(record, name) and any(channel in record for channel in ("x", "v", "theta")):
-        answers["slip_ringing"] = asked("Ringing after slips", lambda: slip_ringing(record))
+        answers["slip_ringing"] = ask("Ringing after slips", lambda: slip_ringing(record))
         return answers, notes
     if record.channels[name].unit != "m/s^2":
         notes.append(f"Channel {name} is no acceleration: what the sticks tell was not asked.")
@@ -218,9 +211,9 @@ def _spikes_and_sticks(
         return answers, notes
     answers["ringing"] = ringing
     answers["mechanism"] = mechanism_of(ringing)
-    answers["transition"] = asked("Transition", lambda: transition_of(ringing, mass, stiffness))
+    answers["transition"] = ask("Transition", lambda: transition_of(ringing, mass, stiffness))
     if answers["transition"] is not None:  # where nothing rings, nothing cuts a ring off
-        answers["microslips"] = asked("Micro-slips", lambda: microslips_of(ringing))
+        answers["microslips"] = ask("Micro-slips", lambda: microslips_of(ringing))
     return answers, notes
 
 

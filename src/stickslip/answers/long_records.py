@@ -154,7 +154,5 @@ def _mean(estimates: Sequence[Estimate]) -> Estimate:
     half = max(own, apart) + abs(skew)
     status = Counter(estimate.status for estimate in estimates).most_common(1)[0][0]
     checks = (f"{count} blocks, which scatter by {values.std(ddof=1):.3g}", *estimates[count // 2].checks)
-    return replace(
-        estimates[count // 2], value=mean, interval=(mean - half + min(skew, 0), mean + half + max(skew, 0)),
-        sd=half / NORMAL_95, status=status, checks=checks,
-    )  # fmt: skip
+    ends, sd = (mean - half + min(skew, 0), mean + half + max(skew, 0)), half / NORMAL_95
+    return replace(estimates[count // 2], value=mean, interval=ends, sd=sd, status=status, checks=checks)

@@ -175,11 +175,9 @@ class Row:
     @classmethod
     def of_dict(cls, data: Mapping[str, Any]) -> Row:
         """A row from plain data."""
-        level = data["level"]
-        return cls(**{
-            **data, "estimates": tuple(_estimate(estimate) for estimate in data["estimates"]),
-            "level": None if level is None else _estimate(level), "picture": tuple(data["picture"]),
-        })  # fmt: skip
+        estimates = tuple(map(_estimate, data["estimates"]))
+        level = data["level"] and _estimate(data["level"])
+        return cls(**{**data, "estimates": estimates, "level": level, "picture": tuple(data["picture"])})
 
 
 def _estimate(data: Mapping[str, Any]) -> Estimate:
@@ -360,9 +358,9 @@ def _cells(row: Row, names: Sequence[str]) -> Iterator[tuple[str, Any]]:
 class Kept:
     """The rows that are done, in a file beside the folder of results; one that was asked otherwise is begun again."""
 
-    def __init__(self, path: Path, asked: Mapping[str, Any]) -> None:
+    def __init__(self, path: Path, query: Mapping[str, Any]) -> None:
         self.path, self.rows = path, dict[str, Row]()
-        first = json.dumps({"asked": asked}, sort_keys=True, default=str)
+        first = json.dumps({"asked": query}, sort_keys=True, default=str)
         lines = path.read_text(encoding="utf-8").split("\n") if path.exists() else []
         if lines[:1] == [first]:
             for line in lines[1:-1]:  # a last line without its end was cut off

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.answers.findings import Asked
+from stickslip.answers.findings import Inquiry
 from stickslip.balance.felt_and_computed import ForceComparison, compare_force
 from stickslip.balance.force import friction_force
 from stickslip.balance.lag import HIDDEN, REPEATS, SensorDelay, sensor_delay
@@ -108,32 +108,32 @@ class Ready:
     doubt: Doubt | None = None
 
 
-def ready(record: Record, rig: RigSettings, method: str, asked: Asked) -> Ready:
+def ready(record: Record, rig: RigSettings, method: str, inquiry: Inquiry) -> Ready:
     """The record with its sensors stated, without its delays, with its friction."""
     for name in (name for name in rig.sensors if name not in record):
-        asked.notes.append(f"A sensor {name} is described, but the record has no such channel.")
-    record, stated = _without_dead(with_sensors(record, rig), asked), rig
+        inquiry.notes.append(f"A sensor {name} is described, but the record has no such channel.")
+    record, stated = _without_dead(with_sensors(record, rig), inquiry), rig
     given = record
-    record, delay = _aligned(record, asked)
+    record, delay = _aligned(record, inquiry)
     known = [name for name in USED if name in record]
-    whole = (asked.ask("Stated delays", lambda: without_delays(record, *known)) if known else None) or record
+    whole = (inquiry.ask("Stated delays", lambda: without_delays(record, *known)) if known else None) or record
     comparison = None
     if is_measured(whole, "friction"):
-        _tell_unused(rig, asked)
+        _tell_unused(rig, inquiry)
     else:
-        rig = _weighed(whole, rig, asked)
+        rig = _weighed(whole, rig, inquiry)
         if "x" in whole and _enough(whole, rig):
             if "load" in whole and ("a" in whole or not _base_seen(whole)):
-                comparison = asked.ask(
+                comparison = inquiry.ask(
                     "Force comparison", lambda: compare_force(middle(whole, STRETCH), **_constants(rig)), aside=True
                 )
-                whole = _with_mounts(whole, comparison, asked)
-            if method == "auto" and _base_moves(whole, comparison, asked):
+                whole = _with_mounts(whole, comparison, inquiry)
+            if method == "auto" and _base_moves(whole, comparison, inquiry):
                 whole, comparison = without(whole, "z"), None
             else:
-                whole = _balanced(whole, rig, method, asked)
+                whole = _balanced(whole, rig, method, inquiry)
     if "friction" not in whole:
-        whole = _by_load(whole, rig, asked)
+        whole = _by_load(whole, rig, inquiry)
     return Ready(whole, delay, comparison, _doubt(whole, given, stated, aligned=record is not given))
 
 
@@ -158,10 +158,10 @@ def _enough(record: Record, rig: RigSettings) -> bool:
     return stated == 2 or (stated == 1 and not {"a", "load"}.isdisjoint(record))
 
 
-def _without_dead(record: Record, asked: Asked) -> Record:
+def _without_dead(record: Record, inquiry: Inquiry) -> Record:
     """The record without sensors that read one value throughout."""
     dead = [name for name in SENSED if name in record and constant(record[name])]
-    asked.notes.extend(f"{unmoved(record, name)}: it is left out." for name in dead)
+    inquiry.notes.extend(f"{unmoved(record, name)}: it is left out." for name in dead)
     return without(record, *dead)
 
 
@@ -180,14 +180,14 @@ def without(record: Record, *names: str) -> Record:
     )
 
 
-def _weighed(record: Record, rig: RigSettings, asked: Asked) -> RigSettings:
+def _weighed(record: Record, rig: RigSettings, inquiry: Inquiry) -> RigSettings:
     """The rig with its mass and its spring by what the load cell feels, where neither was stated."""
     if rig.mass is not None or rig.stiffness is not None or "friction" in record:
         return rig
     if not {"x", "load"} <= set(record) or not _base_seen(record):
         return rig
     ends = {"damper": rig.damper, "contact": rig.contact}
-    constants = asked.ask(
+    constants = inquiry.ask(
         "Mass and stiffness",
         lambda: mass_and_stiffness(middle(record, STRETCH), damping=float(rig.damping or 0.0), **ends),
         aside=True,
@@ -195,7 +195,7 @@ def _weighed(record: Record, rig: RigSettings, asked: Asked) -> RigSettings:
     if constants is None:
         return rig
     mass, stiffness = constants
-    asked.notes.append(
+    inquiry.notes.append(
         f"No mass and no stiffness were stated: {mass.value:.4g} kg and {stiffness.value:.4g} N/m are found from what "
         "the load cell feels."
     )
@@ -207,11 +207,11 @@ def _base_seen(record: Record) -> bool:
     return "z" in record and not constant(record["z"])
 
 
-def _base_moves(record: Record, comparison: ForceComparison | None, asked: Asked) -> bool:
+def _base_moves(record: Record, comparison: ForceComparison | None, inquiry: Inquiry) -> bool:
     """Whether a base that is not measured can not have been at rest, by the load cell."""
     moves = not _base_seen(record) and comparison is not None and comparison.unlike
     if moves:
-        asked.notes.append(
+        inquiry.notes.append(
             f"{'z does not change' if 'z' in record else 'There is no channel z'}, and with the spring's other end at "
             "rest the motion leaves another force than the load cell feels: mass and spring are not used."
         )
@@ -222,22 +222,22 @@ def _constants(rig: RigSettings) -> dict[str, Any]:
     return {"mass": rig.mass, "stiffness": rig.stiffness, "damping": rig.damping or 0.0, "damper": rig.damper}
 
 
-def _aligned(record: Record, asked: Asked) -> tuple[Record, SensorDelay | None]:
+def _aligned(record: Record, inquiry: Inquiry) -> tuple[Record, SensorDelay | None]:
     """The record with the delay of displacement against acceleration stated, where it was not."""
     if not {"x", "a"} <= set(record) or any(record.channels[name].delay for name in ("x", "z", "a") if name in record):
         return record, None
-    lag = asked.ask("Sensor delay", lambda: sensor_delay(middle(record, STRETCH)), aside=True)
+    lag = inquiry.ask("Sensor delay", lambda: sensor_delay(middle(record, STRETCH)), aside=True)
     if lag is None:
         return record, None
     if lag.gain.value < 0:
-        asked.notes.append(
+        inquiry.notes.append(
             "The accelerometer runs against the displacement: one of the two has the wrong sign. Turn it round, as in "
             'channels={"a": "-COLUMN [m/s^2]"}.'
         )
         return record, lag
     late = -lag.delay.value
     if lag.status != "ok" and not (REPEATS in kinds(lag.status) and kinds(lag.status) <= {REPEATS, HIDDEN}):
-        asked.notes.append(f"The delay of x against a, {1e3 * late:.3g} ms, is not taken out: {lag.status}.")
+        inquiry.notes.append(f"The delay of x against a, {1e3 * late:.3g} ms, is not taken out: {lag.status}.")
         return record, lag
     if abs(late) < SURE * lag.delay.sd:
         return record, lag
@@ -245,21 +245,21 @@ def _aligned(record: Record, asked: Asked) -> tuple[Record, SensorDelay | None]:
         if name in record:
             record = record.with_details(name, delay=late)
     late_ones = "x, and z as a sensor of its kind, come" if "z" in record else "x comes"
-    asked.notes.append(
+    inquiry.notes.append(
         f"{late_ones} {1e3 * late:.3g} ms after a, by the phase of their lines: taken out. State what is known "
         "of the sensors' delays to have that taken instead."
     )
     return record, lag
 
 
-def _with_mounts(record: Record, comparison: ForceComparison | None, asked: Asked) -> Record:
+def _with_mounts(record: Record, comparison: ForceComparison | None, inquiry: Inquiry) -> Record:
     """The record with the mounts stated that the comparison of forces shows, where they were not."""
     differ = comparison is not None and (comparison.opposite or comparison.unlike)
     for resonance in () if comparison is None or differ else comparison.resonances:
         name = "a" if "accelerometer" in resonance.name else "load"
         if "mount" in resonance.name and record.channels[name].mount is None:
             record = record.with_details(name, mount=(resonance.frequency.value, resonance.damping.value))
-            asked.notes.append(
+            inquiry.notes.append(
                 f"The {resonance.name} is taken to ring at {resonance.frequency.value:.4g} Hz: {resonance.evidence}."
             )
     return record
@@ -269,11 +269,12 @@ def _doubt(record: Record, given: Record, rig: RigSettings, *, aligned: bool) ->
     """What is not known of the rig and its sensors behind a friction force that was not measured."""
     if "friction" in record and record.channels["friction"].source not in ("friction_force", "load"):
         return None
-    unknown = [
-        f"the mount of {name}{FOUND if record.channels[name].mount is not None else ''}"
+    sensors = [
+        f"{name}{FOUND if record.channels[name].mount is not None else ''}"
         for name in ("a", "load")
         if is_measured(record, name) and given.channels[name].mount is None
     ]
+    unknown = [f"how {' and '.join(sensors)} {'is' if len(sensors) == 1 else 'are'} mounted"] if sensors else []
     if aligned:
         unknown.append(f"the delay of x{FOUND}")
     unknown += [
@@ -283,15 +284,18 @@ def _doubt(record: Record, given: Record, rig: RigSettings, *, aligned: bool) ->
     ]
     if not unknown:
         return None
-    omission = f"{' and '.join(unknown)} {'is' if len(unknown) == 1 else 'are'} not stated"
-    return Doubt(f"{omission}: it may be wrong by some per cent, which the interval leaves out", UNSTATED, lesser=True)
+    listed = " and ".join(filter(None, (", ".join(unknown[:-1]), unknown[-1])))
+    omission = f"{listed} {'is' if len(unknown) == 1 else 'are'} not stated"
+    return Doubt(
+        f"{omission}: the value may be wrong by some per cent, which the interval leaves out", UNSTATED, lesser=True
+    )
 
 
-def _tell_unused(rig: RigSettings, asked: Asked) -> None:
+def _tell_unused(rig: RigSettings, inquiry: Inquiry) -> None:
     unused = [key for key in CONSTANTS if key in rig.model_fields_set and getattr(rig, key) is not None]
     if unused:
         verb = "is" if len(unused) == 1 else "are"
-        asked.notes.append(f"The friction was measured: {' and '.join(unused)} as stated {verb} not used.")
+        inquiry.notes.append(f"The friction was measured: {' and '.join(unused)} as stated {verb} not used.")
 
 
 def described(sensor: Channel) -> bool:
@@ -322,36 +326,36 @@ def chosen_method(record: Record, rig: RigSettings) -> tuple[str, str]:
     return "smoother", f"{why}: the displacement differentiated by a smoother"
 
 
-def _balanced(record: Record, rig: RigSettings, method: str, asked: Asked) -> Record:
+def _balanced(record: Record, rig: RigSettings, method: str, inquiry: Inquiry) -> Record:
     """The record with its friction by the balance of forces."""
     why = "as asked"
     if method == "auto":
         method, why = chosen_method(record, rig)
-    balanced = asked.ask(
+    balanced = inquiry.ask(
         "Friction force", lambda: friction_force(record, contact=rig.contact, method=method, **_constants(rig))
     )
     if balanced is None:
         return record
     lost = () if balanced.rig is None else balanced.rig.lost
-    asked.notes.append(f"Friction force: {'; '.join([f'by the method {method}', why, *lost])}.")
+    inquiry.notes.append(f"Friction force: {'; '.join([f'by the method {method}', why, *lost])}.")
     for name, unit in (("mass", "kg"), ("stiffness", "N/m")):
         if getattr(rig, name) is None:
             value = f"{getattr(balanced.rig, name):.4g} {unit}"
-            asked.notes.append(f"No {name} was stated: {value} is found from how the mass slides.")
+            inquiry.notes.append(f"No {name} was stated: {value} is found from how the mass slides.")
     if "z" not in record:
-        asked.notes.append("There is no channel z: the spring's other end is taken to be at rest.")
+        inquiry.notes.append("There is no channel z: the spring's other end is taken to be at rest.")
     if rig.damping is None:
-        asked.notes.append("No damping was stated: viscous damping of the suspension, if any, counts as friction.")
+        inquiry.notes.append("No damping was stated: viscous damping of the suspension, if any, counts as friction.")
     return balanced
 
 
-def _by_load(record: Record, rig: RigSettings, asked: Asked) -> Record:
+def _by_load(record: Record, rig: RigSettings, inquiry: Inquiry) -> Record:
     """The record with what its load cell reads as its friction, or with a note of what is lacking."""
     moves = any(name in record for name in MOTION)
     if "load" in record and "force" not in record and moves:
         if described(record.channels["load"]) and "x" in record:
-            return _by_cell(record, asked)
-        asked.notes.append(
+            return _by_cell(record, inquiry)
+        inquiry.notes.append(
             "The load cell's reading is taken as the friction force; inertia between both is part of it, and what "
             "its mount adds, of which nothing is stated."
         )
@@ -359,32 +363,32 @@ def _by_load(record: Record, rig: RigSettings, asked: Asked) -> Record:
         unit = record.channels["load"].unit
         return record.with_channel("friction", record["load"], unit=unit, source="load", step=step)
     if {"x", "a"} <= set(record) and rig.mass is None and rig.stiffness is None and "load" not in record:
-        _tell_per_mass(record, rig, asked)
+        _tell_per_mass(record, rig, inquiry)
     lacking = [key for key in ("mass", "stiffness") if getattr(rig, key) is None]
     lacking = lacking if "x" in record else ["a displacement x", *lacking]
     if lacking and "force" not in record and (moves or "load" not in record):
-        asked.notes.append(
+        inquiry.notes.append(
             f"Friction force: without a measured friction or load it needs {' and '.join(lacking)}, not given."
         )
     return record
 
 
-def _tell_per_mass(record: Record, rig: RigSettings, asked: Asked) -> None:
+def _tell_per_mass(record: Record, rig: RigSettings, inquiry: Inquiry) -> None:
     """What can be said without mass, spring and load cell."""
-    scaled = asked.ask(
+    scaled = inquiry.ask(
         "Friction per mass", lambda: friction_force(record, contact=rig.contact, method="motion"), aside=True
     )
     if scaled is not None:
         level = float(np.median(np.abs(scaled["friction_per_mass"])))
-        asked.notes.append(f"Friction per mass: {level:.4g} m/s^2 (median); {scaled.history[-1].outcome}.")
+        inquiry.notes.append(f"Friction per mass: {level:.4g} m/s^2 (median); {scaled.history[-1].outcome}.")
 
 
-def _by_cell(record: Record, asked: Asked) -> Record:
+def _by_cell(record: Record, inquiry: Inquiry) -> Record:
     """The record with its friction by the load cell alone, less what is stated of it."""
-    measured = asked.ask("Friction force", lambda: friction_force(record, method="load"))
+    measured = inquiry.ask("Friction force", lambda: friction_force(record, method="load"))
     if measured is None:
         return record
-    asked.notes.append(f"Friction force: {measured.history[-1].outcome}.")
+    inquiry.notes.append(f"Friction force: {measured.history[-1].outcome}.")
     return measured
 
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.answers.findings import BY_FORCE, NOT_TRIED, ONSETS, Asked, Findings, flagged, record_name, with_doubt
+from stickslip.answers.findings import BY_FORCE, NOT_TRIED, ONSETS, Findings, Inquiry, flagged, record_name, with_doubt
 from stickslip.answers.mistakes import missing, mistakes, slipped, untrue
 from stickslip.answers.preparation import AT_ONCE, CONSTANTS, MOTION, described, middle, normal_load, ready, unmoved
 from stickslip.balance.balance import ALONE, Balance, pulled_slider
@@ -100,8 +100,8 @@ def analyze(
     require_record(record)
     given = {"mass": mass, "stiffness": stiffness, "damping": damping, "damper": damper, "contact": contact}
     rig = _settings(rig, {key: value for key, value in given.items() if value is not None})
-    asked, name, faults = Asked(), record_name(record), tuple(record.check())
-    made = ready(record, rig, method, asked)
+    inquiry, name, faults = Inquiry(), record_name(record), tuple(record.check())
+    made = ready(record, rig, method, inquiry)
     whole = made.record
     slid = slid_on(whole, rig.contact if "contact" in rig.model_fields_set else None)
     answers: dict[str, Any] = {}
@@ -109,18 +109,18 @@ def analyze(
     for question in QUESTIONS:
         led = not question.follows or answers.get(question.follows) is not None
         if led and answers.get(question.unless) is None and question.fits(whole):
-            answers[question.key] = asked.ask(question.name, partial(_answer, question, whole, fused, slid))
+            answers[question.key] = inquiry.ask(question.name, partial(_answer, question, whole, fused, slid))
     slips = mistakes(record, rig, answers.get("consistency"), answers.get("loops"))
-    answers = doubted(answers, whole, slips, unknown=made.doubt, refusals=asked.refusals)
+    answers = doubted(answers, whole, slips, unknown=made.doubt, refusals=inquiry.refusals)
     answers = untried(answers) if lacking(whole) is None else answers
     if all(answer is None for answer in answers.values()):
-        raise _nothing(name, record, asked.refusals)
+        raise _nothing(name, record, inquiry.refusals)
     names = [question.key for question in QUESTIONS]
     results = {**dict.fromkeys(names), **answers, "delay": made.delay, "comparison": made.comparison, "trial": None}
     results |= {"slips": slips, "lacking": missing(whole, rig)}
-    normal = normal_load(record, rig, name, asked.notes)
+    normal = normal_load(record, rig, name, inquiry.notes)
     settings = {**_stated(rig, all_of_it=bool(results["lacking"])), **_constants_of(whole), "contact": slid}
-    return Findings(name, whole, faults, normal, tuple(asked.notes), settings, results=results)
+    return Findings(name, whole, faults, normal, tuple(inquiry.notes), settings, results=results)
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ from functools import partial
 
 import numpy as np
 
-from stickslip.answers.findings import Asked, Comparison, Findings, record_name, require_several
+from stickslip.answers.findings import Comparison, Findings, Inquiry, record_name, require_several
 from stickslip.cycle.loops import NO_SLOPE, friction_loops
 from stickslip.errors import EstimateError
 from stickslip.estimate import Estimate, kinds
@@ -79,29 +79,29 @@ def analyze_squeaks(
     lever = None if lever is None else parse_constant("lever", lever, "m")
     faults = tuple(record.check())
     squeaks = find_squeaks(record, channel=channel, frequencies=band)
-    asked = Asked(list(squeaks.notes))
+    inquiry = Inquiry(list(squeaks.notes))
     others = [channel for channel in VIBRATING if channel in record and channel != squeaks.channel]
     listen = partial(find_squeaks, record, frequencies=band)
-    beside = [asked.ask(f"Bursts in {other}", partial(listen, channel=other)) for other in others]
+    beside = [inquiry.ask(f"Bursts in {other}", partial(listen, channel=other)) for other in others]
     loops = None
     if "friction" in record and any(channel in record for channel in ("x", "v", "theta")):
-        loops = asked.ask("Friction over the cycle", partial(friction_loops, record, contact=contact))
+        loops = inquiry.ask("Friction over the cycle", partial(friction_loops, record, contact=contact))
     else:
-        asked.notes.append("No friction beside a motion is recorded: how it changes with speed can not be told.")
+        inquiry.notes.append("No friction beside a motion is recorded: how it changes with speed can not be told.")
     if lever is not None and "torsion_velocity" not in record:
-        asked.notes.append("The lever is not used: no torsion is recorded, in a channel torsion_velocity.")
-    spectra = asked.ask("Spectra", partial(burst_spectra, record, squeaks=squeaks)) if squeaks.bursts else None
+        inquiry.notes.append("The lever is not used: no torsion is recorded, in a channel torsion_velocity.")
+    spectra = inquiry.ask("Spectra", partial(burst_spectra, record, squeaks=squeaks)) if squeaks.bursts else None
     joined = None
     if squeaks.squeaking:
-        joined = asked.ask("Coupling", partial(coupling, record, squeaks=squeaks, lever=lever))
+        joined = inquiry.ask("Coupling", partial(coupling, record, squeaks=squeaks, lever=lever))
     results = {
         "squeaks": squeaks,
         "beside": tuple(squeaks_of for squeaks_of in beside if squeaks_of is not None),
         "loops": loops,
         "coupling": joined,
         "spectra": spectra,
-        "quality": _quality(record, squeaks, asked),
-        "impulses": asked.ask("Pulses", partial(impulsiveness, record, channel=squeaks.channel)),
+        "quality": _quality(record, squeaks, inquiry),
+        "impulses": inquiry.ask("Pulses", partial(impulsiveness, record, channel=squeaks.channel)),
     }
     chosen = {
         "channel": squeaks.channel,
@@ -109,10 +109,10 @@ def analyze_squeaks(
         **({"contact": contact} if contact else {}),
     }
     load = _normal(record, normal)
-    return Findings(name or record_name(record), record, faults, load, tuple(asked.notes), chosen, results=results)
+    return Findings(name or record_name(record), record, faults, load, tuple(inquiry.notes), chosen, results=results)
 
 
-def _quality(record: Record, squeaks: Squeaks, asked: Asked) -> SoundQuality | None:
+def _quality(record: Record, squeaks: Squeaks, inquiry: Inquiry) -> SoundQuality | None:
     """Of a calibrated sound; of a long one, about its loudest burst: the method takes as long as the sound."""
     if record.channels[squeaks.channel].unit != "Pa" or not squeaks.bursts:
         return None
@@ -122,8 +122,8 @@ def _quality(record: Record, squeaks: Squeaks, asked: Asked) -> SoundQuality | N
         begin = min(max(record.start, loudest.start - HEARD_AT_ONCE / 2), end - HEARD_AT_ONCE)
         record = record.between(begin, begin + HEARD_AT_ONCE)
         part = f"{begin:.4g} to {begin + HEARD_AT_ONCE:.4g} s"
-        asked.notes.append(f"Loudness, sharpness and roughness are those of {part}.")
-    return asked.ask("Loudness, sharpness and roughness", partial(sound_quality, record, channel=squeaks.channel))
+        inquiry.notes.append(f"Loudness, sharpness and roughness are those of {part}.")
+    return inquiry.ask("Loudness, sharpness and roughness", partial(sound_quality, record, channel=squeaks.channel))
 
 
 def trend_of(slope: Estimate | None) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from functools import partial
 
-from stickslip.answers.findings import Asked, Comparison, Findings, record_name, require_several
+from stickslip.answers.findings import Comparison, Findings, Inquiry, record_name, require_several
 from stickslip.cycle.onset import Breakaway, breakaway
 from stickslip.cycle.tribometer import DEFINITIONS, Coefficients, friction_coefficients
 from stickslip.errors import EstimateError
@@ -57,23 +57,23 @@ def analyze_tribometer(
     True
     """
     require_record(record)
-    faults, asked = tuple(record.check()), Asked()
+    faults, inquiry = tuple(record.check()), Inquiry()
     if "friction" not in record and (felt := next((name for name in ("load", "force") if name in record), None)):
         step = Step("analyze_tribometer", {"friction": felt}, f"the friction is the {felt}")
         record = record.with_channel("friction", record[felt], unit="N", source=felt, step=step)
     if normal is None and rig is not None and "normal" not in record:
         normal = rig.normal_load(record_name(record))
-    found = friction_coefficients(record, normal=normal, frequency=frequency)
-    away = asked.ask("Breakaway", partial(breakaway, record), aside=True)
-    static = asked.ask("The static coefficient", partial(_static, found, away), aside=True) if away else None
-    results = {"tribometer": found, "static": static, "wear_in": found.wear_in}
-    load = "measured" if found.measured else f"{found.load.value:.4g} N, stated"
+    coefficients = friction_coefficients(record, normal=normal, frequency=frequency)
+    away = inquiry.ask("Breakaway", partial(breakaway, record), aside=True)
+    static = inquiry.ask("The static coefficient", partial(_static, coefficients, away), aside=True) if away else None
+    results = {"tribometer": coefficients, "static": static, "wear_in": coefficients.wear_in}
+    load = "measured" if coefficients.measured else f"{coefficients.load.value:.4g} N, stated"
     return Findings(
-        record_name(record), record, faults, notes=tuple(asked.notes), settings={"normal load": load}, results=results
+        record_name(record), record, faults, notes=tuple(inquiry.notes), settings={"normal load": load}, results=results
     )
 
 
-def _static(found: Coefficients, away: Breakaway) -> Estimate:
+def _static(coefficients: Coefficients, away: Breakaway) -> Estimate:
     """The static coefficient, of what the contact bears either way before it slips."""
     ways = [way for way in (away.forward, away.back) if way is not None and way.known]
     if len(ways) < 2 or not all(stands(way.status) for way in ways):
@@ -81,9 +81,9 @@ def _static(found: Coefficients, away: Breakaway) -> Estimate:
             "breakaway is not told both ways", "the static coefficient is of both", "sample it more often at reversals"
         )
     ends = zip(*(way.interval for way in ways), strict=True)
-    low, high = (sum(end) / 2 / found.load.value for end in ends)
-    value = sum(way.value for way in ways) / 2 / found.load.value
-    sd = sum(way.sd for way in ways) / 2 / found.load.value
+    low, high = (sum(end) / 2 / coefficients.load.value for end in ends)
+    value = sum(way.value for way in ways) / 2 / coefficients.load.value
+    sd = sum(way.sd for way in ways) / 2 / coefficients.load.value
     return Estimate("coefficient of friction, static", value, (low, high), sd, "1", ways[0].method).within(0.0)
 
 
@@ -118,7 +118,7 @@ def compare_tribometers(findings: Sequence[Findings]) -> Comparison:
     require_several(findings)
     results = {}
     for name in DEFINITIONS:
-        told = [getattr(one.tribometer, name) for one in findings]
-        values = [one.value for one in told]
-        results[name] = mean_of_cycles(told[0].name, values, unit="1", method="mean over the tests", of="test")
+        coefficients = [getattr(one.tribometer, name) for one in findings]
+        values = [one.value for one in coefficients]
+        results[name] = mean_of_cycles(coefficients[0].name, values, unit="1", method="mean over the tests", of="test")
     return Comparison(tuple(findings), results=results)

@@ -238,11 +238,10 @@ def _band(frequency: Array, direct: Complex, indirect: Complex, worth: float, to
     significant = 1 - CHANCE ** (1 / (worth - 1))
     verdict = "differ" if abs(ratio - 1) > tolerance + NORMAL_95 * sd else "agree" if sd < tolerance else "noise"
     size = math.sqrt(1 / (2 * len(direct)))
-    return ForceBand(
-        float(frequency[0]), float(frequency[-1]), centre, size * math.sqrt(power), size * math.sqrt(other),
-        size * float(np.linalg.norm(direct - indirect)), abs(ratio), float(np.angle(ratio)), sd, coherence, significant,
-        verdict if coherence > significant else "noise",
-    )  # fmt: skip
+    low, high, gain, phase = float(frequency[0]), float(frequency[-1]), abs(ratio), float(np.angle(ratio))
+    sizes = size * math.sqrt(power), size * math.sqrt(other), size * float(np.linalg.norm(direct - indirect))
+    verdict = verdict if coherence > significant else "noise"
+    return ForceBand(low, high, centre, *sizes, gain, phase, sd, coherence, significant, verdict)
 
 
 def _difference(lines: Lines, difference: Array) -> Estimate:
@@ -270,12 +269,11 @@ def _agree_up_to(bands: tuple[ForceBand, ...], tolerance: float, lines: Lines, n
     elif not np.any(off > tolerance):
         status = f"they agree as far as they stand out of the noise, to {heard[-1].high:.4g} Hz"
     low, high = ends[0] * math.exp(-NORMAL_95 * width), ends[2] * math.exp(NORMAL_95 * width)
-    return Estimate(
-        "frequency up to which the forces agree", ends[1], (low, high), (high - low) / (2 * NORMAL_95), "Hz",
-        f"ratio within {100 * tolerance:g} % of 1 in bands a factor of {RATIO:g} wide", status,
-        (f"{lines.count} {'cycles' if lines.cycles else 'windows'}",
-         f"{len(heard)} of {len(bands)} bands have both forces in common"),
-    ).within(0.0, nyquist)  # fmt: skip
+    name, unsure = "frequency up to which the forces agree", (high - low) / (2 * NORMAL_95)
+    method = f"ratio within {100 * tolerance:g} % of 1 in bands a factor of {RATIO:g} wide"
+    common = f"{len(heard)} of {len(bands)} bands have both forces in common"
+    checks = (f"{lines.count} {'cycles' if lines.cycles else 'windows'}", common)
+    return Estimate(name, ends[1], (low, high), unsure, "Hz", method, status, checks).within(0.0, nyquist)
 
 
 def _crossing(frequency: Array, off: Array, tolerance: float) -> float:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from stickslip.balance.balance import known_constants
 from stickslip.balance.mounts import ACCELEROMETER, CELL, Resonance
 from stickslip.errors import EstimateError
-from stickslip.estimate import Constant, Estimate, Result, plain
+from stickslip.estimate import Constant, Estimate, Plain, Result
 from stickslip.record.record import Record
 from stickslip.signals.derivatives import noise_along
 from stickslip.signals.interpolate import without_delays
@@ -36,7 +36,7 @@ MISFIT = 1.5  # root mean square of what is left over, in standard deviations of
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class ImpactTest(Result):
+class ImpactTest(Result, Plain):
     """What rings after a tap.
 
     Attributes
@@ -63,10 +63,6 @@ class ImpactTest(Result):
     def estimates(self) -> tuple[Estimate, ...]:
         """Frequency and damping of each."""
         return tuple(number for resonance in self.resonances for number in (resonance.frequency, resonance.damping))
-
-    def to_dict(self) -> dict[str, Any]:
-        """Plain data for JSON."""
-        return dict(plain(vars(self)))
 
 
 def impact_test(record: Record, *, mass: Constant | None = None) -> ImpactTest:

@@ -258,11 +258,9 @@ def _answer(
             f"{name}, frequency", 1 / (2 * math.pi * root), [0, 0, 0, 1 / (4 * math.pi * root**3)], "Hz"
         )
         damping = estimate(f"{name}, damping ratio", damped / (2 * root), slope, "1").within(0.0)
-    return SensorDelay(
-        estimate(f"delay of {second} behind {first}", alignment.delay, [1, 0, 0, 0], "s", status),
-        estimate(f"gain of {second} over {first}", gain, [0, 1, 0, 0], "1"),
-        frequency, damping, tuple(alike), channels, "phase", status,
-    )  # fmt: skip
+    delay = estimate(f"delay of {second} behind {first}", alignment.delay, [1, 0, 0, 0], "s", status)
+    gained = estimate(f"gain of {second} over {first}", gain, [0, 1, 0, 0], "1")
+    return SensorDelay(delay, gained, frequency, damping, tuple(alike), channels, "phase", status)
 
 
 def _status(pair: Alignment, others: Sequence[float], channels: tuple[str, str], *, hidden: bool) -> str:

@@ -381,11 +381,9 @@ def _aperiodic(motion: Motion, repeated: float) -> Cycles:
         )
     mean = mean_of_cycles("cycle", np.diff(edges) / motion.fs, unit="s", method="")
     longest, shortest = mean.interval[1], mean.interval[0]
-    average = Estimate(
-        "cycle frequency", 1 / mean.value, (1 / longest, 1 / shortest if shortest > 0 else math.inf),
-        mean.sd / mean.value**2, "Hz", "cycles between onsets of motion", "the motion is not periodic",
-        mean.checks,
-    )  # fmt: skip
+    interval, sd = (1 / longest, 1 / shortest if shortest > 0 else math.inf), mean.sd / mean.value**2
+    how, doubt = "cycles between onsets of motion", "the motion is not periodic"
+    average = Estimate("cycle frequency", 1 / mean.value, interval, sd, "Hz", how, doubt, mean.checks)
     status = (
         f"the motion is not periodic ({100 * max(0.0, repeated):.0f} % of its variance repeats): "
         f"{len(edges) - 1} cycles from one onset of motion, at {definite_speed(motion):.3g} {motion.unit}/s, "

@@ -15,7 +15,7 @@ from stickslip.balance.lag import SensorDelay, sensor_delay
 from stickslip.balance.mass import Complex, Lines
 from stickslip.balance.motion import is_measured
 from stickslip.errors import EstimateError
-from stickslip.estimate import Constant, Estimate, plain
+from stickslip.estimate import Constant, Estimate, Plain
 from stickslip.record.record import Record, Step
 from stickslip.signals.derivatives import LEAST, noise_along
 from stickslip.signals.interpolate import without_delays
@@ -33,7 +33,7 @@ HEARD = 3.0  # standard deviations of its noise from which a line counts
 
 
 @dataclass(frozen=True)
-class Resonance:
+class Resonance(Plain):
     """Something that swings.
 
     Attributes
@@ -55,10 +55,6 @@ class Resonance:
     damping: Estimate
     channels: tuple[str, ...]
     evidence: str
-
-    def to_dict(self) -> dict[str, Any]:
-        """Plain data for JSON."""
-        return dict(plain(vars(self)))
 
     def __str__(self) -> str:
         frequency, damping = (

@@ -21,11 +21,11 @@ from stickslip.bench.free import added_mass as added_mass
 from stickslip.bench.free import best_constants as best_constants
 from stickslip.bench.free import free_vibration as free_vibration
 from stickslip.bench.free import onto_stick as onto_stick
-from stickslip.bench.known import Known as Known
 from stickslip.bench.monitor import Cycle as Cycle
 from stickslip.bench.monitor import Flaw as Flaw
 from stickslip.bench.monitor import Monitor as Monitor
 from stickslip.bench.monitor import answers as answers
+from stickslip.bench.picture import Picture as Picture
 from stickslip.bench.recording import Acquired as Acquired
 from stickslip.bench.recording import Tape as Tape
 from stickslip.bench.recording import Trigger as Trigger
@@ -48,14 +48,15 @@ from stickslip.bench.runs import read_runs as read_runs
 from stickslip.bench.runs import run_list as run_list
 from stickslip.bench.sim import Fault as Fault
 from stickslip.bench.sim import Sim as Sim
-from stickslip.bench.simulated import SimulatedBench as SimulatedBench
-from stickslip.bench.simulated import sweep_of as sweep_of
 from stickslip.bench.steps import STEPS as STEPS
 from stickslip.bench.steps import BenchStep as BenchStep
 from stickslip.bench.steps import Commissioned as Commissioned
+from stickslip.bench.steps import Known as Known
 from stickslip.bench.steps import commission as commission
 from stickslip.bench.steps import step_named as step_named
+from stickslip.bench.through import SimulatedBench as SimulatedBench
 from stickslip.bench.through import Tour as Tour
+from stickslip.bench.through import sweep_of as sweep_of
 from stickslip.bench.through import tour as tour
 
 __all__: list[str]

@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
-from typing import NamedTuple
+from functools import partial
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,16 +30,20 @@ POINTS = 240  # of a loop: more is not seen
 KEPT = 20.0  # s of samples that are looked back to, at the most
 CYCLES = 2  # that a check of the sensors looks at
 TOLD = 8  # that the numbers are of, where there are so many; three at the least
+SOUNDS = ("sound", "ay")  # that squeak: of the microphone, of an accelerometer across
+LISTENED = 0.5  # s that are looked at in place of a cycle where a sound alone is measured
 HIGH = 0.2  # of the span of the motion, on either side of its middle: where a cycle is said to begin
 SLOWEST = 15.0  # s that a cycle may last
 # Set on the virtual rig's two presets with each fault, at 2.5, 5.6 and 11.1 Hz, and on none:
 ONLY_NOISE = 1.7  # times its noise: a channel whose deviation is less holds nothing else
 NOISIER = 3.0  # times the noise that it had in its first cycles
 NOISY = 0.5  # of its deviation: so much noise is said from the beginning
+MATTERS = 0.001  # of its deviation: less than that may be the curvature of the motion, which grows with it
 STALLED = 1.6  # periods without a new cycle: then the channel that tells cycles is another one
-ALIKE = 0.05  # by how much two cycles may differ whose phase is looked at
-LATE = 4.0  # standard deviations
+LEAST_CYCLES = 1.5  # that a window has to hold for a phase
+LATE = 5.0  # standard deviations
 LEAST_LATE = 1.5  # samples
+TRUSTED = 0.005  # standard deviation of gains, mass and spring together, as parts: a commissioned rig's
 CLEAR = 0.2  # of the spring's force: a balance that leaves less tells no phase
 
 
@@ -78,7 +83,8 @@ class Monitor:
         self.held: deque[tuple[int, Array]] = deque()
         self.begins: deque[int] = deque(maxlen=TOLD + 1)  # counters at which cycles began
         self.quiet: dict[str, list[float]] = {name: [] for name in self.names}
-        order = [name for name in ("z", "x", "v", "a") if name in self.names] or self.names[:1]
+        moving = [name for name in ("z", "x", "v", "a") if name in self.names]
+        order = moving or [name for name in self.names if name not in SOUNDS][:1]
         self.order = deque(self.names.index(name) for name in order)  # the base tells cycles if it moves, else the mass
         self._afresh()
         self.after, self.lost = 0, 0
@@ -101,15 +107,20 @@ class Monitor:
 
     def _stall(self) -> list[Cycle]:
         """What told cycles tells none any more: what is wrong since, and another channel's turn."""
-        period, first = self.begins[-1] - self.begins[-2], self.begins[-1]
+        period, first, name = self.begins[-1] - self.begins[-2], self.begins[-1], self.names[self.order[0]]
         rows = self._rows(self.after - period // 2, self.after)  # before that it still told cycles
         self.order.rotate(-1)
         self._afresh()
+        seen = self._rows(first, self.after)
+        span = np.empty(0) if seen is None else seen[self.order[0]][np.isfinite(seen[self.order[0]])]
+        if len(span):  # it may stick now: its motion is that of the last cycle, and not what it rings meanwhile
+            self.low, self.top = float(span.min()), float(span.max())
         self.begins.clear()
         if rows is None or rows.shape[1] < SHORTEST:
             return []
-        flaws = self._flaws({}, rows, period / self.device.fs)
-        return [Cycle(first, period / self.device.fs, NONE, NONE, NONE, tuple(flaws))]
+        # half a cycle is too little to judge the others by: a mass that sticks there is not flat
+        flaws = tuple(flaw for flaw in self._flaws({}, rows, period / self.device.fs) if flaw.channel == name)
+        return [Cycle(first, period / self.device.fs, NONE, NONE, NONE, flaws)]
 
     def _afresh(self) -> None:
         """Nothing is known yet of the motion that tells cycles."""
@@ -135,7 +146,10 @@ class Monitor:
         return Record(samples, channels, self.device.fs, first / self.device.fs)
 
     def _beginnings(self, first: int, values: Array) -> list[int]:
-        """Counters at which the base, or where it stands the mass, passes its middle upwards."""
+        """Counters at which the base, or where it stands the mass, passes its middle upwards; else by the clock."""
+        if not self.order:
+            size = round(LISTENED * self.device.fs)
+            return list(range(-(-first // size) * size, first + values.shape[1], size))
         row = values[self.order[0]]
         row = row[np.isfinite(row)]
         if not len(row):
@@ -189,7 +203,7 @@ class Monitor:
             known = self.quiet[one.name]
             flaw = _flaw(one, cycle, noise, float(np.median(known)) if known else math.nan)
             if flaw is None and len(known) < 3:
-                known.append(noise)
+                known.append(max(noise, _count(cycle[np.isfinite(cycle)]) / math.sqrt(12)))
             flaws += [flaw] if flaw else []
         broken = {flaw.channel for flaw in flaws}
         sound = {name: values for name, values in channels.items() if name not in broken}
@@ -213,49 +227,99 @@ def _flaw(one: Input, values: Array, noise: float, before: float) -> Flaw | None
     if clipped:
         return Flaw(one.name, "clipped", f"{one.name} stands at the end of its range in {clipped} samples of the cycle")
     deviation = float(np.std(finite))
-    if deviation == 0 or deviation < ONLY_NOISE * noise:
+    louder = noise > NOISIER * before > 0 and noise > MATTERS * deviation
+    if not louder and deviation <= ONLY_NOISE * max(noise, _count(finite)):
         return Flaw(one.name, "flat", f"{one.name} is flat: nothing but noise of {deviation:.2g} {one.unit}")
     usual = f", {noise / before:.1f} times its usual one" if before > 0 else ""
-    if noise > NOISY * deviation or (noise > NOISIER * before > 0 and noise > 0.02 * deviation):
+    if louder or noise > NOISY * deviation:
         return Flaw(one.name, "noisy", f"{one.name} is noisy: {noise:.2g} {one.unit}{usual}")
     return None
+
+
+def _count(values: Array) -> float:
+    """What a digitiser's count is worth: the least step between readings; below it differences tell no noise."""
+    steps = np.diff(np.unique(values))
+    return float(steps.min()) if len(steps) else 0.0
 
 
 def _late(
     channels: Mapping[str, Array], inputs: Sequence[Input], constants: Mapping[str, float], times: tuple[float, float]
 ) -> list[Flaw]:
-    """Channels that come after the acceleration, by the phase of the cycle's first harmonic.
+    """Which of displacement and acceleration comes after the other, and whether the load does after both.
 
-    a = -w^2 x, and the load is what m a + k (x - z) leaves. Stated delays are expected.
+    By a = x'' and load = -(m a + c x' + k (x - z)). Delays that are stated are expected.
     """
-    if not {"x", "a"} <= set(channels):
-        return []
     period, fs = times
-    omega = 2 * math.pi / period
-    expected = {one.name: _expected(one) for one in inputs}
-    lines = {name: _steady_line(values, omega, fs) for name, values in channels.items()}
-    if not all(math.isfinite(sd) for _, sd in lines.values()):
+    if not {"x", "a"} <= set(channels) or len(channels["x"]) < LEAST_CYCLES * period * fs:
         return []
-    a, sd = lines["a"]
-    x, noise = lines["x"]
-    lag, error = -float(np.angle(-(omega**2) * x / a)) / omega, math.hypot(noise / abs(x), sd / abs(a)) / omega
-    lag += expected["a"]
-    flaws = _judged("x", lag - expected["x"], error, fs)
-    lag = lag if flaws else expected["x"]
+    expected = {one.name: _expected(one) for one in inputs}
+    lines = _Lines(channels, 2 * math.pi / period, fs)
+    lag, error = lines.lag(lambda late: lines.of("x", 2, expected["x"] + late), lines.of("a", 0, expected["a"]))
+    error = math.hypot(error, lines.doubt("x", 2), lines.doubt("a"))
+    flaws = _judged("x", lag, error, fs) or _judged("a", -lag, error, fs)
+    delays = expected | {flaw.channel: expected[flaw.channel] + abs(lag) for flaw in flaws}
     whole = "z" in channels or not any(one.name == "z" for one in inputs)
-    if whole and "load" in channels and {"mass", "stiffness"} <= set(constants):
-        mass, stiffness, turn = constants["mass"], constants["stiffness"], 1j * omega
-        z = lines["z"][0] if "z" in lines else 0j
-        stated = any(one.name == "z" and "delay" in one.details for one in inputs)
-        late = expected["z"] if stated else lag  # of the same make as x, where nothing is stated
-        spring = stiffness * (x * np.exp(turn * lag) - z * np.exp(turn * late))
-        moving = constants.get("damping", 0.0) * turn * x * np.exp(turn * lag)
-        due = -(mass * a * np.exp(turn * expected["a"]) + moving + spring)
-        if abs(due) > CLEAR * abs(spring):
-            own = math.hypot(mass * sd, stiffness * noise) / abs(due) / omega
-            error = math.hypot(own, error * abs(spring) / abs(due), lines["load"][1] / abs(lines["load"][0]) / omega)
-            flaws += _judged("load", -float(np.angle(lines["load"][0] / due)) / omega - expected["load"], error, fs)
+    if not (whole and "load" in channels and {"mass", "stiffness"} <= set(constants)):
+        return flaws
+    if not any(one.name == "z" and "delay" in one.details for one in inputs):
+        delays["z"] = delays["x"]  # of the same make as x, where nothing is stated
+    spring = constants["stiffness"] * lines.of("x", 0, delays["x"])
+    spring -= constants["stiffness"] * lines.of("z", 0, delays["z"]) if "z" in channels else 0.0
+    moving = constants.get("damping", 0.0) * lines.of("x", 1, delays["x"]) + spring
+    due = -(constants["mass"] * lines.of("a", 0, delays["a"]) + moving)
+    part = float(np.linalg.norm(due) / np.linalg.norm(spring))
+    if part > CLEAR:
+        lag, error = lines.lag(lambda late: lines.of("load", 0, expected["load"] + late), due)
+        others = math.hypot(lines.doubt("x", 2), lines.doubt("a"), TRUSTED / lines.omega) / part
+        flaws += _judged("load", lag, math.hypot(error, others, lines.doubt("load")), fs)
     return flaws
+
+
+class _Lines(NamedTuple):
+    """Channels at a frequency [rad/s] and its next two, under a window that vanishes with its slope at both ends.
+
+    Two cycles hold it twice: the line below would hold of the zero of each sensor.
+
+    By parts, the integral of a derivative times the window is that of the samples times the window's derivative; the
+    motion need not repeat.
+    """
+
+    channels: Mapping[str, Array]
+    omega: float
+    fs: float
+
+    def of(self, name: str, order: int = 0, delay: float = 0.0) -> NDArray[np.complex128]:
+        """Three lines of a channel's derivative, whose samples come so late [s]."""
+        values = self.channels[name]
+        known = np.isfinite(values)
+        return self._kernels(order, delay)[:, known] @ (values[known] - np.mean(values[known]))
+
+    def doubt(self, name: str, order: int = 0) -> float:
+        """Standard deviation [s] of a channel's phase by its noise."""
+        noise = noise_of(self.channels[name]) * float(np.linalg.norm(self._kernels(order, 0.0)[0]))
+        return noise / max(float(np.linalg.norm(self.of(name, order))), 1e-300) / self.omega
+
+    def lag(self, late: Callable[[float], NDArray[Any]], early: NDArray[Any]) -> tuple[float, float]:
+        """By how much [s] what is late has to be taken forward; its deviation by what is unlike the other even then.
+
+        Three lines less one ratio leave four numbers, of which the phase takes a share as large as each.
+        """
+        lag = 0.0
+        for _ in range(3):  # it is off by a hundredth of itself after one, by the window that moves too
+            lag -= float(np.angle(np.vdot(early, late(lag)))) / self.omega
+        after = late(lag)
+        unlike = after - early * np.vdot(early, after) / max(np.vdot(early, early).real, 1e-300)
+        return lag, float(np.linalg.norm(unlike) / max(float(np.linalg.norm(after)), 1e-300)) / 2 / self.omega
+
+    def _kernels(self, order: int, delay: float) -> NDArray[np.complex128]:
+        """(3, n): Hann's window as three turns, each times exp(-i omega t), with the signs that parts bring."""
+        count = len(next(iter(self.channels.values())))
+        rate = math.tau * self.fs / count
+        time = np.arange(count) / self.fs - delay
+        turns = -1j * (self.omega + rate * np.arange(-1, 4))
+        waves = (-turns[:, None]) ** order * np.exp(turns[:, None] * time)
+        kernels = 0.5 * waves[1:-1] - 0.25 * (waves[:-2] + waves[2:])
+        return np.asarray(np.where((time >= 0) & (time * self.fs < count), kernels, 0.0))
 
 
 def _judged(name: str, lag: float, error: float, fs: float) -> list[Flaw]:
@@ -265,32 +329,10 @@ def _judged(name: str, lag: float, error: float, fs: float) -> list[Flaw]:
     return [Flaw(name, "late", f"{name} comes {1e3 * lag:.2f} ± {max(2e3 * error, 0.01):.2f} ms late")]
 
 
-def _steady_line(values: Array, omega: float, fs: float) -> tuple[complex, float]:
-    """As :func:`_line`, its deviation with what the first half, a cycle or more, is unlike the second.
-
-    Infinite where they are so unlike that the line is that of no steady motion.
-    """
-    half = len(values) // 2
-    (first, noise), (second, _) = (_line(part, omega, fs) for part in (values[:half], values[half : 2 * half]))
-    unlike = abs(first - second)
-    if unlike > ALIKE * abs(second) + 2 * LATE * noise:
-        return second, math.inf
-    line, sd = _line(values, omega, fs)
-    return line, math.hypot(sd, unlike / 2)
-
-
 def _expected(one: Input) -> float:
     """How late [s] a channel is known to be: its delay, and its mount's well below the resonance."""
     frequency, damping = one.details.get("mount") or (math.inf, 0.0)
     return float(one.details.get("delay", 0.0)) + 2 * damping / (2 * math.pi * frequency)
-
-
-def _line(values: Array, omega: float, fs: float) -> tuple[complex, float]:
-    """The amplitude of a frequency [rad/s] in whole cycles of it, and its standard deviation by the noise."""
-    turn = np.exp(-1j * omega * np.arange(len(values)) / fs)
-    known = np.isfinite(values)
-    amplitude = complex(2 * np.mean((values[known] - np.mean(values[known])) * turn[known]))
-    return amplitude or 1e-300 + 0j, noise_of(values) * math.sqrt(2 / len(values))
 
 
 def _loop(channels: Mapping[str, Array], constants: Mapping[str, float], fs: float) -> tuple[Array, Array, Array]:
@@ -302,8 +344,9 @@ def _loop(channels: Mapping[str, Array], constants: Mapping[str, float], fs: flo
     step = count / points / fs
     x = means.get("x", np.empty(0))
     v = means["v"] if "v" in means else _slope(x, step) if len(x) else x
-    if "load" in means:
-        return x, v, means["load"]
+    measured = next((name for name in ("load", "friction") if name in means), None)
+    if measured is not None:
+        return x, v, means[measured]
     if not len(x) or not {"mass", "stiffness"} <= set(constants):
         return x, v, np.empty(0)
     a = means["a"] if "a" in means else _slope(v, step)
@@ -345,8 +388,12 @@ def answers(record: Record, constants: Mapping[str, float]) -> tuple[list[Row], 
     """
     rows: list[Row] = []
     untold: list[str] = []
-    questions: list[Callable[[], list[Row]]] = [lambda: _friction(record, constants)]
-    questions += [lambda name=name: _squeaks(record, name) for name in ("sound", "ay") if name in record]  # type: ignore[misc]
+    stated = {"mass", "stiffness"} <= set(constants) and "x" in record
+    questions: list[Callable[[], list[Row]]] = [partial(_squeaks, record, name) for name in SOUNDS if name in record]
+    if stated or "load" in record or "friction" in record:
+        questions.insert(0, partial(_friction, record, constants))
+    elif "x" in record:
+        untold.append("Friction needs mass and stiffness in rig.toml, or a load cell.")
     for question in questions:
         try:
             rows += question()
@@ -370,12 +417,14 @@ def _forced(record: Record, constants: Mapping[str, float]) -> Record:
     if {"mass", "stiffness"} <= set(constants) and "x" in record:
         known = {name: constants.get(name, 0.0) for name in ("mass", "stiffness", "damping")}
         return friction_force(record, **known)  # type: ignore[arg-type]
+    if "friction" in record:
+        return record
     return record.with_channel("friction", record["load"], unit="N", source="load")
 
 
 def _squeaks(record: Record, channel: str) -> list[Row]:
-    bursts = find_squeaks(record, channel=channel).bursts
+    bursts = [burst for burst in find_squeaks(record, channel=channel).bursts if burst.kind != "noise"]
     if not bursts:
         return []
     loudest = max(bursts, key=lambda burst: burst.level)
-    return [Row(f"{loudest.kind} in {channel}", loudest.frequency, math.nan, math.nan, "Hz")]
+    return [Row(f"pitch in {channel} ({loudest.kind})", loudest.frequency, math.nan, math.nan, "Hz")]

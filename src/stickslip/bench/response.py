@@ -284,8 +284,8 @@ def modal_fit(
     fit = solve(lines.misfit, begin, x_scale=np.maximum(np.abs(begin), 1e-6))
     power = float(fit.fun @ fit.fun) / (len(fit.fun) - len(begin))
     cover = max(1.0, power) * np.linalg.inv(fit.jac.T @ fit.jac)[:4, :4]
-    given = {name: Estimate.stated(name, value, unit) for name, value, unit in (
-        ("mass", mass, "kg"), ("stiffness", stiffness, "N/m")) if value is not None}  # fmt: skip
+    stated = (("mass", mass, "kg"), ("stiffness", stiffness, "N/m"))
+    given = {name: Estimate.stated(name, value, unit) for name, value, unit in stated if value is not None}
     doubt = Doubt(
         f"the answer leaves {power:.2g} times the noise: more than one mass on one spring, or friction", "model"
     )
@@ -334,7 +334,7 @@ class _Lines:
             raise EstimateError(
                 f"{kept.sum()} lines that {channels[0]} excites",
                 f"{MODAL} needs {LEAST_LINES}",
-                "sweep, or shake longer",
+                f"sweep, or shake longer; of white noise state the sensor's own: with_details('{channels[0]}', noise=)",
             )
         turn = 2j * np.pi * frequency[kept]
         level = derivative_spectra(np.ones(len(record)), fs=record.fs, orders=[0])[0, kept]

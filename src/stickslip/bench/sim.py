@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Literal, Self, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,9 +32,12 @@ PRESETS = {"air-track": Rig.air_track, "linear-bearing": Rig.linear_bearing, "pe
 BLOCK = 0.02  # s of samples in a block: short of what an eye sees as late
 BUFFER = 10.0  # s of samples that the device holds for who reads late; older ones are lost, as in a real one
 RAMP = 0.25  # s in which a shaker goes over from one motion to another
+LOOSE = 30.0  # times its own noise: what a sensor picks up whose shield is off
 STRETCH = 1 << 15  # samples of coloured noise made at a time; below fs / STRETCH it is white
 
 Array = NDArray[np.float64]
+FaultKind = Literal["drop", "saturation", "cable", "noise"]
+FAULTS: tuple[str, ...] = get_args(FaultKind)
 
 
 @dataclass(frozen=True)
@@ -45,7 +48,8 @@ class Fault:
     ----------
     kind : str
         "drop": nothing is delivered; "saturation": the amplifier is set a thousand times too high, so that readings
-        stand at the range's end; "cable": the plug is pulled, and only the amplifier's noise is left.
+        stand at the range's end; "cable": the plug is pulled, and only the amplifier's noise is left; "noise": the
+        shield is off, and it is thirty times its own.
     at, duration : float
         When, and for how long [s].
     channel : str
@@ -63,8 +67,8 @@ class Fault:
     channel: str = ""
 
     def __post_init__(self) -> None:
-        if self.kind not in ("drop", "saturation", "cable"):
-            raise ModelError(f"a fault '{self.kind}'", "there are drop, saturation, cable", "name one of them")
+        if self.kind not in FAULTS:
+            raise ModelError(f"a fault '{self.kind}'", f"there are {', '.join(FAULTS)}", "name one of them")
         if (self.kind == "drop") == bool(self.channel):
             raise ModelError(
                 f"a {self.kind} of '{self.channel}'",
@@ -144,10 +148,13 @@ class Sim:
                 raise ModelError(
                     f"a {fault.kind} of '{fault.channel}'", f"the rig has {', '.join(known)}", "choose one of them"
                 )
-            if fault.kind == "saturation" and math.isinf(known[fault.channel].digitiser.limit):
+            sensor = known.get(fault.channel)
+            if fault.kind == "saturation" and sensor and math.isinf(sensor.digitiser.limit):
                 raise ModelError(
                     f"a saturation of {fault.channel}", "its sensor has no range", "give the digitiser a limit"
                 )
+            if fault.kind == "noise" and sensor and not (sensor.noise.white or sensor.noise.band):
+                raise ModelError(f"noise of {fault.channel}", "its sensor has none", "give the sensor noise")
 
     @property
     def model(self) -> str:
@@ -319,12 +326,13 @@ class _Reading:
         sensor, count = self.sensor, len(times)
         if not count:
             return np.empty(0)
-        readings = sensor.gain * self._filtered(times - sensor.lag)
+        readings, noise = sensor.gain * self._filtered(times - sensor.lag), self._noise(count)
         for fault in faults:
             if fault.channel == sensor.channel:
                 rows = fault.rows(times)
-                readings[rows] *= 0.0 if fault.kind == "cable" else 1000.0
-        written = sensor.digitiser.counts(readings + self._noise(count))
+                readings[rows] *= {"cable": 0.0, "saturation": 1000.0}.get(fault.kind, 1.0)
+                noise[rows] *= LOOSE if fault.kind == "noise" else 1.0
+        written = sensor.digitiser.counts(readings + noise)
         written[sensor.digitiser.lost(count, fs=self.fs, rng=self.rng)] = np.nan
         return written
 
@@ -375,7 +383,7 @@ class _Reading:
 class _Fault(BaseModel):
     model_config = STRICT
 
-    kind: Literal["drop", "saturation", "cable"]
+    kind: FaultKind
     at: Annotated[float, quantity("s"), Field(ge=0)]
     duration: Annotated[float, quantity("s"), Field(gt=0)] | None = None
     channel: str = ""

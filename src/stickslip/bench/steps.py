@@ -2,22 +2,38 @@
 
 from __future__ import annotations
 
+import json
+import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
-from stickslip.balance.impact import impact_test
-from stickslip.bench.calibration import calibrate, spring_by_weights
-from stickslip.bench.free import free_vibration, onto_stick
-from stickslip.bench.known import Known
-from stickslip.bench.response import modal_fit
-from stickslip.bench.rest import at_rest, discharge_test
+from stickslip.balance.impact import ImpactTest, impact_test
+from stickslip.balance.mounts import ACCELEROMETER, CELL, Resonance
+from stickslip.bench.calibration import Calibration, SpringByWeights, calibrate, spring_by_weights
+from stickslip.bench.free import (
+    FreeVibration,
+    MassAndSpring,
+    OntoStick,
+    added_mass,
+    best_constants,
+    damper_of,
+    free_vibration,
+    onto_stick,
+)
+from stickslip.bench.response import ModalFit, modal_fit
+from stickslip.bench.rest import AtRest, DischargeTest, at_rest, discharge_test
 from stickslip.errors import EstimateError, ModelError, RecordError
 from stickslip.estimate import Estimate, Result
-from stickslip.record.record import Record
+from stickslip.files.expression import split_spec
+from stickslip.record.record import Record, Step
 from stickslip.rig.rig import Rig
-from stickslip.rig.settings import RigSettings
+from stickslip.rig.settings import CommissionSettings, RigSettings, rig_settings
 from stickslip.settings import nearest
+from stickslip.units import parse_unit
+
+CALIBRATIONS = {"gauge-x": "x", "gauge-z": "z", "turn": "a", "weigh": "load"}  # step -> channel
+STANDS_ON = {"a": ACCELEROMETER, "load": CELL}
 
 
 @dataclass(frozen=True)
@@ -180,7 +196,7 @@ class Commissioned(Result):
     Attributes
     ----------
     known : Known
-        Results by step, constants, and :meth:`~stickslip.bench.known.Known.toml`.
+        Results by step, constants, and :meth:`~stickslip.bench.steps.Known.toml`.
     refused : mapping of str to str
         Steps that could not be answered, and why.
     truth : mapping of str to float
@@ -223,6 +239,7 @@ def commission(
     steps: Sequence[BenchStep] = STEPS,
     truth: Mapping[str, float] | None = None,
     progress: Callable[[str, float], None] | None = None,
+    answered: Callable[[BenchStep, Result | str], None] | None = None,
 ) -> Commissioned:
     """Which constants, and which sensors, does a rig have?
 
@@ -243,6 +260,8 @@ def commission(
         True values by the names of estimates.
     progress : callable, optional
         Called with words and the number of steps that are done.
+    answered : callable, optional
+        Called with each step and its result, or why it was refused.
 
     Returns
     -------
@@ -268,4 +287,258 @@ def commission(
             known = known.having(step.name, step.ask(record, known))
         except (EstimateError, RecordError) as error:  # what is asked wrongly ends all
             refused[step.name] = str(error)
+        if answered is not None:
+            answered(step, refused.get(step.name) or known.results[step.name])
     return Commissioned(known, refused, truth or {})
+
+
+# ---- what is known of the rig
+
+
+@dataclass(frozen=True)
+class Known:
+    """What is known of a rig while it is commissioned.
+
+    Attributes
+    ----------
+    rig : RigSettings
+        What was stated before.
+    results : mapping of str to Result
+        By step.
+    """
+
+    rig: RigSettings = field(default_factory=RigSettings)
+    results: Mapping[str, Result] = field(default_factory=dict)
+
+    @property
+    def at_hand(self) -> CommissionSettings:
+        """Weights, gauge blocks and the mass that is added."""
+        return self.rig.commission or CommissionSettings()
+
+    def of(self, step: str, kind: type[Any]) -> Any:
+        """The result of a step, or None."""
+        result = self.results.get(step)
+        return result if isinstance(result, kind) else None
+
+    def having(self, step: str, result: Result) -> Known:
+        """With one more result."""
+        return replace(self, results={**self.results, step: result})
+
+    # ---- sensors
+
+    @property
+    def mounts(self) -> dict[str, Resonance | tuple[float, float]]:
+        """What the sensors stand on, by channel: as a tap found it, else as stated."""
+        known: dict[str, Resonance | tuple[float, float]] = {
+            name: sensor.mount for name, sensor in self.rig.sensors.items() if sensor.mount is not None
+        }
+        tap = self.of("tap", ImpactTest)
+        for channel, name in STANDS_ON.items():
+            for resonance in tap.resonances if tap is not None else ():
+                if resonance.name == name:
+                    known[channel] = resonance
+        return known
+
+    def gain(self, channel: str) -> Estimate | None:
+        """Reading over truth of a channel, where it was calibrated."""
+        calibrations = [self.of(step, Calibration) for step, name in CALIBRATIONS.items() if name == channel]
+        return next((calibration.gain for calibration in calibrations if calibration is not None), None)
+
+    def zero(self, channel: str) -> float:
+        """What a channel reads at rest; 0 where that was not asked."""
+        rest = self.of("rest", AtRest)
+        if rest is None or channel not in rest.sensors or rest.sensors[channel].zero.includes(0.0):
+            return 0.0
+        return float(rest.sensors[channel].zero.value)
+
+    def corrected(self, record: Record) -> Record:
+        """A record with zeros taken off and gains set right, as far as they are known; their doubt in ``gain_sd``."""
+        samples, applied = dict(record.samples), {}
+        for name in record:
+            gain, zero = self.gain(name), self.zero(name)
+            if gain is None and not zero:
+                continue
+            samples[name] = (record[name] - zero) / (gain.value if gain else 1.0)
+            applied[name] = {"zero": zero, "gain": gain.value if gain else 1.0}
+            if gain:
+                record = record.with_details(name, gain_sd=gain.spread / abs(gain.value))
+        if not applied:
+            return record
+        return record.with_samples(samples, Step("corrected", applied, "zero and gain by commissioning"))
+
+    # ---- constants
+
+    @property
+    def constants(self) -> MassAndSpring | None:
+        """Mass and spring that agree best with what was measured of them; None before there is enough."""
+        free = self.of("free", FreeVibration)
+        masses = [Estimate.stated("mass", self.rig.mass, "kg")] if self.rig.mass is not None else []
+        spring = self.of("spring", SpringByWeights)
+        if free is None:
+            return self._stated
+        loaded = self.of("added", FreeVibration)
+        if loaded is not None:
+            masses.append(added_mass(free.frequency, loaded.frequency, self.at_hand.added).mass)
+        springs = [spring.stiffness] if spring is not None else []
+        if self.rig.stiffness is not None and spring is None:
+            springs.append(Estimate.stated("spring stiffness", self.rig.stiffness, "N/m"))
+        return best_constants(free.frequency, masses=masses, springs=springs) if masses or springs else None
+
+    @property
+    def _stated(self) -> MassAndSpring | None:
+        if self.rig.mass is None or self.rig.stiffness is None:
+            return None
+        pair = (("mass", self.rig.mass, "kg"), ("spring stiffness", self.rig.stiffness, "N/m"))
+        mass, spring = (Estimate.stated(*arguments) for arguments in pair)
+        return MassAndSpring(mass, spring, "ok")
+
+    def require_constants(self) -> MassAndSpring:
+        """Mass and spring, or a refusal that says what to do first.
+
+        Raises
+        ------
+        EstimateError
+            Neither is known yet.
+        """
+        if self.constants is not None:
+            return self.constants
+        raise EstimateError(
+            "mass and spring are not known yet",
+            "they come from a free vibration, with weights on the spring or an added mass",
+            "do the steps free and spring first, or state mass in rig.toml",
+        )
+
+    @property
+    def damping(self) -> Estimate | None:
+        """Of the suspension [N s/m], by the damping ratio of the free vibration."""
+        free, known = self.of("free", FreeVibration), self.constants
+        return None if free is None or known is None else damper_of(free.damping_ratio, known)
+
+    # ---- rig.toml
+
+    def settings(self) -> dict[str, Any]:
+        """What ``rig.toml`` is to say, as plain data: stated before, and found now."""
+        settings = self.rig.model_dump(exclude_unset=True)
+        known, damping = self.constants, self.damping
+        if known is not None:
+            settings |= {"mass": _pm(known.mass), "stiffness": _pm(known.stiffness)}
+        if damping is not None:
+            settings["damping"] = _pm(damping)
+        if channels := self._channels():
+            settings["channels"] = {**settings.get("channels", {}), **channels}
+        sensors = self._sensors()
+        if sensors:
+            settings["sensors"] = {**settings.get("sensors", {}), **sensors}
+        return settings
+
+    def _channels(self) -> dict[str, str]:
+        """The channel map with zeros and gains."""
+        rest, made = self.of("rest", AtRest), {}
+        for name in rest.sensors if rest is not None else CALIBRATIONS.values():
+            gain = self.gain(name)
+            if gain is None and rest is None:
+                continue
+            unit = rest.sensors[name].zero.unit if rest is not None else {"a": "m/s^2", "load": "N"}.get(name, "m")
+            made[name] = _channel(self.rig.channels.get(name, f"{name} [{unit}]"), self.zero(name), gain)
+        return made
+
+    def _sensors(self) -> dict[str, dict[str, Any]]:
+        tables: dict[str, dict[str, Any]] = {}
+        rest, free = self.of("rest", AtRest), self.of("free", FreeVibration)
+        for name, sensor in rest.sensors.items() if rest is not None else ():
+            gain = self.gain(name)
+            tables.setdefault(name, {})["noise"] = _short(sensor.noise.value / abs(gain.value if gain else 1.0))
+        for name, mount in self.mounts.items():
+            pair = mount if isinstance(mount, tuple) else (mount.frequency.value, mount.damping.value)
+            tables.setdefault(name, {})["mount"] = [f"{pair[0]:.5g} Hz", _short(pair[1])]
+        late = free.delays.get("a") if free is not None else None
+        if late is not None:
+            tables.setdefault("x", {})["delay"] = f"{late.value:.5g} s"
+            modal = self.of("sweep", ModalFit)
+            if modal is not None:
+                tables.setdefault("z", {})["delay"] = f"{late.value - modal.delay.value:.5g} s"
+        if free is not None and free.inertia is not None and free.inertia.interval[0] > 0:
+            tables.setdefault("load", {})["inertia"] = f"{free.inertia.value:.5g} kg"
+        leak = self.of("discharge", DischargeTest)
+        if leak is not None and math.isfinite(leak.time_constant.value):
+            tables.setdefault("load", {})["discharge"] = f"{leak.time_constant.value:.5g} s"
+        return tables
+
+    def toml(self) -> str:
+        """The text of ``rig.toml``; read back, it is what :meth:`settings` says.
+
+        Raises
+        ------
+        ModelError
+            What was found can not be stated.
+        """
+        settings = self.settings()
+        rig_settings(settings, source="what commissioning found")
+        notes = ["# Written by stickslip commission: values with their standard uncertainty.", *self._notes()]
+        return "\n".join([*notes, "", *_lines(settings)]) + "\n"
+
+    def _notes(self) -> list[str]:
+        stick = self.of("stick", OntoStick)
+        if stick is None:
+            return []
+        return [f"# {estimate}" for estimate in (stick.frequency, stick.stiffness)]
+
+
+def _channel(stated: str, zero: float, gain: Estimate | None) -> str:
+    """The column of a channel with its zero taken off and its gain set right.
+
+    A zero is written in the column's unit; behind a sensitivity, whose column is in volts, it is left out.
+    """
+    spec = split_spec(stated)
+    arithmetic, unit = spec.arithmetic, f" [{spec.unit}]" if spec.unit else ""
+    if zero and not spec.sensitivity:
+        own = zero / parse_unit(spec.unit).scale if spec.unit else zero
+        arithmetic = f"({arithmetic} {'-' if own > 0 else '+'} {abs(own):.6g})"
+    if gain is None:
+        return f"{arithmetic}{unit}" + (f" @ {spec.sensitivity}" if spec.sensitivity else "")
+    tail = f" @ {spec.sensitivity}" if spec.sensitivity else ""
+    percent = 100 * gain.spread / abs(gain.value)
+    arithmetic = arithmetic if arithmetic.startswith("(") or arithmetic.isidentifier() else f"({arithmetic})"
+    return f"{arithmetic} / {gain.value:.8g}{unit}{tail} ± {percent:.2g} %"
+
+
+def _pm(estimate: Estimate) -> str:
+    """Value and standard uncertainty, as the settings read them."""
+    digits = max(
+        2, 2 + math.ceil(math.log10(max(1.0, abs(estimate.value) / max(estimate.sd, 1e-12 * abs(estimate.value)))))
+    )
+    return f"{estimate.value:.{min(digits, 12)}g} ± {estimate.sd:.2g} {estimate.unit}"
+
+
+def _short(value: float) -> float:
+    return float(f"{value:.5g}")
+
+
+def _lines(values: Mapping[str, Any], path: str = "") -> list[str]:
+    """A table of TOML: plain keys first, then its tables."""
+    plain = {key: value for key, value in values.items() if not isinstance(value, Mapping) and value is not None}
+    lines = [f"{_key(key)} = {_value(value)}" for key, value in plain.items()]
+    for key, value in values.items():
+        if isinstance(value, Mapping) and value:
+            name = f"{path}.{_key(key)}" if path else _key(key)
+            inner = _lines(value, name)
+            lines += ["", f"[{name}]", *inner] if any(not isinstance(v, Mapping) for v in value.values()) else inner
+    return lines
+
+
+def _key(key: str) -> str:
+    return (
+        key
+        if key.replace("_", "").replace("-", "").isalnum() and key.isascii()
+        else json.dumps(key, ensure_ascii=False)
+    )
+
+
+def _value(value: Any) -> str:
+    if isinstance(value, (list, tuple)):
+        return f"[{', '.join(map(_value, value))}]"
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, (int, float)):
+        return repr(value)
+    return json.dumps(str(value), ensure_ascii=False)

@@ -16,6 +16,8 @@ from stickslip.cli.options import all_option, constants_options, normal_option, 
 from stickslip.cli.records import (
     answers,
     default_folder,
+    files_of,
+    folder_after,
     groups_of,
     name_left_out,
     read,
@@ -23,7 +25,7 @@ from stickslip.cli.records import (
     rig_of,
     with_left_out,
 )
-from stickslip.cli.show import show
+from stickslip.cli.show import publish, show
 from stickslip.cli.terminal import complain, progress
 from stickslip.errors import INTERRUPTED
 from stickslip.workers import processors
@@ -84,7 +86,7 @@ def analyze(
     """
     places, shown = Places.of(options), {"as_json": as_json, "everything": everything}
     rig = rig_of(**options)
-    groups = [group for argument in files for group in groups_of(argument)]
+    groups = groups_of(*files)
     require_fits(options["normal"], groups)
     folder = output or default_folder(groups)
     if places.wanted(groups):
@@ -101,7 +103,7 @@ def analyze(
             of_parts=lambda parts, say: ss.answers.analyze_blocks(parts, rig=rig, method=method, progress=say),
         )
 
-        def together(findings: list[Findings]) -> Findings | Comparison:
+        def together(findings: list[Findings]) -> Any:
             return with_left_out(ss.compare(findings) if len(findings) > 1 else findings[0], refused)
 
         tell("drawing and writing", 2 * len(groups))
@@ -118,22 +120,25 @@ def _sure(
     tell: Callable[..., None],
     **context: Any,
 ) -> tuple[Findings | Comparison, Path | None]:
-    """The results, tried on twins and written; the quick ones are written first, and stay where that is interrupted."""
+    """The results, tried on twins and written; the quick ones are written first, and stay where that is interrupted.
+
+    Figures are drawn once, with what stays: they take longer than the quick answers do.
+    """
     if not twins:
         results = together(all_findings)
-        return results, folder and ss.publish(results, folder=folder, **context)
+        return results, publish(results, folder, **context)
     from concurrent.futures import ThreadPoolExecutor
 
     with ThreadPoolExecutor(1) as beside:  # drawn here, while other processes look for the twins
-        quick = None if folder is None else beside.submit(ss.publish, together(all_findings), folder=folder, **context)
+        quick = beside.submit(publish, together(all_findings), folder, figures=False, **context)
         try:
             results = together([_tried(findings, twins, tell) for findings in all_findings])
             tell("drawing and writing")
-            return results, None if quick is None else ss.publish(results, folder=quick.result(), **context)
+            return results, publish(results, quick.result(), **context)
         except KeyboardInterrupt:
-            if quick is None:
+            if folder is None:
                 raise
-            complain(f"interrupted: {quick.result()} has the quick answers, not tried on twins.")
+            complain(f"interrupted: {quick.result()} has the quick answers, not tried on twins, without figures.")
             sys.exit(INTERRUPTED)
 
 
@@ -193,13 +198,11 @@ def impact(file: str, output: Path | None, as_json: bool, everything: bool, **op
     stickslip impact tap.csv --mass 2.42
     """
     rig = rig_of(**options)
-    groups = groups_of(file)
-    if len(groups) != 1:
-        raise click.BadParameter(f"'{file}' fits {len(groups)} records; a tap is one", param_hint="FILE")
-    folder = output or (None if as_json else default_folder(groups, "impact"))
+    files = files_of(file, "a tap is one")
+    folder = output or (None if as_json else folder_after(files[0], "impact"))
     with progress(1) as tell:
         tell(f"reading {file}", 0)
-        record = read(groups[0], rig)
+        record = read(files, rig)
         test = ss.balance.impact_test(record, mass=rig.mass)
-        written = ss.publish(test, folder=folder, record=record) if folder else None
+        written = publish(test, folder, record=record)
     show(test, written, as_json=as_json, everything=everything, record=record)

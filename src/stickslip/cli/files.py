@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -12,7 +11,7 @@ import click
 
 import stickslip as ss
 from stickslip.cli.options import all_option, constants_options, reading_options
-from stickslip.cli.records import RIG_FILE, collected, groups_of, read, rig_of
+from stickslip.cli.records import RIG_FILE, collected, files_of, groups_of, read, rig_of
 from stickslip.cli.terminal import aligned, complain, say, spoken, wrapped
 
 if TYPE_CHECKING:
@@ -47,14 +46,12 @@ def check(file: str, **options: Any) -> None:
 @reading_options
 def convert(file: str, out: Path, force: bool, **options: Any) -> None:
     """Read FILE and write it as OUT: CSV, HDF5 or Parquet by its suffix, with units and history."""
-    groups = groups_of(file)
-    if len(groups) != 1:
-        raise click.BadParameter(f"'{file}' fits {len(groups)} records; one is converted at a time", param_hint="FILE")
-    if out.exists() and any(out.samefile(path) for path in groups[0]):
+    files = files_of(file, "one is converted at a time")
+    if out.exists() and any(out.samefile(path) for path in files):
         raise click.BadParameter(f"'{out}' is the file to be read", param_hint="OUT")
     if out.exists() and not force:
         raise click.BadParameter(f"'{out}' is there already; --force writes over it", param_hint="OUT")
-    say(ss.write_record(read(groups[0], rig_of(**options)), out, overwrite=force))
+    say(ss.write_record(read(files, rig_of(**options)), out, overwrite=force))
 
 
 @click.command()
@@ -110,7 +107,7 @@ def init(files: tuple[str, ...], yes: bool, output: Path, force: bool, **options
     """
     if output.exists() and not force:
         raise click.BadParameter(f"'{output}' is there already; --force writes over it", param_hint="--output")
-    groups = [group for argument in files for group in groups_of(argument)]
+    groups = groups_of(*files)
     stated = rig_of(**{**options, "here": False})
     record = read(groups[0], stated)
     guesses = [] if stated.channels else ss.rig.guess_columns(record)
@@ -226,22 +223,9 @@ def _settings(
 
 
 def _toml(settings: Mapping[str, Any], files: Sequence[Path]) -> Iterator[str]:
-    """Plain values first, then the tables."""
     yield f"# The rig of {' + '.join(path.name for path in files)}, as stickslip init wrote it. A bare number is in SI."
     yield '# State how sure a constant is as in mass = "2.42 ± 0.02 kg", and a gain as in a = "acc [g] ± 1 %".'
-    tables = {key: value for key, value in settings.items() if isinstance(value, Mapping)}
-    yield from (f"{key} = {_value(value)}" for key, value in settings.items() if key not in tables)
-    for key, table in tables.items():
-        plain = {name: value for name, value in table.items() if not isinstance(value, Mapping)}
-        if plain:
-            yield from ("", f"[{key}]", *(f"{json.dumps(name)} = {_value(value)}" for name, value in plain.items()))
-        for name in table.keys() - plain.keys():
-            inner = (f"{word} = {_value(value)}" for word, value in table[name].items() if value is not None)
-            yield from ("", f"[{key}.{json.dumps(name)}]", *inner)
-
-
-def _value(value: Any) -> str:
-    return json.dumps(list(value) if isinstance(value, tuple) else value, ensure_ascii=False)
+    yield from ss.rig.rig_toml(settings)
 
 
 # ---- what comes of it

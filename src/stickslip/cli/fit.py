@@ -10,9 +10,9 @@ import click
 
 import stickslip as ss
 from stickslip.cli.options import constants_options, reading_options, result_options
-from stickslip.cli.records import answers, default_folder, groups_of, name_left_out, read, rig_of
-from stickslip.cli.show import show
-from stickslip.cli.terminal import progress
+from stickslip.cli.records import RIG_FILE, answer_together, default_folder, groups_of, read, rig_of
+from stickslip.cli.show import publish, show
+from stickslip.cli.terminal import complain, progress
 
 if TYPE_CHECKING:
     from stickslip import Record
@@ -70,8 +70,8 @@ def fit(
     stickslip fit sweep.csv --channels "v=speed [mm/s]" --channels "friction=F [N]" --curve stribeck
     """
     rig = rig_of(**options)
-    groups = [group for argument in files for group in groups_of(argument)]
-    _require_one_question(groups, curve, asked=laws is not None or system is not None)
+    groups = groups_of(*files)
+    _require_one_question(groups, curve, has_law=laws is not None or system is not None)
     folder = output or (None if as_json else default_folder(groups, "fit"))
     names = laws.split(",") if laws is not None else None
     count = f"{len(names) if names else 'six'} laws"
@@ -84,12 +84,12 @@ def fit(
             progress=lambda share: tell(f"fitting and comparing {count}, {share:.0%}", 1 + share),
         )  # fmt: skip
         tell("drawing and writing", 2)
-        written = ss.publish(result, folder=folder, record=records) if folder else None
+        written = publish(result, folder, record=records)
     show(result, written, as_json=as_json, everything=everything, record=records)
 
 
-def _require_one_question(groups: list[list[Path]], curve: str | None, *, asked: bool) -> None:
-    if curve is not None and asked:
+def _require_one_question(groups: list[list[Path]], curve: str | None, *, has_law: bool) -> None:
+    if curve is not None and has_law:
         raise click.BadParameter(
             "a curve or laws are fitted, not both; leave one out", param_hint="--curve, --laws, --system"
         )
@@ -100,6 +100,15 @@ def _require_one_question(groups: list[list[Path]], curve: str | None, *, asked:
 def _oscillator(file: Path | None) -> object:
     """The system of a file; whether it is of one mass is for the fit to say."""
     return None if file is None else ss.systems.read_system(file).system
+
+
+def _read_as_fitted(law: Path, channels: tuple[str, ...]) -> Path | None:
+    """How the record was read that the law was fitted to; None where this folder or the command states it."""
+    file = (law / "law" if law.is_dir() else law.parent) / RIG_FILE
+    if channels or Path(RIG_FILE).is_file() or not file.is_file():
+        return None
+    complain(f"columns by {file}")
+    return file
 
 
 @click.command()
@@ -120,9 +129,10 @@ def predict(
     """Simulate a fitted law along other records, and say how much of them it follows.
 
     LAW is the folder that stickslip fit wrote, its law/law.toml, or a file of a system as stickslip simulate reads it.
-    FILES are records that the law was not fitted to: the base's motion z or the applied force drives the simulation as
-    it was recorded, and the sensors read it as --config states them. Nothing is fitted to a record but how its motion
-    begins and each sensor's zero. Several records are a table, one row a file.
+    FILES are records that the law was not fitted to, read by the columns of the one that it was unless stated: the
+    base's motion z or the applied force drives the simulation as it was recorded, and the sensors read it as --config
+    states them. Nothing is fitted to a record but how its motion begins and each sensor's zero. Several records are a
+    table, one row a file.
 
     Told is of each channel 100 (1 - |y - yhat| / |y - mean y|) %, the fit of system identification.
 
@@ -132,22 +142,16 @@ def predict(
     stickslip fit slow.csv --mass 2.42 --stiffness 2310 --damping 0.12
     stickslip predict slow-fit fast.csv
     """
-    rig = rig_of(**options)
+    rig = rig_of(**{**options, "config": options["config"] or _read_as_fitted(law, options["channels"])})
     oscillator = ss.answers.read_fitted(law, rig=rig)
-    groups = [group for argument in files for group in groups_of(argument)]
+    groups = groups_of(*files)
     folder = output or (None if as_json else default_folder(groups, "predicted"))
+
+    def together(predictions: list[Predictions]) -> Predictions:
+        return replace(predictions[0], parts=tuple(part for one in predictions for part in one.parts))
 
     def ask(record: Record) -> Predictions:
         return ss.answers.predict(record, oscillator, rig=rig, plain=plain)
 
-    with progress(2 * len(groups) + 1) as tell:
-        predictions, refused = answers(groups, rig, ask, tell)
-        parts, notes = (
-            [part for prediction in predictions for part in prediction.parts],
-            [f"Left out: {error}" for error in refused],
-        )
-        results = replace(predictions[0], parts=tuple(parts), notes=tuple(notes))
-        tell("drawing and writing", 2 * len(groups))
-        written = ss.publish(results, folder=folder) if folder else None
-    name_left_out(refused)
-    show(results, written, as_json=as_json, everything=everything)
+    shown = {"as_json": as_json, "everything": everything}
+    answer_together(groups, rig, ask, together=together, folder=folder, **shown)

@@ -11,9 +11,8 @@ import click
 
 import stickslip as ss
 from stickslip.cli.options import together
-from stickslip.cli.records import answers as answers_of
-from stickslip.cli.records import checksum, name_left_out, names_of, read, with_left_out
-from stickslip.cli.show import show
+from stickslip.cli.records import answer_together, checksum, names_of, read
+from stickslip.cli.show import publish, show
 from stickslip.cli.terminal import progress
 
 if TYPE_CHECKING:
@@ -116,7 +115,7 @@ def answer_many(
     """Ask all records, write what was found into `folder` (not of JSON alone), show it, forget what was kept of it."""
     with progress(len(groups)) as tell:
         batch = ask_many(question, groups, rig, query, places, folder=folder, tell=tell)
-    written = ss.publish(batch, folder=folder) if output or not shown["as_json"] else None
+    written = publish(batch, folder if output or not shown["as_json"] else None)
     if places.table is not None:
         ss.story.write_table(batch, places.table)
     _kept(folder).unlink(missing_ok=True)
@@ -139,13 +138,14 @@ def answer_all(
     if places.wanted(groups):
         answer_many(question, groups, rig, query, places, folder=folder, output=output, **shown)
         return
-    with progress(2 * len(groups) + 1) as tell:
-        findings, refused = answers_of(groups, rig, lambda record: ASK[question](record, rig, **query), tell)
-        tell("drawing and writing", 2 * len(groups))
-        results = with_left_out(compare(findings) if len(findings) > 1 else findings[0], refused)
-        written = ss.publish(results, folder=folder) if output or not shown["as_json"] else None
-    name_left_out(refused)
-    show(results, written, **shown)
+    answer_together(
+        groups,
+        rig,
+        lambda record: ASK[question](record, rig, **query),
+        together=lambda findings: compare(findings) if len(findings) > 1 else findings[0],
+        folder=folder if output or not shown["as_json"] else None,
+        **shown,
+    )
 
 
 def _rows(tasks: Sequence[Task], kept: Mapping[str, Row]) -> Iterator[Row]:
@@ -172,10 +172,9 @@ def answered(task: Task) -> Row:
     try:
         record = read(task.files, task.rig, task.names)
         findings = ASK[task.question](record, task.rig, **task.options)
-        return ss.answers.Row(
-            name, task.key, ss.summary(findings).answer, findings.quoted, findings.level, findings.normal,
-            picture=PICTURES[task.question](findings),
-        )  # fmt: skip
+        answer, picture = ss.summary(findings).answer, PICTURES[task.question](findings)
+        quoted, level = findings.quoted, findings.level
+        return ss.answers.Row(name, task.key, answer, quoted, level, findings.normal, picture=picture)
     except ss.errors.ModelError:
         raise
     except ss.StickslipError as error:

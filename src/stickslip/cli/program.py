@@ -16,11 +16,10 @@ COMMANDS = {  # by the file that they stand in
     "bench": ("acquire", "commission", "devices", "simulated_bench"),
     "files": ("check", "convert", "datasets", "init"),
     "fit": ("fit", "predict"),
-    "joint": ("joint",),
+    "machines": ("joint", "tribometer"),
     "rig": ("rig",),
     "simulate": ("bifurcation", "dither", "lab", "simulate", "stability", "sweep"),
     "thesis": ("thesis",),
-    "tribometer": ("tribometer",),
     "vibrations": ("decay", "squeak", "wavelet"),
 }
 ARGUMENTS = "stickslip.arguments"  # the key under which the context keeps what was typed

@@ -17,12 +17,12 @@ import click
 
 import stickslip as ss
 from stickslip.cli.options import pair
-from stickslip.cli.terminal import complain, spoken
+from stickslip.cli.show import publish, show
+from stickslip.cli.terminal import complain, progress, spoken
 from stickslip.printing import printable
 
 if TYPE_CHECKING:
     from stickslip import Record
-    from stickslip.answers import Comparison, Findings
     from stickslip.record import Step
     from stickslip.rig import RigSettings
 
@@ -95,8 +95,20 @@ def _require_load(load: str) -> None:
         raise click.BadParameter(f"'{load}' is no load: {error.rule}", param_hint="--normal") from error
 
 
-def groups_of(argument: str) -> list[list[Path]]:
-    """The records that an argument stands for, each as its files: patterns filled in, parts joined by + paired."""
+def groups_of(*arguments: str) -> list[list[Path]]:
+    """The records that arguments stand for, each as its files: patterns filled in, parts joined by + paired."""
+    return [group for argument in arguments for group in _groups(argument)]
+
+
+def files_of(argument: str, why: str) -> list[Path]:
+    """The files of the one record that an argument stands for."""
+    groups = groups_of(argument)
+    if len(groups) != 1:
+        raise click.BadParameter(f"'{argument}' fits {len(groups)} records; {why}", param_hint="FILE")
+    return groups[0]
+
+
+def _groups(argument: str) -> list[list[Path]]:
     if Path(argument).is_dir():
         raise click.BadParameter(
             f"'{argument}' is a folder; name a file, or a pattern like '{Path(argument) / '*.csv'}'", param_hint="FILES"
@@ -271,11 +283,30 @@ def answers(
     )
 
 
+def answer_together(
+    groups: Sequence[Sequence[Path]],
+    rig: RigSettings,
+    ask: Callable[[Record], Answer],
+    *,
+    together: Callable[[list[Answer]], Any],
+    folder: Path | None,
+    **shown: bool,
+) -> None:
+    """Ask every record, put the answers together, leave them in a folder, and show them."""
+    with progress(2 * len(groups) + 1) as tell:
+        found, refused = answers(groups, rig, ask, tell)
+        results = with_left_out(together(found), refused)
+        tell("drawing and writing", 2 * len(groups))
+        written = publish(results, folder)
+    name_left_out(refused)
+    show(results, written, **shown)
+
+
 def _say(tell: Callable[[str, float], None], what: str, done: float, state: str) -> None:
     tell(f"{what}, {state}", done)
 
 
-def with_left_out(results: Findings | Comparison, refused: Sequence[ss.StickslipError]) -> Findings | Comparison:
+def with_left_out(results: Any, refused: Sequence[ss.StickslipError]) -> Any:
     """The results, with a note for each record that is not among them."""
     notes = (*results.notes, *(f"Left out: {error}" for error in refused))
     return dataclasses.replace(results, notes=notes)

@@ -19,7 +19,7 @@ from stickslip.cli.options import (
     wanted_case,
 )
 from stickslip.cli.records import folder_after, groups_of, read, rig_of
-from stickslip.cli.show import show
+from stickslip.cli.show import publish, show
 from stickslip.cli.terminal import progress
 
 if TYPE_CHECKING:
@@ -122,7 +122,7 @@ def measure(case: str, output: Path | None, as_json: bool, everything: bool, pla
         run = ss.story.outcome(wanted, progress=lambda share: tell(f"simulating, {share:.0%}", 0)).run
         results = _planned(run, bench, tell, options) if plan else _measured(run, bench, tell, options)
         context = {"needs": needs} if plan else {"form": form}
-        written = ss.publish(results, folder=folder, **context) if folder else None
+        written = publish(results, folder, **context)
     show(results, written, as_json=as_json, everything=everything, **context)
 
 
@@ -189,7 +189,7 @@ def join(first: str, second: str, output: Path | None, as_json: bool, everything
     own = [options.pop(f"{which}_channels") for which in ("first", "second")]
     if options["channels"] and any(own):
         raise click.BadParameter("columns are named for both, or for each", param_hint="--channels")
-    groups = [group for argument in (first, second) for group in groups_of(argument)]
+    groups = groups_of(first, second)
     if len(groups) != 2:
         raise click.BadParameter(f"{len(groups)} records; two are joined", param_hint="FIRST SECOND")
     seconds = None if shift is None else float(ss.Estimate.stated("offset", shift, "s"))
@@ -205,5 +205,5 @@ def join(first: str, second: str, output: Path | None, as_json: bool, everything
         rate = ss.signals.clock_rate(a, b, on=named_on) if drift else 1.0
         joined = ss.signals.synchronise(a, b, on=named_on, offset=seconds, rate=rate)
         folder = output or (None if as_json else folder_after(groups[0][0], "joined"))
-        written = ss.publish(joined, folder=folder, form=form) if folder else None
+        written = publish(joined, folder, form=form)
     show(joined, written, as_json=as_json, everything=everything, form=form)

@@ -27,6 +27,11 @@ def print_json(results: Mapping[str, Any]) -> None:
     say_json({"program": "stickslip", "version": ss.__version__, **results})
 
 
+def publish(result: Any, folder: Path | None, **context: Any) -> Path | None:
+    """The folder of a result, whose page names options as the terminal does; none where none is asked for."""
+    return None if folder is None else ss.publish(result, folder=folder, wording=spoken, **context)
+
+
 def show(result: Any, written: Path | None, *, as_json: bool, everything: bool = False, **context: Any) -> None:
     """A result as its story tells it, in short or with `everything`; `context` as in ``publish``."""
     story = ss.summary(result, **context)

@@ -23,7 +23,7 @@ from stickslip.cli.options import (
     usable,
     wanted_case,
 )
-from stickslip.cli.show import print_json, show
+from stickslip.cli.show import print_json, publish, show
 from stickslip.cli.terminal import progress, say, say_json, wrapped
 from stickslip.errors import INTERRUPTED
 
@@ -69,7 +69,7 @@ def simulate(
     with progress(4 if options["animation"] else 3) as tell:
         tell("simulating", 0)
         result = ss.story.outcome(wanted, progress=lambda share: tell(f"simulating, {share:.0%}", share))
-        written = ss.publish(result, folder=folder, tell=tell, **options) if folder else None
+        written = publish(result, folder, tell=tell, **options)
     show(result, written, as_json=as_json, everything=everything, **options)
     if result.run.status == "interrupted":
         raise SystemExit(INTERRUPTED)
@@ -140,7 +140,7 @@ def sweep(file: Path, engine: str, store: Path | None, output: Path | None, as_j
         store=place,
     )
     story, whole = ss.summary(atlas), atlas.attrs["status"] == "complete"
-    written = ss.publish(atlas, folder=output, system=plan.case.system) if output is not None else None
+    written = publish(atlas, output, system=plan.case.system)
     if as_json:
         print_json({**story.data(), "store": str(place)})
         raise SystemExit(0 if whole else INTERRUPTED)
@@ -269,7 +269,7 @@ def _answer(
     with progress(1) as tell:
         tell(f"{what} of {case.name}", 0)
         answer = ask()
-        written = ss.publish(answer, folder=folder) if folder else None
+        written = publish(answer, folder)
     show(answer, written, as_json=as_json, everything=everything)
 
 

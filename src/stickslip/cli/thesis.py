@@ -39,18 +39,18 @@ def thesis(chapters: tuple[str, ...], output: Path | None, as_json: bool) -> Non
     folder = output or (None if as_json else Path("thesis-stickslip"))
     with progress(len(wanted) + 1) as tell:
         done = pages.reproduce(wanted, folder=folder, tell=tell)
-    found = pages.results(done)
+    results = pages.results(done)
     if as_json:
-        say_json(found)
+        say_json(results)
     else:
-        _show(found, done, folder)
-    if not pages.holds(found):
+        _show(results, done, folder)
+    if not pages.holds(results):
         raise SystemExit(1)
 
 
-def _show(found: dict[str, Any], done: tuple[Any, ...], folder: Path | None) -> None:
+def _show(results: dict[str, Any], done: tuple[Any, ...], folder: Path | None) -> None:
     rows = []
-    others = (entry for entry in found["numbers"] if entry["verdict"] != "same")
+    others = (entry for entry in results["numbers"] if entry["verdict"] != "same")
     for key, group in itertools.groupby(others, key=lambda entry: [entry[name] for name in _ROW]):
         entries = list(group)
         label = f", {entries[0]['entry']}" * bool(entries[0]["entry"]) + f" and {len(entries) - 1} more" * (
@@ -62,15 +62,15 @@ def _show(found: dict[str, Any], done: tuple[Any, ...], folder: Path | None) -> 
         )
     if rows:
         say("\n".join(aligned(("number", "printed", "ours", "verdict", "why"), rows)))
-    counts = [[chapter.name, *(str(chapter.counts[verdict]) for verdict in found["verdicts"])] for chapter in done]
-    say("\n".join(aligned(("chapter", *found["verdicts"]), counts)))
-    total = ", ".join(f"{count} {verdict}" for verdict, count in found["verdicts"].items() if count)
-    say("\n".join(wrapped(f"{sum(found['verdicts'].values())} printed numbers: {total}.")))
-    if found["seen"]:
-        ticked = sum(one["seen"] for one in found["seen"])
-        say(f"Of {len(found['seen'])} things that the text says one should see, {ticked} are seen.")
+    counts = [[chapter.name, *(str(chapter.counts[verdict]) for verdict in results["verdicts"])] for chapter in done]
+    say("\n".join(aligned(("chapter", *results["verdicts"]), counts)))
+    total = ", ".join(f"{count} {verdict}" for verdict, count in results["verdicts"].items() if count)
+    say("\n".join(wrapped(f"{sum(results['verdicts'].values())} printed numbers: {total}.")))
+    if results["seen"]:
+        ticked = sum(one["seen"] for one in results["seen"])
+        say(f"Of {len(results['seen'])} things that the text says one should see, {ticked} are seen.")
         unseen = [
-            f"not seen: {one['says']} ({one['section']}): {one['why']}" for one in found["seen"] if not one["seen"]
+            f"not seen: {one['says']} ({one['section']}): {one['why']}" for one in results["seen"] if not one["seen"]
         ]
         say("\n".join(line for text in unseen for line in wrapped(text)))
     if folder is not None:

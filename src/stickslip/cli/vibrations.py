@@ -13,6 +13,7 @@ from stickslip.cli.many import Places, answer_all, many_options
 from stickslip.cli.options import contact_option, normal_option, reading_options, result_options
 from stickslip.cli.records import (
     default_folder,
+    files_of,
     folder_after,
     groups_of,
     name_of,
@@ -20,7 +21,7 @@ from stickslip.cli.records import (
     require_fits,
     rig_of,
 )
-from stickslip.cli.show import show
+from stickslip.cli.show import publish, show
 from stickslip.cli.terminal import progress
 
 if TYPE_CHECKING:
@@ -71,7 +72,7 @@ def decay(files: tuple[str, ...], output: Path | None, as_json: bool, everything
             "a drift is told from a steady oscillation, and would take what friction does for drift",
             "leave it out: what drifts is said, and the whole waveform bears it",
         )
-    groups = [group for argument in files for group in groups_of(argument)]
+    groups = groups_of(*files)
     folder = output or (default_folder(groups) if len(groups) == 1 else Path("decays-stickslip"))
     query |= {key: getattr(rig, key) for key in ("mass", "stiffness") if query[key] is None}
     compare = ss.answers.compare_decays
@@ -114,7 +115,7 @@ def squeak(
     """
     places, shown = Places.of(options), {"as_json": as_json, "everything": everything}
     rig = rig_of(**options)
-    groups = [group for argument in files for group in groups_of(argument)]
+    groups = groups_of(*files)
     require_fits(options["normal"], groups)
     folder = output or Path(f"{groups[0][0].stem}-squeak" if len(groups) == 1 else "squeaks-compared")
     query = {"channel": channel, "frequencies": frequencies, "lever": lever}
@@ -144,19 +145,17 @@ def wavelet(
     stickslip wavelet run.csv --channels "a=acc [m/s^2]" --mass 2.42 --stiffness 2310
     stickslip wavelet squeal.ogg --frequencies 500:8000 --wavelet-frequency 20
     """
-    groups = groups_of(file)
-    if len(groups) != 1:
-        raise click.BadParameter(f"'{file}' fits {len(groups)} records; one is mapped at a time", param_hint="FILE")
+    files = files_of(file, "one is mapped at a time")
     query = {key: options.pop(key) for key in ("channel", "wavelet_frequency", "normalisation")}
     rig = rig_of(**options)
-    folder = output or (None if as_json else folder_after(groups[0][0], "wavelet"))
+    folder = output or (None if as_json else folder_after(files[0], "wavelet"))
     with progress(3) as tell:
-        tell(f"reading {name_of(groups[0])}", 0)
-        parts = _told_of(read_parts(groups[0], rig), tell)
+        tell(f"reading {name_of(files)}", 0)
+        parts = _told_of(read_parts(files, rig), tell)
         query |= {"mass": rig.mass, "stiffness": rig.stiffness}
         findings = ss.answers.time_frequency(parts, frequencies=frequencies, **query)
         tell("drawing and writing", 2)
-        written = ss.publish(findings, folder=folder) if folder else None
+        written = publish(findings, folder)
     show(findings, written, as_json=as_json, everything=everything)
 
 

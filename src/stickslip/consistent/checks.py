@@ -10,16 +10,15 @@ import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import combinations
-from typing import Any
 
-from stickslip.estimate import plain
+from stickslip.estimate import Plain
 
 HOLDS, FAILS, UNTOLD = "holds", "fails", "can not be told"
 APART = 3.0  # standard deviations from which two numbers are not one
 
 
 @dataclass(frozen=True)
-class Check:
+class Check(Plain):
     """One thing that must be true if everything stated is.
 
     Attributes
@@ -45,10 +44,6 @@ class Check:
     discrepancy: float
     verdict: str
     sentence: str
-
-    def to_dict(self) -> dict[str, Any]:
-        """Plain data for JSON; what is not finite becomes ``None``."""
-        return dict(plain(vars(self)))
 
     def __str__(self) -> str:
         unit = "" if self.unit == "1" else f" {self.unit}"

@@ -8,7 +8,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,7 +40,7 @@ from stickslip.consistent.forced_checks import (
 )
 from stickslip.consistent.sliding_balance import Stated, stated_checks, what_fails
 from stickslip.errors import EstimateError
-from stickslip.estimate import Constant, Result, plain
+from stickslip.estimate import Constant, Plain, Result
 from stickslip.record.check import find_clipping
 from stickslip.record.flaws import constant, saturated
 from stickslip.record.record import Record
@@ -68,7 +67,7 @@ SURE = 5.0  # standard deviations of what is left over, from which shifts differ
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Consistency(Result):
+class Consistency(Result, Plain):
     """What must be true if everything stated is.
 
     Attributes
@@ -105,10 +104,6 @@ class Consistency(Result):
             names = ", ".join(check.name for check in self.checks)
             raise EstimateError(f"no check '{name}'", f"there are {names}", "choose one of them")
         return named[0]
-
-    def to_dict(self) -> dict[str, Any]:
-        """Plain data for JSON."""
-        return dict(plain(vars(self)))
 
     def __repr__(self) -> str:
         return "\n  ".join([f"Consistency [{'ok' if self.status == 'ok' else 'not ok'}]:", *map(str, self.checks)])

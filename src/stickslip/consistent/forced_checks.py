@@ -59,8 +59,8 @@ class Seen:
             w = 2 * np.pi * lines.frequency
             made["load"] = made["load"] - channels["load"].inertia * made.get("a", -(w**2) * made["x"])
         at = 0 if lines.cycles is not None else int(np.argmax(np.abs(made["x"]).mean(axis=0) * lines.frequency))
-        return cls(lines, made, known, str(rig.get("damper", "ground")), tolerance, at, _trips(record), channels,
-                   str(contact or "ground"))  # fmt: skip
+        damper, face, trips = str(rig.get("damper", "ground")), str(contact or "ground"), _trips(record)
+        return cls(lines, made, known, damper, tolerance, at, trips, channels, face)
 
     @property
     def angular(self) -> float:

@@ -320,7 +320,7 @@ def _answer(fit: _Fit, against: Estimate | None, record: Record) -> Cause:
     spread = float(np.std(fit.force[fit.inside]))
     is_late = not lag.includes(0.0) and (1.0 if against else WORSE) * residuals[3] < residuals[2]
     is_soft = give.value > fit.least and give.interval[0] > 0 and WORSE * residuals[3] < residuals[1]
-    cause = _named(residuals, spread, is_late=is_late, is_soft=is_soft, held=against is not None)
+    cause = _named(residuals, spread, is_late=is_late, is_soft=is_soft, measured=against is not None)
     contact = _likely(record) if cause == "contact compliance" else None
     stiffness = contact.stiffness if contact else _stiffness(fit.level(*best[:2]), give) if is_soft else None
     give = _give_of(contact) if contact else give
@@ -333,14 +333,14 @@ def _answer(fit: _Fit, against: Estimate | None, record: Record) -> Cause:
 
 
 def _named(
-    residuals: tuple[float, float, float, float], spread: float, *, is_late: bool, is_soft: bool, held: bool
+    residuals: tuple[float, float, float, float], spread: float, *, is_late: bool, is_soft: bool, measured: bool
 ) -> str:
-    """The cause, or that it can not be told: from what each leaves; `held` is a lag that the accelerometer tells."""
+    """The cause, or that it can not be told: from what each leaves; `measured`: the accelerometer tells the lag."""
     neither, lagging, _, both = residuals
     good = math.sqrt(EXPLAINED) * spread
     if is_soft:
         certain = both < good
-    elif held:
+    elif measured:
         certain = lagging < math.sqrt(FAR) * spread
     else:
         certain = lagging < good and (is_late or neither < WORSE * both)

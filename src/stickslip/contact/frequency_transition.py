@@ -264,14 +264,13 @@ def _fitted(windows: tuple[Window, ...], ringing: Ringing) -> Mode | None:
     spread, quantile = np.linalg.inv(normal) * variance * tau, student(free / tau)
     slope = np.array([-(pole.imag**2), pole.real * pole.imag]) / abs(pole) ** 3  # of the damping ratio
     method = f"one decaying mode, least squares over {rings} rings"
+    checks = (f"{len(used)} sticks",)
+    hertz, sd = pole.imag / (2 * math.pi), math.sqrt(spread[1, 1]) / (2 * math.pi)
     frequency = Estimate.normal(
-        "transition frequency", pole.imag / (2 * math.pi), sd=math.sqrt(spread[1, 1]) / (2 * math.pi), unit="Hz",
-        method=method, quantile=quantile, checks=(f"{len(used)} sticks",),
-    )  # fmt: skip
-    damping = Estimate.normal(
-        "transition damping ratio", -pole.real / abs(pole), sd=math.sqrt(float(slope @ spread @ slope)), unit="1",
-        method=method, quantile=quantile,
-    )  # fmt: skip
+        "transition frequency", hertz, sd=sd, unit="Hz", method=method, quantile=quantile, checks=checks
+    )
+    ratio, sd = -pole.real / abs(pole), math.sqrt(float(slope @ spread @ slope))
+    damping = Estimate.normal("transition damping ratio", ratio, sd=sd, unit="1", method=method, quantile=quantile)
     return Mode(pole, frequency, damping, math.sqrt(variance), tuple(window for window, _ in used), tau)
 
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from stickslip.contact.ringing import MISFIT, Ringing, checked_mass, find_ringing
 from stickslip.errors import EstimateError
-from stickslip.estimate import Constant, plain
+from stickslip.estimate import Constant, Plain
 from stickslip.record.record import Record
 
 QUESTION = "the mechanism"
@@ -38,7 +38,7 @@ STRANGE = 4.5  # standard deviations from what the simulated records of its kind
 
 
 @dataclass(frozen=True, repr=False)
-class Mechanism:
+class Mechanism(Plain):
     """What the sticks of a record are like.
 
     Attributes
@@ -66,10 +66,6 @@ class Mechanism:
     probabilities: Mapping[str, float] = field(default_factory=dict)
     features: Mapping[str, float] = field(default_factory=dict)
     reason: str = ""
-
-    def to_dict(self) -> dict[str, Any]:
-        """Plain data for JSON."""
-        return dict(plain(vars(self)))
 
     def __repr__(self) -> str:
         sure = f" ({100 * self.probability:.0f} %)" if math.isfinite(self.probability) else ""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -275,11 +276,9 @@ def _edges(window: Window, glide: Piece, pole: complex) -> tuple[float, float]:
     begin, end, reach = float(glide.first), float(glide.last), ASTRAY * cycle
     for step in STEPS:
         away = np.arange(-reach, reach + step * cycle / 2, step * cycle)
-        tried = [
-            (_left(rows, values, first, last, pole), first, last)
-            for first in begin + away if first >= low + 2
-            for last in end + away if first + 1 <= last <= high - 2
-        ]  # fmt: skip
+        pairs = itertools.product(begin + away, end + away)
+        inside = [(first, last) for first, last in pairs if low + 2 <= first < last <= high - 2]
+        tried = [(_left(rows, values, first, last, pole), first, last) for first, last in inside]
         if tried:
             _, begin, end = min(tried)
         reach = step * cycle

@@ -183,10 +183,9 @@ def coupled_frequency(record: Record) -> Estimate:
     )
     sd = fitted.stiffness.sd / (8 * math.pi**2 * mass * value)
     said, status = _ringing(record, fitted, value, sd)
-    return Estimate(
-        FREQUENCY, value, (low, high), sd, "Hz", "sqrt((k + K) / m) / 2 pi, from the likeliest contact",
-        Status(fitted.stiffness.status, status), (said, *fitted.stiffness.checks),
-    )  # fmt: skip
+    method = "sqrt((k + K) / m) / 2 pi, from the likeliest contact"
+    status, checks = Status(fitted.stiffness.status, status), (said, *fitted.stiffness.checks)
+    return Estimate(FREQUENCY, value, (low, high), sd, "Hz", method, status, checks)
 
 
 def _ringing(record: Record, fitted: LikelyContact, value: float, sd: float) -> tuple[str, str]:
@@ -271,10 +270,8 @@ def _answer(
     known = np.array([turn, amplitude[0], level.value, math.log(stiffness.value)])
     doubt = np.diag([2 * math.pi * loops.frequency.sd, amplitude[1], level.sd, stiffness.sd / stiffness.value]) ** 2
     stops = _stops(loops, branches, turn * amplitude[0])
-    equation = _propagated(
-        "equation", _equation, known, doubt, "equation 3.4 of the thesis",
-        ("without damping of the contact, and for harmonic sliding: 3 to 5 % high on a rig like the thesis's",),
-    )  # fmt: skip
+    high = ("without damping of the contact, and for harmonic sliding: 3 to 5 % high on a rig like the thesis's",)
+    equation = _propagated("equation", _equation, known, doubt, "equation 3.4 of the thesis", high)
     turns = np.array([_reached(branch, level.value) for branch in branches])
     curve = _of_curve(turns, lagging, off)
     equation = replace(equation, status=stops) if stops != "ok" else equation

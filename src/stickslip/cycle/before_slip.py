@@ -131,10 +131,9 @@ def presliding(record: Record, *, contact: str | None = None) -> Presliding:
     untold = verdict == "can not be told"
     slopes = [slope.unknown(evidence) if untold else slope.within(0.0, otherwise=evidence) for slope in slopes]
     status = evidence if untold else "ok"
-    return Presliding(
-        _inverse(_both(slopes), "presliding stiffness") if gives else None,
-        sides[0], sides[1], _backlash(strokes) if gives else None, slopes[0], slopes[1], verdict, evidence, status,
-    )  # fmt: skip
+    stiffness = _inverse(_both(slopes), "presliding stiffness") if gives else None
+    (forward, back), backlash = sides, _backlash(strokes) if gives else None
+    return Presliding(stiffness, forward, back, backlash, slopes[0], slopes[1], verdict, evidence, status)
 
 
 def _branch(stroke: Stroke, low: float, high: float) -> tuple[float, float] | None:
@@ -149,11 +148,8 @@ def _branch(stroke: Stroke, low: float, high: float) -> tuple[float, float] | No
 
 def _blurred(strokes: Strokes) -> bool:
     """Whether the friction builds up faster than a balance of forces can follow, in most strokes."""
-    rows = [
-        np.count_nonzero((stroke.friction > LOW * stroke.level) & (stroke.friction < HIGH * stroke.level)
-                         & (np.arange(len(stroke.friction)) <= stroke.slip))
-        for stroke in strokes.strokes
-    ]  # fmt: skip
+    before = [(stroke.friction[: stroke.slip + 1], stroke.level) for stroke in strokes.strokes]
+    rows = [np.count_nonzero((force > LOW * level) & (force < HIGH * level)) for force, level in before]
     return float(np.median(rows)) < BLURRED * strokes.motion.blur
 
 

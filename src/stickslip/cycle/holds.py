@@ -207,10 +207,10 @@ def _end(
     if core is None:
         carried += limits[1.0] - carried[0]
     turned = side * trace.velocity[near] < -SURE * trace.velocity_sd[near]
-    held = np.flatnonzero(turned & (limits[1.0] - carried > SURE * trace.friction_sd[near]))
-    if not len(held):
+    stuck = np.flatnonzero(turned & (limits[1.0] - carried > SURE * trace.friction_sd[near]))
+    if not len(stuck):
         return None
-    begun = int(held[0])
+    begun = int(stuck[0])
     end, doubt = math.nan, 0.0
     for _ in range(2):
         over = np.flatnonzero((carried[begun:] >= limits[1.0]) | (-carried[begun:] >= limits[-1.0]))

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from stickslip.cycle.joint_asked import Asked, asked_of, turning
+from stickslip.cycle.joint_data import JointData, joint_data, turning
 from stickslip.cycle.joint_fit import ADVICE, Telling, fitted
 from stickslip.estimate import Constant, Doubt, Estimate, Result, Status
 from stickslip.record.record import Record
@@ -167,20 +167,20 @@ def regress_joint(
     >>> found.forward.includes(0.06), found.load.includes(0.1), round(found.inertia.value, 3)
     (True, True, 0.02)
     """
-    record, asked = asked_of(record, gravity, inertia=inertia, kp=kp, kd=kd, torque_constant=torque_constant)
-    fit, terms, pull, left_out = fitted(asked)
-    return _answer(record, asked, fit, terms, pull, left_out)
+    record, data = joint_data(record, gravity, inertia=inertia, kp=kp, kd=kd, torque_constant=torque_constant)
+    fit, terms, pull, left_out = fitted(data)
+    return _answer(record, data, fit, terms, pull, left_out)
 
 
 def _answer(
-    record: Record, asked: Asked, fit: LeastSquares, terms: tuple[str, ...], pull: tuple[float, float],
+    record: Record, data: JointData, fit: LeastSquares, terms: tuple[str, ...], pull: tuple[float, float],
     left_out: tuple[str, ...],
 ) -> JointFriction:  # fmt: skip
-    slides = asked.logs[0].sliding
+    slides = data.logs[0].sliding
     rows, window = slides.rows, slides.window
-    carried = _carried(asked, pull)
-    status = Status(*_worries(asked, fit, terms, record))
-    tell = Telling(asked, fit, terms, turning(record), status)
+    carried = _carried(data, pull)
+    status = Status(*_worries(data, fit, terms, record))
+    tell = Telling(data, fit, terms, turning(record), status)
     known = {term: tell.one(term) for term in terms if term != "uneven"}
     if "load" in known:
         known["load"] = known["load"].within(0.0)
@@ -189,27 +189,27 @@ def _answer(
     ways: list[Estimate | None] = [None, None]
     if "uneven" in terms:
         ways = [tell.sum({"viscous": 1, "uneven": by}, f"viscous friction {way}") for by, way in WAYS]
-    inertia = replace(asked.stated["inertia"], name="inertia") if "inertia" in asked.stated else known["inertia"]
-    speed, acceleration = (window.apply(asked.logs[0].position, order)[rows] for order in (1, 2))
-    weight = pull[0] * window.apply(np.sin(asked.logs[0].position))[rows]
-    weight += pull[1] * window.apply(np.cos(asked.logs[0].position))[rows]
-    damped = known["damping"].value * _error_rate(asked) if "damping" in known else np.zeros(len(asked.raw))
+    inertia = replace(data.stated["inertia"], name="inertia") if "inertia" in data.stated else known["inertia"]
+    speed, acceleration = (window.apply(data.logs[0].position, order)[rows] for order in (1, 2))
+    weight = pull[0] * window.apply(np.sin(data.logs[0].position))[rows]
+    weight += pull[1] * window.apply(np.cos(data.logs[0].position))[rows]
+    damped = known["damping"].value * _error_rate(data) if "damping" in known else np.zeros(len(data.raw))
     return JointFriction(
         level=level.within(0.0), forward=forward, back=back, viscous=known["viscous"], viscous_forward=ways[0],
         viscous_back=ways[1], load=known.get("load"),
         inertia=inertia.within(0.0), sine=known.get("sine"), cosine=known.get("cosine"), damping=known.get("damping"),
-        torque=asked.raw + damped, gain=asked.stated["kp"].value if asked.source == "reference" else 0.0,
-        carried=carried, residual=float(np.linalg.norm(fit.residual) / np.linalg.norm(asked.torque)),
-        condition=fit.condition, time=record.start + rows / record.fs, speed=speed, measured=asked.torque,
-        explained=asked.torque - fit.residual,
-        friction=asked.torque + damped[rows] - inertia.value * acceleration - weight,
-        left_out=left_out, source=asked.source, status=status,
+        torque=data.raw + damped, gain=data.stated["kp"].value if data.source == "reference" else 0.0,
+        carried=carried, residual=float(np.linalg.norm(fit.residual) / np.linalg.norm(data.torque)),
+        condition=fit.condition, time=record.start + rows / record.fs, speed=speed, measured=data.torque,
+        explained=data.torque - fit.residual,
+        friction=data.torque + damped[rows] - inertia.value * acceleration - weight,
+        left_out=left_out, source=data.source, status=status,
     )  # fmt: skip
 
 
-def _carried(asked: Asked, pull: tuple[float, float]) -> float:
+def _carried(data: JointData, pull: tuple[float, float]) -> float:
     """Mean size of gravity's torque while it slides."""
-    place = asked.logs[0].position[asked.logs[0].sliding.rows]
+    place = data.logs[0].position[data.logs[0].sliding.rows]
     return float(np.mean(np.abs(pull[0] * np.sin(place) + pull[1] * np.cos(place))))
 
 
@@ -218,9 +218,9 @@ def _level(tell: Telling, pull: tuple[float, float], load: Estimate | None) -> E
     weights = {"forward": 0.5, "back": 0.5}
     if load is None or not load.known:
         return tell.sum(weights, "sliding friction")
-    place = tell.asked.logs[0].position[tell.asked.logs[0].sliding.rows]
+    place = tell.data.logs[0].position[tell.data.logs[0].sliding.rows]
     side = np.sign(pull[0] * np.sin(place) + pull[1] * np.cos(place))
-    carried, share = _carried(tell.asked, pull), load.value
+    carried, share = _carried(tell.data, pull), load.value
     weights |= {"load": carried, "sine": share * float(np.mean(side * np.sin(place)))}
     level = tell.sum(weights | {"cosine": share * float(np.mean(side * np.cos(place)))}, "sliding friction")
     more = share * carried  # its product counts twice in a sum of both factors
@@ -228,26 +228,26 @@ def _level(tell: Telling, pull: tuple[float, float], load: Estimate | None) -> E
     return replace(level, value=level.value - more, interval=(low - more, high - more))
 
 
-def _error_rate(asked: Asked) -> Array:
+def _error_rate(data: JointData) -> Array:
     """How the error of the position changes."""
-    assert asked.logs[0].reference is not None
-    return asked.logs[0].sliding.window.apply(asked.logs[0].reference - asked.logs[0].position, 1)
+    assert data.logs[0].reference is not None
+    return data.logs[0].sliding.window.apply(data.logs[0].reference - data.logs[0].position, 1)
 
 
-def _worries(asked: Asked, fit: LeastSquares, terms: tuple[str, ...], record: Record) -> list[Doubt | str]:
+def _worries(data: JointData, fit: LeastSquares, terms: tuple[str, ...], record: Record) -> list[Doubt | str]:
     worries: list[Doubt | str] = []
-    if "load" in asked.terms and "load" not in terms:
+    if "load" in data.terms and "load" not in terms:
         worries.append(
             Doubt(f"friction may grow with the load, which this log does not tell: {ADVICE['load']}", LOADED)
         )
     if fit.independent < FEW_INDEPENDENT * len(terms):
         worries.append(f"only {fit.independent:.0f} independent samples for {len(terms)} coefficients")
-    if asked.logs[0].reference is None and "inertia" in terms:
-        window, rows = asked.logs[0].sliding.window, asked.logs[0].sliding.rows
-        column = window.apply(asked.logs[0].position, 2)[rows]
-        noise = noise_level(asked.logs[0].position, record.fs) * window.noise_of_acceleration
+    if data.logs[0].reference is None and "inertia" in terms:
+        window, rows = data.logs[0].sliding.window, data.logs[0].sliding.rows
+        column = window.apply(data.logs[0].position, 2)[rows]
+        noise = noise_level(data.logs[0].position, record.fs) * window.noise_of_acceleration
         noisy = float(noise**2 / np.mean(column**2))
         if noisy > BIASED:
-            words = f"noise in the acceleration lowers the inertia by about {100 * noisy:.2g} %: log the reference too"
-            worries.append(Doubt(words, NOISY))
+            doubt = f"noise in the acceleration lowers the inertia by about {100 * noisy:.2g} %: log the reference too"
+            worries.append(Doubt(doubt, NOISY))
     return worries

@@ -142,10 +142,9 @@ def breakaway(record: Record, *, contact: str | None = None) -> Breakaway:
     rings = ringing_of(strokes.strokes, record.fs) if is_measured(record, "friction") else None  # a balance rings too
     heard = (None, None, None) if rings is None else (rings.forward, rings.back, rings.difference)
     swings = [_swing(record, [stroke for stroke in borne.strokes if stroke.way == way], side) for way, side in SIDES]
-    return Breakaway(
-        _flagged(levels[0], status), _flagged(levels[1], status), _flagged(ratio, status) or ratio, *heard,
-        swings[0], swings[1], len(borne.strokes), status,
-    )  # fmt: skip
+    forward, back = (_flagged(level, status) for level in levels)
+    ratio = _flagged(ratio, status) or ratio
+    return Breakaway(forward, back, ratio, *heard, swings[0], swings[1], len(borne.strokes), status)
 
 
 def _level(borne: _Borne, strokes: Strokes, way: int, side: str) -> Estimate | None:
@@ -349,10 +348,10 @@ def _start(travel: Array, pull: Array, mass: float, fs: float) -> float | None:
     # by the pull alone, and by a force of 1 N, from each begin on
     pulled = np.where(since > 0, twice - twice[begins, None] - once[begins, None] * since, 0.0)
     step = every**2 / (mass * fs**2)
-    held, rest = step * since**2 / 2, travel - step * pulled
-    held_about, rest_about = (part - part.mean(axis=1, keepdims=True) for part in (held, rest))
-    friction = -np.sum(held_about * rest_about, axis=1) / np.sum(held_about**2, axis=1)
-    cost = np.sum((rest_about + friction[:, None] * held_about) ** 2, axis=1)
+    unit, rest = step * since**2 / 2, travel - step * pulled
+    unit_about, rest_about = (part - part.mean(axis=1, keepdims=True) for part in (unit, rest))
+    friction = -np.sum(unit_about * rest_about, axis=1) / np.sum(unit_about**2, axis=1)
+    cost = np.sum((rest_about + friction[:, None] * unit_about) ** 2, axis=1)
     cost[pull[begins] < friction] = np.inf
     best = int(np.argmin(cost))
     if not np.isfinite(cost[best]):

@@ -311,7 +311,9 @@ def _mean_of_both(forward: Estimate, back: Estimate, name: str) -> Estimate:
     if not (forward.known and back.known):
         return replace(forward if not forward.known else back, name=name)
     low, high = ((a + b) / 2 for a, b in zip(forward.interval, back.interval, strict=True))
-    return Estimate(
-        name, (forward.value + back.value) / 2, (low, high), (forward.sd + back.sd) / 2, forward.unit,
-        f"mean of both directions, {forward.method}", doubtful.status, forward.checks,
-    )  # fmt: skip
+    mean, sd, method = (
+        (forward.value + back.value) / 2,
+        (forward.sd + back.sd) / 2,
+        f"mean of both directions, {forward.method}",
+    )
+    return Estimate(name, mean, (low, high), sd, forward.unit, method, doubtful.status, forward.checks)

@@ -179,11 +179,9 @@ def _difference(forward: Estimate, back: Estimate) -> Estimate:
         math.hypot(high - forward.value, back.value - under),
     )
     flags = [estimate.status for estimate in (forward, back) if estimate.status != "ok"]
-    return Estimate(
-        "ringing after slip begins, forward less back", value, interval=(value - below, value + above),
-        sd=math.hypot(forward.sd, back.sd), unit="Hz", method="difference of both directions",
-        status=flags[0] if flags else "ok",
-    )  # fmt: skip
+    name, method = "ringing after slip begins, forward less back", "difference of both directions"
+    interval, sd = (value - below, value + above), math.hypot(forward.sd, back.sd)
+    return Estimate(name, value, interval, sd, "Hz", method, flags[0] if flags else "ok")
 
 
 def _direction(strokes: Sequence[Stroke], side: str, fs: float) -> tuple[Estimate, Estimate, Estimate] | None:
@@ -242,13 +240,9 @@ def _averaged(degrees: Array, without: Array, count: int, side: str) -> list[Est
     swings = []
     for row, (what, unit) in enumerate((("ringing after slip begins", "Hz"), ("damping ratio of that ringing", "1"))):
         half = math.hypot(quantile * sd[row], 2 * spread[row])
-        swings.append(
-            Estimate(
-                f"{what}, {side}", float(mean[row]), interval=(mean[row] - half, mean[row] + half),
-                sd=math.hypot(sd[row], spread[row]), unit=unit, status=status, checks=checks,
-                method="one decaying mode in all strokes, least squares; jackknife over strokes, and polynomials",
-            )
-        )  # fmt: skip
+        method = "one decaying mode in all strokes, least squares; jackknife over strokes, and polynomials"
+        value, interval, wide = float(mean[row]), (mean[row] - half, mean[row] + half), math.hypot(sd[row], spread[row])
+        swings.append(Estimate(f"{what}, {side}", value, interval, wide, unit, method, status, checks))
     return swings
 
 

@@ -170,15 +170,15 @@ def friction_coefficients(
     steady = _steady(wear_in, len(loads))
     status = Status(*_doubts(wear_in, steady, len(loads)), *([cycles.status] if cycles.status != "ok" else []))
     relative = math.hypot(record.channels["friction"].gain_sd, load.sd / load.value)
-    told = {
+    coefficients = {
         name: _beside(mean_of_cycles(_called(name), of_cycles[name][steady:], unit="1", method=how), relative, status)
         for name, how in DEFINITIONS.items()
     }
     position, cycle, forward, back = _map(friction, motion, label, loads)
     return Coefficients(
-        told["plateau"], told["by_stroke"], told["by_cycle"], told["by_energy"], load=load, of_cycles=of_cycles,
-        time=motion.start + cycles.edges[:-1] / motion.fs, wear_in=wear_in, position=position, cycle=cycle,
-        forward=forward, back=back, unit=motion.unit, measured=load.method != "stated", status=status,
+        **coefficients, load=load, of_cycles=of_cycles, time=motion.start + cycles.edges[:-1] / motion.fs,
+        wear_in=wear_in, position=position, cycle=cycle, forward=forward, back=back, unit=motion.unit,
+        measured=load.method != "stated", status=status,
     )  # fmt: skip
 
 
@@ -237,8 +237,8 @@ def _beside(coefficient: Estimate, relative: float, status: str) -> Estimate:
     below, above = (math.hypot(end - coefficient.value, more) for end in coefficient.interval)
     interval = coefficient.value - below, coefficient.value + above
     sd = math.hypot(coefficient.sd, relative * coefficient.value)
-    told = replace(coefficient, interval=interval, sd=sd, status=Status(coefficient.status, status))
-    return told.within(0.0, otherwise=DRIVES)
+    widened = replace(coefficient, interval=interval, sd=sd, status=Status(coefficient.status, status))
+    return widened.within(0.0, otherwise=DRIVES)
 
 
 def fit_wear_in(values: Array) -> WearIn | None:
@@ -297,10 +297,10 @@ def _first_guess(number: Array, values: Array) -> tuple[float, float, float]:
     best, least = (float(values.mean()), 0.0, SHORTEST), math.inf
     for cycles in np.geomspace(1.5 * SHORTEST, number[-1] / 2, TIMES):
         design = np.column_stack([np.ones_like(number), np.exp(-number / cycles)])
-        found = np.linalg.lstsq(design, values, rcond=None)[0]
-        left = float(np.linalg.norm(values - design @ found))
+        solution = np.linalg.lstsq(design, values, rcond=None)[0]
+        left = float(np.linalg.norm(values - design @ solution))
         if left < least:
-            best, least = (float(found[0]), float(found[1]), float(cycles)), left
+            best, least = (float(solution[0]), float(solution[1]), float(cycles)), left
     return best
 
 
@@ -313,8 +313,8 @@ def _steady(wear_in: WearIn | None, count: int) -> int:
 def _doubts(wear_in: WearIn | None, steady: int, count: int) -> list[Doubt]:
     if wear_in is None or steady:
         return []
-    words = f"it is still wearing in after {count} cycles: the mean is not of a state that lasts"
-    return [Doubt(words, WEARING)]
+    doubt = f"it is still wearing in after {count} cycles: the mean is not of a state that lasts"
+    return [Doubt(doubt, WEARING)]
 
 
 def _map(friction: Array, motion: Motion, label: NDArray[np.intp], loads: Array) -> tuple[Array, Array, Array, Array]:

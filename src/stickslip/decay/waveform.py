@@ -193,7 +193,7 @@ def normal_equations(p, n, blocks, hessian, gradient, work):
             hessian[j, k] = 0.0
     lam, half = _pole(p)
     turn = _exponential(lam, size * dt)
-    squares, held, mean, used = 0.0, 0, 0.0, 0
+    squares, counted, mean, used = 0.0, 0, 0.0, 0
     fall(p, state, False)
     i = 0
     for piece in range(-1, n + 1):
@@ -220,11 +220,11 @@ def normal_equations(p, n, blocks, hessian, gradient, work):
                 continue
             # a part of a block, which several pieces share
             mean = _add_part(rows, count / size, z, tau, mean, pending)
-            held += count
+            counted += count
             i += count
             if i % size == 0 or i == total:
-                squares += _add_block(means[(i - 1) // size], mean, held / size, pending, hessian, gradient)
-                mean, held = 0.0, 0
+                squares += _add_block(means[(i - 1) // size], mean, counted / size, pending, hessian, gradient)
+                mean, counted = 0.0, 0
     share = total / used if order == 2 and used > 0 else 1.0
     for j in range(6):
         gradient[j] *= share

@@ -220,10 +220,10 @@ def _begin(ring_down: RingDown, restoring: Restoring) -> tuple[slice, Array]:
     fall = float(np.clip(fall, 0.3, 0.9999))
     dry = float(np.clip(-less / (1 + fall), 1e-6 * sizes[0], 0.3 * sizes[0]))
     damping = -math.log(fall) / math.pi
-    held = ring_down.held and first == 0
+    is_held = ring_down.held and first == 0
     period = 2 * math.pi / w
-    release = (ring_down.release - ring_down.first) if held else turns[0] / ring_down.fs
-    begin = max(0, int((release - period / 2) * ring_down.fs)) if held else int(turns[0])
+    release = (ring_down.release - ring_down.first) if is_held else turns[0] / ring_down.fs
+    begin = max(0, int((release - period / 2) * ring_down.fs)) if is_held else int(turns[0])
     stop = ring_down.stop - ring_down.first + TAIL * period
     end = min(len(ring_down.samples), int(stop * ring_down.fs) + 1)
     amplitude = float(ring_down.samples[turns[0]] - ring_down.rest)

@@ -69,8 +69,18 @@ def plates_of(findings: Findings) -> list[Plate]:
     sticks = [event for event in events if event.kind == "stick"]
     plates = [*_of_friction(findings), *_over_time(findings, sticks=len(sticks)), *_of_contact(findings)]
     if any(event.whole for event in sticks):
-        plates.append(captioned("friction", "sticks", partial(plot_sticks, findings)))
+        uncorrected = _before_twins(findings)
+        plates.append(captioned("friction", "sticks", partial(plot_sticks, findings), uncorrected=uncorrected))
     return plates
+
+
+def _before_twins(findings: Findings) -> str:
+    """That drawn sticks are those read off the record, where the table's share is corrected by twins."""
+    if findings.trial is None:
+        return ""
+    stuck = sum(event.duration for event in findings.sticks.events if event.kind == "stick")
+    share = 100 * stuck / findings.record.duration
+    return f", as read off the record: {share:.0f} % of the time, not yet corrected by twins"
 
 
 def _of_friction(findings: Findings) -> list[Plate]:
@@ -89,7 +99,7 @@ def _of_friction(findings: Findings) -> list[Plate]:
 def _over_time(findings: Findings, *, sticks: int) -> list[Plate]:
     """The record as a whole, some cycles of it, and the force balance in them."""
     near = close_up(findings)
-    stuck = " Grey: the contact sticks." if sticks else ""
+    stuck = f" Grey: the contact sticks{_before_twins(findings)}." if sticks else ""
     shaded = stuck if sticks <= MOST_SHADES else ""
     plates = [captioned("friction", "record", partial(plot_traces, findings), stuck=shaded)]
     if near is not None:

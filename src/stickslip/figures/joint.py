@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from stickslip.answers.findings import Findings
     from stickslip.cycle.joint import JointFriction
-    from stickslip.cycle.joint_logs import JointPrediction
+    from stickslip.cycle.joint_fit import JointPrediction
 
 Array = NDArray[np.float64]
 

@@ -65,13 +65,10 @@ def streams_of(path: Path, messages: Iterable[Message]) -> list[Stream]:
     for (topic, names), part in rows.items():
         values = np.array([row for _, _, row in part], dtype=np.float64).reshape(len(part), len(names))
         stamps = np.array([stamp for _, stamp, _ in part], dtype=np.int64)
-        streams.append(
-            Stream(
-                topic.strip("/"), _seconds(np.array([heard for heard, _, _ in part], dtype=np.int64) - first),
-                dict(zip(names, values.T, strict=True)), _seconds(stamps - stamps[0]) if np.all(stamps > 0) else None,
-                (topic, names) in named,
-            )
-        )  # fmt: skip
+        times = _seconds(np.array([heard for heard, _, _ in part], dtype=np.int64) - first)
+        own = _seconds(stamps - stamps[0]) if np.all(stamps > 0) else None
+        columns = dict(zip(names, values.T, strict=True))
+        streams.append(Stream(topic.strip("/"), times, columns, own, (topic, names) in named))
     return streams
 
 
@@ -93,16 +90,16 @@ def joined(path: Path, streams: Sequence[Stream], notes: Sequence[str] = ()) -> 
     begin = int(np.searchsorted(clock.heard, max(stream.heard[0] for stream in kept)))
     stamps = clock.stamps if clock.stamps is not None and np.all(np.diff(clock.stamps) > 0) else clock.heard
     arrays, columns = {"time": stamps[begin:]}, [Column("time", "s", len(stamps) - begin)]
-    told = [f"the clock is that of {clock.topic}", *notes]
+    history = [f"the clock is that of {clock.topic}", *notes]
     for stream, names in zip(kept, _titles(kept), strict=True):
         rows = np.searchsorted(stream.heard, clock.heard[begin:], side="right") - 1
         if stream is not clock:
-            told.append(f"{stream.topic} is read as last heard")
+            history.append(f"{stream.topic} is read as last heard")
         for name, (own, values) in zip(names, stream.columns.items(), strict=True):
             arrays[name] = values[begin:] if stream is clock else values[rows]
             columns.append(Column(name, stream.units.get(own), len(rows)))
-    told += [f"{stream.topic} is heard too late, left out" for stream in streams if stream.heard[0] > latest]
-    return Table(tuple(columns), slices(arrays), notes=tuple(told))
+    history += [f"{stream.topic} is heard too late, left out" for stream in streams if stream.heard[0] > latest]
+    return Table(tuple(columns), slices(arrays), notes=tuple(history))
 
 
 def _titles(streams: Sequence[Stream]) -> list[list[str]]:

@@ -314,20 +314,20 @@ class Columns:
                 raise
             return Unit(own, 1.0, own)  # a unit of the instrument's own ("counts"): the numbers stay as written
 
-    def time(self, asked: str | None) -> dict[int, TimeColumn]:
+    def time(self, wanted: str | None) -> dict[int, TimeColumn]:
         """The time column of each file that has one: the one asked for, or one recognised by its name."""
         times = {}
         for number, source in enumerate(self.sources):
-            if asked is not None:
-                key = self._asked_time(number, asked)
+            if wanted is not None:
+                key = self._asked_time(number, wanted)
             else:
                 named = [column for column in source.table.columns if is_time(column)]
                 best = min(named, key=_time_rank, default=None)
                 key = self._time_column(number, best, named) if best else None
             if key:
                 times[number] = key
-        if asked is not None and not times:
-            raise unknown("time column", asked, [name for _, name in self.columns])
+        if wanted is not None and not times:
+            raise unknown("time column", wanted, [name for _, name in self.columns])
         return times
 
     def _time_column(self, number: int, best: Column, named: Sequence[Column]) -> TimeColumn:
@@ -336,8 +336,8 @@ class Columns:
         scale = parse_unit(stated or "s", expect="s").scale
         return TimeColumn((number, best.name), scale, tuple((number, name) for name in twins), stated is None)
 
-    def _asked_time(self, number: int, asked: str) -> TimeColumn | None:
-        spec = split_spec(asked)
+    def _asked_time(self, number: int, wanted: str) -> TimeColumn | None:
+        spec = split_spec(wanted)
         table = self.sources[number].table
         by_name = {f"#{n}": column for n, column in enumerate(table.columns, 1)}
         by_name |= {last_part(column.name): column for column in table.columns}

@@ -275,9 +275,9 @@ def warm(request: Mapping[str, Any], go_on: GoOn) -> Answer:
     drawn.run({"state": state}, go_on)
     kinetic = float(state["law"]["kinetic"])
     grid = {"drive.frequency": [2.5, 2.6], "law.kinetic": [kinetic, 1.1 * kinetic]}
-    asked = {"state": state, "measure": "stops", "grid": grid, "halvings": 1}
-    sweep(asked, go_on)
-    return refine(asked, go_on)
+    query = {"state": state, "measure": "stops", "grid": grid, "halvings": 1}
+    sweep(query, go_on)
+    return refine(query, go_on)
 
 
 MAPS: dict[str, Callable[[Mapping[str, Any], GoOn], Answer]] = {"sweep": sweep, "refine": refine, "warm": warm}

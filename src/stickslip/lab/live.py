@@ -8,7 +8,8 @@ import queue
 import threading
 import time
 from collections.abc import AsyncIterator, Callable, Mapping
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future
+from concurrent.futures.process import BrokenProcessPool
 from contextlib import asynccontextmanager, suppress
 from dataclasses import dataclass, field, replace
 from datetime import datetime
@@ -25,12 +26,14 @@ import stickslip as ss
 import stickslip.bench as bench
 from stickslip.lab.frames import frame
 from stickslip.lab.play import conversation, readable
+from stickslip.workers import pool
 
 WANTED = ("open", "close", "record", "stop", "mark", "drive")
-BINS = 500.0  # a second of each trace: the lowest and the highest sample in each are drawn
+BINS = 250.0  # a second of each trace: the lowest and the highest sample in each are drawn
 WATCHERS = 64  # pages at a time
 BEHIND = 8  # messages that a page may be behind; older ones are skipped
 LONGEST_MARK = 200  # letters
+EVERY = 0.5  # s between two answers: each takes a processor for 0.2 s at 4 channels of 20 kHz, and one reads no faster
 
 
 @dataclass(frozen=True)
@@ -159,8 +162,10 @@ class Session:
         self.began, self.rest, self.rest_at = 0.0, np.empty((len(device.inputs), 0)), 0
         self.said = ""
         self.thread = threading.Thread(target=self._run, daemon=True)
-        self.asker = ThreadPoolExecutor(1)
-        self.busy = False
+        # Numbers are found in another process: beside the reading, they kept samples from the page for 0.2 s a cycle.
+        self.processes = pool(1, "stickslip.bench")
+        self.numbers: Future[Any] | None = None
+        self.due = 0.0
 
     def start(self) -> None:
         """Begin to read."""
@@ -170,7 +175,7 @@ class Session:
         """Close the device; a recording under way becomes a record."""
         self.ending.set()
         self.thread.join()
-        self.asker.shutdown(wait=False, cancel_futures=True)
+        self.processes.shutdown(cancel_futures=True)
 
     def _run(self) -> None:
         try:
@@ -235,9 +240,8 @@ class Session:
         self.tell(self._frame(block))
         for cycle in cycles:
             self.tell(_cycle(cycle, self.device.fs))
-        if cycles and not self.busy and (record := self.monitor.window()) is not None:
-            self.busy = True
-            self.asker.submit(self._ask, record)
+        if cycles and time.monotonic() > self.due and (self.numbers is None or self.numbers.done()):
+            self._ask()
 
     def _frame(self, block: bench.Block) -> bytes:
         """A block as it is drawn: lowest and highest of each channel, bin by bin; the rest waits for the next one."""
@@ -254,19 +258,28 @@ class Session:
             arrays[f"low {one.name}"], arrays[f"high {one.name}"] = rows.min(axis=1), rows.max(axis=1)
         oldest = time.time() - (time.monotonic() - block.clock) - block.samples.shape[1] / fs
         recorded = time.monotonic() - self.began if self.tape is not None else None
-        return frame({"kind": "block", "first": first, "step": size / fs, "start": first / fs, "oldest": oldest,
-                      "recorded": recorded, "said": self.said, "lost": self.monitor.lost}, arrays)  # fmt: skip
+        header = {"kind": "block", "first": first, "step": size / fs, "start": first / fs, "oldest": oldest}
+        header |= {"recorded": recorded, "said": self.said, "lost": self.monitor.lost}
+        return frame(header, arrays)
 
-    def _ask(self, record: ss.Record) -> None:
-        """The numbers of the last cycles, beside the reading."""
+    def _ask(self) -> None:
+        """Have the numbers of the last cycles found."""
+        record = self.monitor.window()
+        if record is not None:
+            self.due = time.monotonic() + EVERY
+            self.numbers = self.processes.submit(bench.answers, record, self.constants)
+            self.numbers.add_done_callback(self._answered)
+
+    def _answered(self, numbers: Future[Any]) -> None:
+        """Show them."""
+        if numbers.cancelled():
+            return
         try:
-            rows, untold = bench.answers(record, self.constants)
-            plain = [
-                [value if isinstance(value, str) or math.isfinite(value) else None for value in row] for row in rows
-            ]
-            self.tell(frame({"kind": "numbers", "rows": plain, "untold": untold}))
-        finally:
-            self.busy = False
+            rows, untold = numbers.result()
+        except BrokenProcessPool:
+            rows, untold = [], ["The process that finds the numbers was ended; close the device and open it again."]
+        plain = [[value if isinstance(value, str) or math.isfinite(value) else None for value in row] for row in rows]
+        self.tell(frame({"kind": "numbers", "rows": plain, "untold": untold}))
 
 
 def _cycle(cycle: bench.Cycle, fs: float) -> bytes:

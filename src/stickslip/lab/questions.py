@@ -6,8 +6,10 @@ import base64
 import dataclasses
 import json
 import math
+import re
 import shutil
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,11 +17,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 import stickslip as ss
-from stickslip.lab.asked import AS_WRITTEN, PART, Asked, on_the_page
 
 if TYPE_CHECKING:
     from stickslip import Record
     from stickslip.record import Fault
+    from stickslip.rig import RigSettings
     from stickslip.story import Story
 
 Array = NDArray[np.float64]
@@ -29,14 +31,17 @@ MOST_FIGURES, MOST_SOUNDS, LONGEST_SOUND = 6, 8, 1 << 20  # shown in the lab; by
 POINTS = 2000  # pairs of least and greatest value of a channel that are drawn
 MOTION, FORCES = {"x", "v"}, {"friction", "load", "force"}
 CONSTANTS = ("mass", "stiffness", "damping")
+LONG = 1 << 26  # bytes of files from which a record is asked part by part
+PART = 1 << 18  # rows of such a part
+AS_WRITTEN = "a record as it was written"
 
 
-def describe(asked: Asked) -> dict[str, Any]:
+def describe(query: Query) -> dict[str, Any]:
     """The channels, rate and faults of each record, and of each question what a person must still tell."""
     records, missing = [], []
-    for number in range(len(asked.records)):
-        asked.say(f"reading {asked.name(number)}", number / len(asked.records))
-        summary, needs = _one(asked, number)
+    for number in range(len(query.records)):
+        query.say(f"reading {query.name(number)}", number / len(query.records))
+        summary, needs = _one(query, number)
         records.append(summary)
         missing += needs
     names = [{channel["name"] for channel in record["channels"]} for record in records]
@@ -70,15 +75,15 @@ def _question(able: bool, why: str, needs: list[str], may: list[str]) -> dict[st
     }
 
 
-def _one(asked: Asked, number: int) -> tuple[dict[str, Any], list[str]]:
+def _one(query: Query, number: int) -> tuple[dict[str, Any], list[str]]:
     """A record as the page shows it, and what reading it still needs."""
     try:
-        return shown(asked.name(number), asked.parts(number)), []
+        return shown(query.name(number), query.parts(number)), []
     except ss.errors.RecordError as error:
-        if asked.reading.get("fs") or error.kind != ss.errors.NO_RATE:
+        if query.reading.get("fs") or error.kind != ss.errors.NO_RATE:
             raise
-        guess = Asked(asked.records, asked.names, {**asked.reading, "fs": 1.0}, asked.options, asked.say)
-        summary = shown(asked.name(number), guess.parts(number))
+        guess = Query(query.records, query.names, {**query.reading, "fs": 1.0}, query.options, query.say)
+        summary = shown(query.name(number), guess.parts(number))
         return {**summary, "fs": None, "duration": None, "asks": on_the_page(str(error))}, ["fs"]
 
 
@@ -207,11 +212,11 @@ def plain(value: float) -> float | None:
 FOLDER = "results"
 
 
-def results_of(asked: Asked, answer: Callable[[int], Any]) -> tuple[list[Any], list[str]]:
+def results_of(query: Query, answer: Callable[[int], Any]) -> tuple[list[Any], list[str]]:
     """What each record answers, and why those that are left out do not; the reason where none does."""
     results, left_out = [], []
-    for number in range(len(asked.records)):
-        asked.say(f"analysing {asked.name(number)}", number / (len(asked.records) + 1))
+    for number in range(len(query.records)):
+        query.say(f"analysing {query.name(number)}", number / (len(query.records) + 1))
         try:
             results.append(answer(number))
         except ss.errors.ModelError:
@@ -224,12 +229,12 @@ def results_of(asked: Asked, answer: Callable[[int], Any]) -> tuple[list[Any], l
 
 
 def published(
-    asked: Asked, findings: Sequence[Any], left_out: Sequence[str], compare: Callable[..., Any]
+    query: Query, findings: Sequence[Any], left_out: Sequence[str], compare: Callable[..., Any]
 ) -> dict[str, Any]:
     """The page, numbers and figures of one record, or of several compared; and what the lab shows of them."""
     results = compare(findings) if len(findings) > 1 else findings[0]
     results = dataclasses.replace(results, notes=(*results.notes, *left_out))
-    asked.say("drawing and writing", len(asked.records) / (len(asked.records) + 1))
+    query.say("drawing and writing", len(query.records) / (len(query.records) + 1))
     ss.publish(results, folder=FOLDER)
     return _shown(ss.summary(results))
 
@@ -255,30 +260,30 @@ def loudest(story: Story) -> list[Any]:
     return [clip for clip in clips if len(clip.wav) < LONGEST_SOUND]
 
 
-def analyze(asked: Asked) -> dict[str, Any]:
+def analyze(query: Query) -> dict[str, Any]:
     """All questions about friction."""
-    method = asked.options.get("method") or "auto"
+    method = query.options.get("method") or "auto"
 
     def one(number: int) -> Any:
-        rig = asked.rig(number)
-        if not asked.is_long(number):
-            return _on_twins(asked, ss.analyze(asked.record(number), rig=rig, method=method))
+        rig = query.rig(number)
+        if not query.is_long(number):
+            return _on_twins(query, ss.analyze(query.record(number), rig=rig, method=method))
 
         def tell(sentence: str) -> None:
-            asked.say(f"analysing {asked.name(number)}, {sentence}", number / (len(asked.records) + 1))
+            query.say(f"analysing {query.name(number)}, {sentence}", number / (len(query.records) + 1))
 
-        return ss.answers.analyze_blocks(asked.parts(number), rig=rig, method=method, progress=tell)
+        return ss.answers.analyze_blocks(query.parts(number), rig=rig, method=method, progress=tell)
 
-    return published(asked, *results_of(asked, one), ss.compare)
+    return published(query, *results_of(query, one), ss.compare)
 
 
-def _on_twins(asked: Asked, findings: Any) -> Any:
+def _on_twins(query: Query, findings: Any) -> Any:
     """The answers tried on twins where that is asked for; with a note of why, where the record has none."""
-    if not asked.options.get("twins"):
+    if not query.options.get("twins"):
         return findings
 
     def tell(share: float) -> None:
-        asked.say(f"trying the answers of {findings.name} on {TWINS} simulated rigs, {share:.0%}", 0.1 + 0.8 * share)
+        query.say(f"trying the answers of {findings.name} on {TWINS} simulated rigs, {share:.0%}", 0.1 + 0.8 * share)
 
     tell(0.0)
     try:
@@ -287,11 +292,11 @@ def _on_twins(asked: Asked, findings: Any) -> Any:
         return dataclasses.replace(findings, notes=(*findings.notes, f"Twins: {error}"))
 
 
-def decay(asked: Asked) -> dict[str, Any]:
+def decay(query: Query) -> dict[str, Any]:
     """How a released mass dies away."""
-    options = {name: value for name, value in asked.options.items() if value is not None}
-    results, left_out = results_of(asked, lambda number: ss.analyze_decay(asked.record(number), **options))
-    answer = published(asked, results, left_out, ss.answers.compare_decays)
+    options = {name: value for name, value in query.options.items() if value is not None}
+    results, left_out = results_of(query, lambda number: ss.analyze_decay(query.record(number), **options))
+    answer = published(query, results, left_out, ss.answers.compare_decays)
     return {**answer, "overlay": [curve for findings in results for curve in _decay_curves(findings)]}
 
 
@@ -304,52 +309,52 @@ def _decay_curves(findings: Any) -> Iterator[dict[str, Any]]:
         yield curve(findings.name, fit.channel, unit, time, measured, fitted)
 
 
-def squeak(asked: Asked) -> dict[str, Any]:
+def squeak(query: Query) -> dict[str, Any]:
     """When, how loud and at which frequency it squeaks."""
-    options = {name: asked.options.get(name) for name in ("channel", "frequencies", "lever")}
+    options = {name: query.options.get(name) for name in ("channel", "frequencies", "lever")}
 
     def one(number: int) -> Any:
-        rig = asked.rig(number)
-        findings = ss.analyze_squeaks(asked.record(number), contact=rig.contact, **options)
+        rig = query.rig(number)
+        findings = ss.analyze_squeaks(query.record(number), contact=rig.contact, **options)
         load = rig.normal_load(findings.name)
         return findings if load is None else dataclasses.replace(findings, normal=load)
 
-    return published(asked, *results_of(asked, one), ss.answers.compare_squeaks)
+    return published(query, *results_of(query, one), ss.answers.compare_squeaks)
 
 
-def wavelet(asked: Asked) -> dict[str, Any]:
+def wavelet(query: Query) -> dict[str, Any]:
     """A channel over time and frequency."""
-    options = {name: value for name, value in asked.options.items() if value is not None}
-    asked.say(f"mapping {asked.name(0)}", 0.1)
-    findings = ss.answers.time_frequency(asked.parts(), **options)
-    return published(asked, [findings], [], list)
+    options = {name: value for name, value in query.options.items() if value is not None}
+    query.say(f"mapping {query.name(0)}", 0.1)
+    findings = ss.answers.time_frequency(query.parts(), **options)
+    return published(query, [findings], [], list)
 
 
-def fit(asked: Asked) -> dict[str, Any]:
+def fit(query: Query) -> dict[str, Any]:
     """Which friction law it is, or a curve of friction."""
-    rig = asked.rig()
-    asked.say("reading", 0.0)
-    records = [asked.record(number) for number in range(len(asked.records))]
+    rig = query.rig()
+    query.say("reading", 0.0)
+    records = [query.record(number) for number in range(len(query.records))]
     result, records = ss.answers.fit_records(
         records,
         rig=rig,
-        curve=asked.options.get("curve"),
-        laws=_listed(asked.options.get("laws")),
-        calibration=asked.options.get("calibration") or 0.01,
-        progress=lambda share: asked.say(f"fitting and comparing laws, {share:.0%}", 0.05 + 0.85 * share),
+        curve=query.options.get("curve"),
+        laws=_listed(query.options.get("laws")),
+        calibration=query.options.get("calibration") or 0.01,
+        progress=lambda share: query.say(f"fitting and comparing laws, {share:.0%}", 0.05 + 0.85 * share),
     )
     ss.publish(result, folder=FOLDER, record=records)
     answer = _shown(ss.summary(result, record=records))
-    curves = [*_law_curves(asked, records, result)]
+    curves = [*_law_curves(query, records, result)]
     return {**answer, "overlay": curves, "state": fitted_system(Path(FOLDER, "law", "law.toml"))}
 
 
-def _law_curves(asked: Asked, records: Sequence[Record], result: Any) -> Iterator[dict[str, Any]]:
+def _law_curves(query: Query, records: Sequence[Record], result: Any) -> Iterator[dict[str, Any]]:
     """What the best law's sensors would have read, over what was measured; nothing of a curve."""
     for number, traces in enumerate(result.fit.traces if isinstance(result, ss.law.LawComparison) else ()):
         for name, values in traces.measured.items():
             unit = records[number].channels[name].unit
-            yield curve(asked.name(number), name, unit, traces.time[name], values, traces.fitted[name])
+            yield curve(query.name(number), name, unit, traces.time[name], values, traces.fitted[name])
 
 
 def fitted_system(file: Path) -> dict[str, Any] | None:
@@ -367,6 +372,92 @@ def _listed(names: str | None) -> list[str] | None:
     return [word.strip() for word in names.split(",") if word.strip()] if names else None
 
 
-QUESTIONS: dict[str, Callable[[Asked], dict[str, Any]]] = {
+# ---- what is asked, of which records
+
+
+@dataclass(frozen=True)
+class Query:
+    """What was asked: of which records, read how, with which options.
+
+    Attributes
+    ----------
+    records : sequence of sequence of Path
+        The files of each record.
+    names : mapping of str to str
+        What the users call a file, by our name of it.
+    reading, options : mapping
+        How the files are read; what the question is told.
+    say : callable
+        Told in words, and as a share of one, how far it is.
+    """
+
+    records: Sequence[Sequence[Path]]
+    names: Mapping[str, str]
+    reading: Mapping[str, Any]
+    options: Mapping[str, Any]
+    say: Callable[[str, float], None]
+
+    @classmethod
+    def of(cls, ask: Mapping[str, Any], say: Callable[[str, float], None]) -> Query:
+        records = [[Path(path) for path in record] for record in ask["records"]]
+        return cls(records, ask["names"], ask["reading"], ask["options"], say)
+
+    def rig(self, number: int = 0) -> RigSettings:
+        """The settings, with the normal load of one of the records."""
+        known = set(ss.rig.RigSettings.model_fields)
+        given = {name: value for name, value in {**self.reading, **self.options}.items() if name in known}
+        loads = given.pop("normal", None)
+        load = loads[number] if isinstance(loads, list) and number < len(loads) else None
+        return ss.rig.rig_settings({**given, **({"normal": load} if load else {})}, source="the page")
+
+    def record(self, number: int = 0) -> Record:
+        """One of the records, whole, mended as asked."""
+        rig, files = self.rig(number), self.records[number]
+        read = ss.read_record(files, rows=rig.row_range(), **rig.reading())
+        return ss.answers.mend(self.named(read, files), repairs=rig.repair)
+
+    def parts(self, number: int = 0) -> Iterator[Record]:
+        """One of the records in parts that fit into memory; whole if it is short, or rows or repairs are asked for."""
+        rig, files = self.rig(number), self.records[number]
+        if rig.rows or rig.repair or not self.is_long(number):
+            yield self.record(number)
+            return
+        for part in ss.read_blocks(files, size=PART, **rig.reading()):
+            yield self.named(part, files)
+
+    def is_long(self, number: int) -> bool:
+        return sum(path.stat().st_size for path in self.records[number]) > LONG
+
+    def name(self, number: int) -> str:
+        return " + ".join(self.names[path.name] for path in self.records[number])
+
+    def named(self, record: Record, files: Sequence[Path]) -> Record:
+        """The record, its history telling the users' own names of the files."""
+        ours = {path.name for path in files}
+        steps = [_renamed(step, self.names) for step in record.history]
+        if not any(file["name"] in ours for step in record.history for file in step.arguments.get("files", ())):
+            files_sent = [
+                {"name": self.names[path.name]} for path in files
+            ]  # as write_record left it: it names no file
+            steps.append(ss.record.Step("read_record", {"files": files_sent}, AS_WRITTEN))
+        return dataclasses.replace(record, history=tuple(steps))
+
+
+def _renamed(step: ss.record.Step, names: Mapping[str, str]) -> ss.record.Step:
+    files = [
+        {key: names.get(value, value) if key == "name" else value for key, value in file.items() if key != "folder"}
+        for file in step.arguments.get("files", ())
+    ]
+    return dataclasses.replace(step, arguments={**step.arguments, "files": files}) if files else step
+
+
+def on_the_page(sentence: str) -> str:
+    """A sentence with the page's fields for the arguments that it names to a Python user."""
+    text = re.sub(r'channels=\{"(\w+)": "([^"]*)"\}', r"\1 in the table of channels", sentence)
+    text = re.sub(r'\b(channel|method|restoring|contact)="(\w+)"', r"\1: \2", text)
+    return re.sub(r"\b([a-z_]+)=(?=\W|$)", r'the field "\1"', text)
+
+
+QUESTIONS: dict[str, Callable[[Query], dict[str, Any]]] = {
     "describe": describe, "analyze": analyze, "decay": decay, "squeak": squeak, "wavelet": wavelet, "fit": fit,
 }  # fmt: skip

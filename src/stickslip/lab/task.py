@@ -25,12 +25,11 @@ def main() -> int:
 
     ask = json.loads(Path(ASK).read_text(encoding="utf-8"))
     limit(**ask.pop("limits"))
-    from stickslip.lab.asked import Asked, on_the_page
-    from stickslip.lab.questions import QUESTIONS
+    from stickslip.lab.questions import QUESTIONS, Query, on_the_page
 
     say = _line_by_line()
     try:
-        answer = QUESTIONS[ask["question"]](Asked.of(ask, say))
+        answer = QUESTIONS[ask["question"]](Query.of(ask, say))
     except StickslipError as error:
         return _leave({"refused": on_the_page(str(error))}, 1)
     except MemoryError:

@@ -85,17 +85,18 @@ def _stribeck_starts(samples: Samples) -> tuple[Array, Array]:
     return np.linspace(np.log(np.quantile(speed, 0.01)), np.log(speed.max()), SPEEDS), np.log(EXPONENTS)
 
 
-def _stribeck_law(found: dict[str, float]) -> Stribeck:
-    return Stribeck(**{name: value for name, value in found.items() if name != "offset"})
+def _stribeck_law(values: dict[str, float]) -> Stribeck:
+    return Stribeck(**{name: value for name, value in values.items() if name != "offset"})
 
 
-def _beware(found: dict[str, Estimate], samples: Samples) -> list[tuple[tuple[str, ...], str]]:
+def _beware(estimates: dict[str, Estimate], samples: Samples) -> list[tuple[tuple[str, ...], str]]:
     """What Stribeck's curve says where nothing slid, or where friction does not fall."""
     slowest, unseen = float(np.abs(samples.velocity).min()), ("static", "speed", "exponent")
-    if found["static"].value - found["kinetic"].value <= found["static"].interval[1] - found["static"].value:
+    static = estimates["static"]
+    if static.value - estimates["kinetic"].value <= static.interval[1] - static.value:
         word = f"friction does not fall with speed above {told(slowest, f'{samples.unit}/s')} more than its scatter"
         return [(unseen, f"{word}: slide slower to tell a static friction and a Stribeck speed")]
-    if slowest > found["speed"].value:
+    if slowest > estimates["speed"].value:
         word = f"the slowest sliding, {told(slowest, f'{samples.unit}/s')}, is above the Stribeck speed: slide slower"
         return [(unseen, word)]
     return []
@@ -109,7 +110,7 @@ def _uneven_columns(samples: Samples, logs: Array) -> Array:
 COULOMB = Family(
     "f = kinetic sign(v) + offset", "v",
     lambda samples, logs: _with_offset(samples, np.sign(samples.velocity)),
-    _parameters("kinetic"), _named("kinetic", "offset"), lambda found: Coulomb(found["kinetic"]),
+    _parameters("kinetic"), _named("kinetic", "offset"), lambda values: Coulomb(values["kinetic"]),
 )  # fmt: skip
 VISCOUS = Family(
     "f = kinetic sign(v) + viscous v + offset",
@@ -117,7 +118,7 @@ VISCOUS = Family(
     lambda samples, logs: _with_offset(samples, np.sign(samples.velocity), samples.velocity),
     _parameters("kinetic", "viscous"),
     _named("kinetic", "viscous", "offset"),
-    lambda found: LinearSlope(found["kinetic"], slope=found["viscous"]),
+    lambda values: LinearSlope(values["kinetic"], slope=values["viscous"]),
 )
 DRY_STRIBECK = Family(
     "f = (kinetic + (static - kinetic) exp(-(|v|/speed)^exponent)) sign(v) + offset", "v",
@@ -133,7 +134,7 @@ STRIBECK = Family(
 UNEVEN = Family(
     "f = kinetic_forward + viscous_forward v where v > 0, -kinetic_back + viscous_back v where v < 0", "v",
     _uneven_columns, _parameters("kinetic_forward", "viscous_forward", "kinetic_back", "viscous_back"),
-    _named("kinetic_forward", "viscous_forward", "kinetic_back", "viscous_back"), lambda found: None,
+    _named("kinetic_forward", "viscous_forward", "kinetic_back", "viscous_back"), lambda values: None,
 )  # fmt: skip
 
 
@@ -147,8 +148,8 @@ def table(samples: Samples, points: int) -> Family:
         hats = np.stack([np.interp(np.abs(some.velocity), nodes, row) for row in np.eye(points)], axis=1)
         return _with_offset(some, *(np.sign(some.velocity)[:, None] * hats).T)
 
-    def law(found: dict[str, float]) -> Tabulated:
-        return Tabulated([0.0, *nodes], [found[names[0]], *(found[name] for name in names)])
+    def law(values: dict[str, float]) -> Tabulated:
+        return Tabulated([0.0, *nodes], [values[names[0]], *(values[name] for name in names)])
 
     places = ", ".join(f"{node:.3g}" for node in nodes)
     return Family(
@@ -168,9 +169,9 @@ def _monotone(columns: Array, friction: Array, points: int) -> Array:
         steps[:points, 1:points] *= side
         lowest = np.where((np.arange(len(steps)) >= 1) & (np.arange(len(steps)) < points), 0.0, -np.inf)
         gram = np.asarray(np.linalg.qr(np.column_stack([columns @ steps, friction]), mode="r"))
-        found = lsq_linear(gram[:, :-1], gram[:, -1], bounds=(lowest, np.inf))
-        if found.cost < least:
-            best, least = steps @ found.x, float(found.cost)
+        solution = lsq_linear(gram[:, :-1], gram[:, -1], bounds=(lowest, np.inf))
+        if solution.cost < least:
+            best, least = steps @ solution.x, float(solution.cost)
     return best
 
 
@@ -235,8 +236,8 @@ def velocity_step(samples: Samples, *, law: str, normal: float) -> Family:
             "stiffness": c[0] * shape[2], "trend": c[2] / normal,
         }  # fmt: skip
 
-    def made(found: dict[str, float]) -> RateState:
-        values = {name: found[name] for name in ("friction", "direct", "evolution", "distance")}
+    def made(parameters: dict[str, float]) -> RateState:
+        values = {name: parameters[name] for name in ("friction", "direct", "evolution", "distance")}
         return RateState(normal, reference=before, law=law, **values)
 
     def starts(some: Samples) -> tuple[Array, Array, Array, Array]:
@@ -267,10 +268,10 @@ def step_of(samples: Samples) -> tuple[float, float, float]:
         grid = np.linspace(low, high, 25)
         for corner in grid:
             lines = np.column_stack([np.ones(len(x)), time, np.maximum(time - corner, 0)])
-            found = np.linalg.lstsq(lines, x, rcond=None)[0]
-            left = x - lines @ found
+            slope = np.linalg.lstsq(lines, x, rcond=None)[0]
+            left = x - lines @ slope
             if float(left @ left) < least:
-                best, least = (float(corner), float(found[1]), float(found[1] + found[2])), float(left @ left)
+                best, least = (float(corner), float(slope[1]), float(slope[1] + slope[2])), float(left @ left)
         width = 1.5 * (grid[1] - grid[0])
         low, high = max(best[0] - width, 0.0), min(best[0] + width, time[-1])
     corner, before, after = best
@@ -347,8 +348,8 @@ def _half_stroke(samples: Samples) -> float:
 def _beware_of_span(*, span: Callable[[dict[str, Estimate]], float]) -> Beware:
     """The friction where the motion is too short to slide, the stiffness where it is too coarse to give way."""
 
-    def beware(found: dict[str, Estimate], samples: Samples) -> list[tuple[tuple[str, ...], str]]:
-        length, half, unit = span(found), _half_stroke(samples), samples.unit
+    def beware(estimates: dict[str, Estimate], samples: Samples) -> list[tuple[tuple[str, ...], str]]:
+        length, half, unit = span(estimates), _half_stroke(samples), samples.unit
         step = float(np.median(np.abs(np.diff(samples.displacement))))
         if length > SLIDES * half:
             word = f"friction still rises {told(half, unit)} from the middle: larger strokes tell where it slides"
@@ -366,15 +367,15 @@ def _beware_of_span(*, span: Callable[[dict[str, Estimate]], float]) -> Beware:
 DAHL = Family(
     "df/dx = stiffness (1 - f/kinetic sign(v))^exponent, and offset", "x", _of_dahl,
     lambda c, shape: {"kinetic": c[0], "stiffness": c[0] / shape[0], "offset": c[1], "exponent": shape[1]}, UNITS,
-    lambda found: Dahl(found["kinetic"], stiffness=found["stiffness"], exponent=found["exponent"]),
+    lambda values: Dahl(values["kinetic"], stiffness=values["stiffness"], exponent=values["exponent"]),
     lambda samples: (*_lengths(samples), np.log(POWERS)),
-    _beware_of_span(span=lambda found: DAHL_LENGTHS * found["kinetic"].value / found["stiffness"].value),
+    _beware_of_span(span=lambda estimates: DAHL_LENGTHS * estimates["kinetic"].value / estimates["stiffness"].value),
 )  # fmt: skip
 JENKINS = Family(
     "df/dx = stiffness up to |f| = kinetic, and offset", "x", _of_jenkins,
     lambda c, shape: {"kinetic": c[0] * shape[0], "stiffness": c[0], "offset": c[1]}, UNITS,
-    lambda found: ElastoSlip([found["stiffness"]], [found["kinetic"]]), _lengths,
-    _beware_of_span(span=lambda found: found["kinetic"].value / found["stiffness"].value),
+    lambda values: ElastoSlip([values["stiffness"]], [values["kinetic"]]), _lengths,
+    _beware_of_span(span=lambda estimates: estimates["kinetic"].value / estimates["stiffness"].value),
 )  # fmt: skip
 
 
@@ -389,8 +390,8 @@ def iwan(elements: int) -> Family:
     return Family(
         f"Iwan's {elements} classes that yield evenly up to width, together of stiffness, and offset", "x", columns,
         lambda c, shape: {"kinetic": c[0] * shape[0] / 2, "stiffness": c[0], "width": shape[0], "offset": c[1]}, UNITS,
-        lambda found: ElastoSlip.iwan(found["stiffness"], width=found["width"], elements=elements), _lengths,
-        _beware_of_span(span=lambda found: found["width"].value),
+        lambda values: ElastoSlip.iwan(values["stiffness"], width=values["width"], elements=elements), _lengths,
+        _beware_of_span(span=lambda estimates: estimates["width"].value),
     )  # fmt: skip
 
 
@@ -412,15 +413,15 @@ def maxwell_slip(samples: Samples, elements: int) -> Family:
         return np.column_stack([deflections(some.displacement, yields), np.ones(len(some.displacement))])
 
     def parameters(c: Array, shape: Array) -> dict[str, float]:
-        each = {f"stiffness_{number}": value for number, value in enumerate(c[:-1], start=1)}
-        return {"kinetic": float(c[:-1] @ yields), "stiffness": float(c[:-1].sum()), **each, "offset": c[-1]}
+        parameters = {f"stiffness_{number}": value for number, value in enumerate(c[:-1], start=1)}
+        return {"kinetic": float(c[:-1] @ yields), "stiffness": float(c[:-1].sum()), **parameters, "offset": c[-1]}
 
-    def law(found: dict[str, float]) -> ElastoSlip:
-        stiff = np.array([found[f"stiffness_{number}"] for number in range(1, len(yields) + 1)])
+    def law(values: dict[str, float]) -> ElastoSlip:
+        stiff = np.array([values[f"stiffness_{number}"] for number in range(1, len(yields) + 1)])
         return ElastoSlip(stiff.tolist(), (stiff * yields).tolist())
 
-    places = ", ".join(f"{each:.3g}" for each in yields)
+    places = ", ".join(f"{length:.3g}" for length in yields)
     units = UNITS | {f"stiffness_{number}": "N/m" for number in range(1, len(yields) + 1)}
     formula = f"elements of stiffness_1 ... stiffness_{len(yields)} that slip at deflections of {places} m, and offset"
-    beware = _beware_of_span(span=lambda found: float(yields[-1]))
+    beware = _beware_of_span(span=lambda values: float(yields[-1]))
     return Family(formula, "x", columns, parameters, units, law, beware=beware)

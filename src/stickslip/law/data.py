@@ -138,8 +138,8 @@ def samples_of(
     A coefficient of friction is turned into a force where the load `normal` [N] is known.
     """
     if isinstance(data, Loops):
-        asked = {"contact": contact, "frequency": frequency, "normal": normal}
-        if given := [f"{name}=" for name, value in asked.items() if value is not None]:
+        query = {"contact": contact, "frequency": frequency, "normal": normal}
+        if given := [f"{name}=" for name, value in query.items() if value is not None]:
             raise EstimateError(
                 f"{' and '.join(given)} of friction_loops' answer",
                 "its mean cycle holds a force over a known motion",
@@ -150,6 +150,13 @@ def samples_of(
         raise EstimateError(
             f"a curve of {type(data).__name__}", "it is fitted to a Record or to friction_loops of one", "give either"
         )
+    return _of_record(data, contact, frequency, smoothed, normal)
+
+
+def _of_record(
+    data: Record, contact: str | None, frequency: float | str | None, smoothed: bool, normal: float | None
+) -> tuple[Samples, Samples]:
+    """The friction over the motion of the contact, cycle by cycle where it has any."""
     question = "the fit of a friction curve"
     rubs = "coefficient" if "coefficient" in data and "friction" not in data else "friction"
     data.require_clean(rubs, question=question, samples=LEAST)

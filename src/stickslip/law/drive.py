@@ -181,10 +181,10 @@ def _tones(values: Array, time: Array, noise: float) -> tuple[tuple[float, float
         best = minimize_scalar(
             left, bounds=(coarse - 0.5 / span, coarse + 0.5 / span), method="bounded", options={"xatol": 1e-9 * coarse}
         )
-        found, rest = _fitted(values, time, float(best.x), count)
-        cosines, sines = found[1:-1:2], found[2:-1:2]
+        solution, rest = _fitted(values, time, float(best.x), count)
+        cosines, sines = solution[1:-1:2], solution[2:-1:2]
         sizes, angles = np.hypot(cosines, sines), np.arctan2(-sines, cosines)
-        if rest <= allowed and abs(found[-1]) <= DRIFT * sizes[0]:
+        if rest <= allowed and abs(solution[-1]) <= DRIFT * sizes[0]:
             return tuple(
                 (float(a), (j + 1) * float(best.x), float(p))
                 for j, (a, p) in enumerate(zip(sizes, angles, strict=True))
@@ -197,8 +197,8 @@ def _fitted(values: Array, time: Array, frequency: float, count: int) -> tuple[A
     columns = np.ones((len(time), 2 * count + 2))
     columns[:, 1:-1:2], columns[:, 2:-1:2] = waves.real, waves.imag
     columns[:, -1] = np.linspace(-0.5, 0.5, len(time))
-    found = np.linalg.solve(columns.T @ columns, columns.T @ values)
-    return np.asarray(found), float(np.sqrt(np.mean((values - columns @ found) ** 2)))
+    solution = np.linalg.solve(columns.T @ columns, columns.T @ values)
+    return np.asarray(solution), float(np.sqrt(np.mean((values - columns @ solution) ** 2)))
 
 
 @dataclass(frozen=True, eq=False)

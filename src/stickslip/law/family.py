@@ -73,7 +73,7 @@ class Family:
     units: Mapping[str, str]
     law: Callable[[dict[str, float]], Law | CurvedLaw | None]
     starts: Callable[[Samples], Sequence[Array]] = lambda samples: ()
-    beware: Callable[[dict[str, Estimate], Samples], list[tuple[tuple[str, ...], str]]] = lambda found, samples: []
+    beware: Callable[[dict[str, Estimate], Samples], list[tuple[tuple[str, ...], str]]] = lambda estimates, samples: []
     instead: Family | None = None
     positive: tuple[str, ...] = ()
     fitted: Callable[[Array, Array], Array] | None = None
@@ -121,11 +121,11 @@ def _least_squares(family: Family, samples: Samples) -> Member:
     count = columns.shape[1]
     coefficients = _coefficients(family, columns, friction)
     if len(logs):
-        found = minimise(
+        minimum = minimise(
             lambda raw: family.columns(samples, raw[count:])[skip:] @ raw[:count], friction,
             np.concatenate([coefficients, logs]), settled_at=SETTLED, most=MOST,
         )  # fmt: skip
-        raw, jacobian, residual = found.parameters, found.jacobian, found.residual
+        raw, jacobian, residual = minimum.parameters, minimum.jacobian, minimum.residual
     else:
         raw, jacobian, residual = coefficients, columns, friction - columns @ coefficients
 
@@ -227,9 +227,9 @@ def scatter(influence: Array, alone: Array, residual: Array, samples: Samples) -
     shrinkage = np.sqrt(independent / left)
     sd, freedom = np.empty(terms), np.empty(terms)
     for index in range(terms):
-        told = [_of_parts(influence[:, index], group) for group in (parts, samples.block)]
-        told = [(each * shrinkage, q) for each, q in told] + [(alone[index] * np.sqrt(len(residual) / left), left)]
-        sd[index], freedom[index] = max(told, key=lambda each: student(each[1]) * each[0])
+        pairs = [_of_parts(influence[:, index], group) for group in (parts, samples.block)]
+        pairs = [(pair * shrinkage, q) for pair, q in pairs] + [(alone[index] * np.sqrt(len(residual) / left), left)]
+        sd[index], freedom[index] = max(pairs, key=lambda pair: student(pair[1]) * pair[0])
     return sd, freedom
 
 

@@ -207,40 +207,40 @@ def fit_curve(
 
 
 def _over_speed(family: Family) -> Callable[[Request], tuple[Family, Samples]]:
-    def chosen(asked: Request) -> tuple[Family, Samples]:
-        require_speeds(asked.sliding, asked.curve)
-        return family, asked.sliding
+    def chosen(request: Request) -> tuple[Family, Samples]:
+        require_speeds(request.sliding, request.curve)
+        return family, request.sliding
 
     return chosen
 
 
-def _uneven(asked: Request) -> tuple[Family, Samples]:
-    require_reversals(asked.sliding, asked.curve)
-    return _over_speed(curves.UNEVEN)(asked)
+def _uneven(request: Request) -> tuple[Family, Samples]:
+    require_reversals(request.sliding, request.curve)
+    return _over_speed(curves.UNEVEN)(request)
 
 
-def _table(asked: Request) -> tuple[Family, Samples]:
-    return _over_speed(curves.table(asked.sliding, asked.elements))(asked)
+def _table(request: Request) -> tuple[Family, Samples]:
+    return _over_speed(curves.table(request.sliding, request.elements))(request)
 
 
 def _over_way(family: Callable[[Samples, int], Family]) -> Callable[[Request], tuple[Family, Samples]]:
-    def chosen(asked: Request) -> tuple[Family, Samples]:
-        require_reversals(asked.whole, asked.curve)
-        require_resisting(asked.whole)
-        return family(asked.whole, asked.elements), asked.whole
+    def chosen(request: Request) -> tuple[Family, Samples]:
+        require_reversals(request.whole, request.curve)
+        require_resisting(request.whole)
+        return family(request.whole, request.elements), request.whole
 
     return chosen
 
 
 def _step(law: str) -> Callable[[Request], tuple[Family, Samples]]:
-    def chosen(asked: Request) -> tuple[Family, Samples]:
-        return curves.velocity_step(asked.whole, law=law, normal=asked.normal), asked.whole
+    def chosen(request: Request) -> tuple[Family, Samples]:
+        return curves.velocity_step(request.whole, law=law, normal=request.normal), request.whole
 
     return chosen
 
 
 CURVES: dict[str, Callable[[Request], tuple[Family, Samples]]] = {
-    "coulomb": lambda asked: (curves.COULOMB, asked.sliding),
+    "coulomb": lambda request: (curves.COULOMB, request.sliding),
     "viscous": _over_speed(curves.VISCOUS),
     "stribeck": _over_speed(curves.STRIBECK),
     "asymmetric": _uneven,
@@ -268,26 +268,26 @@ def _answer(curve: str, family: Family, member: Member, *, filled: float) -> Cur
     missed = model_error(left, samples) / float(np.sqrt(np.mean(samples.friction**2)))
     method = f"least squares of '{curve}'"
     checks = (f"{len(left)} samples in {samples.cycles} cycles",)
-    found = {
+    parameters = {
         name: _estimate(name, value, sd, freedom, samples.in_units(family.units[name]), method, checks)
         for (name, value), sd, freedom in zip(member.values.items(), member.sd, member.freedom, strict=True)
     }
     worries = _worries(member, samples, family.along, missed)
-    for name, each in found.items():
-        if not all(map(math.isfinite, each.interval)):
-            found[name] = replace(each, status="the record tells nothing of it")
+    for name, estimate in parameters.items():
+        if not all(map(math.isfinite, estimate.interval)):
+            parameters[name] = replace(estimate, status="the record tells nothing of it")
     if missed > MISSES:
-        found = {name: replace(each, status=NOT_FOLLOWED) for name, each in found.items()}
+        parameters = {name: replace(estimate, status=NOT_FOLLOWED) for name, estimate in parameters.items()}
     if TOO_NOISY in worries:
-        found = {name: replace(each, status=TOO_NOISY) if each.status == "ok" else each for name, each in found.items()}
+        parameters = {name: estimate.doubted(TOO_NOISY) for name, estimate in parameters.items()}
     if filled > FILLED:
         worries.append(f"{filled:.0%} of the samples were not measured, but filled in between others")
-    for names, word in family.beware(found, samples):
+    for names, word in family.beware(parameters, samples):
         worries.append(word)
-        found |= {name: replace(found[name], status=word) for name in names}
+        parameters |= {name: replace(parameters[name], status=word) for name in names}
     if family.along != "t" and not samples.reverses:
-        forces = [name for name, unit in family.units.items() if unit == "N" and name in found]
-        found |= {name: replace(found[name], status=ONE_WAY) for name in forces if found[name].status == "ok"}
+        forces = [name for name, unit in family.units.items() if unit == "N" and name in parameters]
+        parameters |= {name: parameters[name].doubted(ONE_WAY) for name in forces}
     try:
         law = family.law(member.values)
     except ModelError as refused:
@@ -295,7 +295,7 @@ def _answer(curve: str, family: Family, member: Member, *, filled: float) -> Cur
         rounded = re.sub(r"\d+\.\d{6,}", lambda number: f"{float(number[0]):.6g}", refused.value)
         worries.append(f"no law has these values: {rounded}")
     return CurveFit(
-        curve=curve, parameters=found, law=law, formula=family.formula, unit=samples.force,
+        curve=curve, parameters=parameters, law=law, formula=family.formula, unit=samples.force,
         residual=float(np.sqrt(np.mean(left**2))),
         unexplained=float(np.linalg.norm(left) / np.linalg.norm(samples.friction)), model_error=missed,
         correlations=member.correlations, along=family.along,
@@ -307,8 +307,8 @@ def _answer(curve: str, family: Family, member: Member, *, filled: float) -> Cur
 def _estimate(
     name: str, value: float, sd: float, freedom: float, unit: str, method: str, checks: tuple[str, ...]
 ) -> Estimate:
-    words = NAMES.get(name, name.replace("_", " "))
-    made = Estimate.normal(words, value, sd=sd, unit=unit, method=method, quantile=student(freedom), checks=checks)
+    label = NAMES.get(name, name.replace("_", " "))
+    made = Estimate.normal(label, value, sd=sd, unit=unit, method=method, quantile=student(freedom), checks=checks)
     if name not in POSITIVE:
         return made
     log_half = (made.interval[1] - value) / value
@@ -318,29 +318,31 @@ def _estimate(
 
 def _worries(member: Member, samples: Samples, along: str, missed: float) -> list[str]:
     """What the samples can not bear."""
-    names, words = list(member.values), []
+    names, worries = list(member.values), []
     cyclic = along != "t"
     if cyclic and samples.cycles < len(names):
         many = f"{samples.cycles} cycle{'s' * (samples.cycles > 1)}"
-        words.append(f"{many} for {len(names)} parameters: give more of them")
+        worries.append(f"{many} for {len(names)} parameters: give more of them")
     if samples.noise > float(np.sqrt(np.mean(member.fitted**2))):
-        words.append(TOO_NOISY)
+        worries.append(TOO_NOISY)
     if cyclic and not samples.reverses:
-        words.append(f"{ONE_WAY}; let it reverse")
+        worries.append(f"{ONE_WAY}; let it reverse")
     if along == "v" and samples.speed_spread < LEAST_SPREAD:
-        words.append("one speed alone: whether friction changes with speed is not told; let the speed vary")
+        worries.append("one speed alone: whether friction changes with speed is not told; let the speed vary")
     if cyclic and samples.drives:
-        words.append("friction drives the motion: the sign of the force or of the displacement is wrong")
+        worries.append("friction drives the motion: the sign of the force or of the displacement is wrong")
     left = float(np.linalg.norm(samples.friction - member.fitted) / np.linalg.norm(samples.friction))
     if missed > MISSES:
-        words.append(
+        worries.append(
             f"the friction does not follow the curve: {missed:.0%} of it is neither in the curve nor noise; "
             "another curve may leave less, or another mass"
         )
     elif left > LEAVES:
-        words.append(f"the curve leaves {100 * left:.0f} % of the friction: another one, or less noise, may leave less")
+        worries.append(
+            f"the curve leaves {100 * left:.0f} % of the friction: another one, or less noise, may leave less"
+        )
     for i, j in zip(*np.nonzero(np.triu(np.abs(member.correlations), 1) > TIED), strict=True):
-        words.append(
+        worries.append(
             f"{names[i]} and {names[j]} can only be told together (correlation {member.correlations[i, j]:.3f})"
         )
-    return words
+    return worries

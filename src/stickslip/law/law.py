@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from stickslip.errors import EstimateError, ModelError
 from stickslip.estimate import Estimate, Result, Status
-from stickslip.law.search import OF_SENSORS, Knob, Point, Problem, descend
+from stickslip.law.search import OF_SENSORS, SHARE, Knob, Point, Problem, Slopes, descend, rows_of, without_starts
 from stickslip.law.start import (
     Shown,
     best_start,
@@ -29,8 +29,7 @@ from stickslip.law.start import (
     usual_nuisance,
     value_of,
 )
-from stickslip.law.stretch import channels_of
-from stickslip.law.surety import Surety, surety
+from stickslip.law.stretch import Sensor, Stretch, channels_of
 from stickslip.laws.base import Law
 from stickslip.laws.curved import CurvedLaw
 from stickslip.oscillator import Oscillator
@@ -45,7 +44,13 @@ METHOD = "least squares of what the sensors read, the motion simulated"
 MISFIT = 1.2  # times its noise that a channel's residual may be
 STIFFEST = 1e-5  # of the stroke: what a contact gives way at least
 UNEVEN = 0.1  # of its mean, that a surface strays
-WORK = 60.0  # calls of progress that a fit is taken for
+WORK = 24.0  # calls of progress after which most of a fit is taken to be done
+UNSURE = 0.25  # of a coordinate: a wider deviation is looked at by the likelihood itself
+REACH = (0.7, 1.6, 3.2, 7.0)  # steps of the coordinate that the look takes, to three decades away
+FAINT = 1e-12  # of the sharpest direction: below it a direction is not seen at all
+HALVINGS = 3
+CLEAR = 0.05  # of what chi squared may rise by: a step that lowers it by less decides no end
+CLOSE = 10  # passes of a descent that starts near its end, damper, spring and gains among what is turned
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,7 +140,7 @@ class LawFit(Result):
             "misfit": dict(self.misfit),
             "status": self.status,
             "checks": list(self.checks),
-            "estimates": [each.to_dict() for each in self.estimates],
+            "estimates": [estimate.to_dict() for estimate in self.estimates],
         }
 
 
@@ -219,18 +224,14 @@ def fit_law(
         raise EstimateError("no record", "a law is fitted to one record at least", "give one")
     if surface not in ("even", "rough"):
         raise ModelError(f"surface = '{surface}'", "a surface is 'even' or 'rough'", "choose one, or leave it out")
-    tell = _teller(progress)
+    tell = teller(progress, WORK)
     names = free_names(oscillator, free)
-    shown = [Shown.of(each, channels_of(each, channels), oscillator) for each in records]
+    shown = [Shown.of(one, channels_of(one, channels), oscillator) for one in records]
     if nuisance is None:
         nuisance = usual_nuisance(oscillator, names, shown) if names else ()
     require_apart(oscillator, names, nuisance, shown)
-    stretches = []
-    for number, each in enumerate(shown):
-        each.require_sliding()
-        rows = each.slides()
-        stretches.append(each.stretch(number, (int(rows[0]), len(each.record) - 1)))
-    fastest = max(each.fastest for each in shown)
+    stretches = [_sliding_stretch(motion, number) for number, motion in enumerate(shown)]
+    fastest = max(motion.fastest for motion in shown)
     oscillator, profile = better_start(oscillator, names, shown), None
     if names:
         dampers = [oscillator.damping, *([seen_damping(oscillator, shown).damping] if "damping" in nuisance else [])]
@@ -240,13 +241,26 @@ def fit_law(
         names = tuple(name for name in names if name != "kinetic")
     knobs = [bounded(knob(oscillator, name), oscillator, stretches, STIFFEST) for name in names]
     knobs += nuisance_knobs(oscillator, nuisance, stretches)
-    if profile:
-        knobs += [
-            Knob(f"profile {j}", "profile", value, 0.01, prior=UNEVEN / 0.01) for j, value in enumerate(profile.values)
-        ]
+    heights = enumerate(profile.values if profile else ())
+    knobs += [Knob(f"profile {j}", "profile", height, 0.01, prior=UNEVEN / 0.01) for j, height in heights]
     problem = Problem.of(oscillator, stretches, knobs, profile)
-    point = problem.begin(np.zeros(len(knobs)))
-    if profile:
+    point = _descended(problem, tell)
+    sure = surety(problem, point, tell) if intervals else None
+    if progress:
+        progress(1.0)
+    return answered(problem, point, sure, shown)
+
+
+def _sliding_stretch(motion: Shown, number: int) -> Stretch:
+    """A record from its first fast sliding to its end."""
+    motion.require_sliding()
+    return motion.stretch(number, (int(motion.slides()[0]), len(motion.record) - 1))
+
+
+def _descended(problem: Problem, tell: Callable[[], None]) -> Point:
+    """Where the search ends; that of a rough surface begins where one by a part of the readings ends."""
+    point = problem.begin(np.zeros(len(problem.knobs)))
+    if problem.profile:
         few = thinned_out(problem)
         first = descend(few, few.begin(point.u), tell=tell)
         states = zip(first.starts, point.starts, strict=True)
@@ -254,17 +268,14 @@ def fit_law(
     point = descend(problem, point, tell=tell)
     if not math.isfinite(point.chi2):
         raise EstimateError(
-            f"{oscillator.law!r} can not be simulated along this record",
+            f"{problem.oscillator.law!r} can not be simulated along this record",
             "the search starts from a motion that exists",
             "start from other values of the law",
         )
-    sure = surety(problem, point, tell) if intervals else None
-    if progress:
-        progress(1.0)
-    return answered(problem, point, sure, shown)
+    return point
 
 
-def _teller(progress: Callable[[float], object] | None) -> Callable[[], None]:
+def teller(progress: Callable[[float], object] | None, expected: float) -> Callable[[], None]:
     """Progress that comes nearer to its end with each call, as nobody knows how many there will be."""
     calls = 0
 
@@ -272,7 +283,7 @@ def _teller(progress: Callable[[float], object] | None) -> Callable[[], None]:
         nonlocal calls
         calls += 1
         if progress:
-            progress(1 - math.exp(-2.5 * calls / WORK))
+            progress(1 - math.exp(-calls / expected))
 
     return tell
 
@@ -310,46 +321,46 @@ def answered(problem: Problem, point: Point, sure: Surety | None, shown: Sequenc
             f"{worst} is left with {times:.3g} times its noise: the law is not the whole of it, or mass=, stiffness= "
             "or a unit is wrong"
         )
-    return LawFit(
-        replace(system, drive=problem.oscillator.drive), parameters, _between(problem, sure), noise, residual,
-        point.chi2, sum(counts.values()), len(problem.knobs), tuple(traces), "rough" if problem.profile else "even",
-        Status(*worries), checks,
-    )  # fmt: skip
+    system, surface = replace(system, drive=problem.oscillator.drive), "rough" if problem.profile else "even"
+    size, count, correlations = sum(counts.values()), len(problem.knobs), _between(problem, sure)
+    fit = LawFit(system, parameters, correlations, noise, residual, point.chi2, size, count, tuple(traces), surface)
+    return replace(fit, status=Status(*worries), checks=checks)
 
 
 def _between(problem: Problem, sure: Surety | None) -> Array:
     """Correlations of what is reported."""
-    told = [k for k, knob in enumerate(problem.knobs) if knob.kind != "profile"]
-    return sure.correlations[np.ix_(told, told)] if sure else np.eye(len(told))
+    kept = [k for k, knob in enumerate(problem.knobs) if knob.kind != "profile"]
+    return sure.correlations[np.ix_(kept, kept)] if sure else np.eye(len(kept))
 
 
 def _mean_friction(problem: Problem, point: Point, level: float) -> Estimate:
     """The mean of the profile; how sure, by how the profile varies along the surface."""
     values = level * np.array([k.value(u) for k, u in zip(problem.knobs, point.u, strict=True) if k.kind == "profile"])
     sd, freedom = mean_uncertainty(values[1:-1])
-    return Estimate.normal(
-        "sliding friction", float(values[1:-1].mean()), sd=sd, unit="N", quantile=student(freedom),
-        method="mean of the friction along the surface",
-        checks=(f"it varies by {100 * np.std(values[1:-1]) / values[1:-1].mean():.2g} % along the surface",),
-    )  # fmt: skip
+    mean, method = float(values[1:-1].mean()), "mean of the friction along the surface"
+    checks = (f"it varies by {100 * np.std(values[1:-1]) / values[1:-1].mean():.2g} % along the surface",)
+    quantile = student(freedom)
+    return Estimate.normal("sliding friction", mean, sd=sd, unit="N", quantile=quantile, method=method, checks=checks)
 
 
 def _parameters(problem: Problem, point: Point, sure: Surety | None, system: Oscillator) -> dict[str, Estimate]:
-    found = {}
-    for k, each in enumerate(problem.knobs):
-        if each.kind == "profile":
+    parameters = {}
+    for k, turned in enumerate(problem.knobs):
+        if turned.kind == "profile":
             continue
-        values = [_value(each, u, system) for u in ((point.u[k], *sure.ends[k]) if sure else (point.u[k],) * 3)]
-        unit = {"gain": "1", "delay": "s"}.get(each.kind) or unit_of(system, each.name)
-        sd = abs(_value(each, point.u[k] + 1e-6, system) - values[0]) / 1e-6 * float(sure.sd[k]) if sure else math.nan
+        values = [_value(turned, u, system) for u in ((point.u[k], *sure.ends[k]) if sure else (point.u[k],) * 3)]
+        unit = {"gain": "1", "delay": "s"}.get(turned.kind) or unit_of(system, turned.name)
+        sd = abs(_value(turned, point.u[k] + 1e-6, system) - values[0]) / 1e-6 * float(sure.sd[k]) if sure else math.nan
         interval = (values[1], values[2]) if sure else (math.nan, math.nan)
-        word = _words(each, system)
-        key = each.name if each.stretch is None else f"{each.name}.{each.stretch + 1}"
-        found[key] = Estimate(word, values[0], interval, sd, unit, METHOD, _told(each, word, values, unit, sure))
-    return found
+        word = _label_of(turned, system)
+        key = turned.name if turned.stretch is None else f"{turned.name}.{turned.stretch + 1}"
+        parameters[key] = Estimate(
+            word, values[0], interval, sd, unit, METHOD, _status_of(turned, word, values, unit, sure)
+        )
+    return parameters
 
 
-def _words(knob: Knob, system: Oscillator) -> str:
+def _label_of(knob: Knob, system: Oscillator) -> str:
     """What a parameter is called."""
     if knob.kind not in OF_SENSORS:
         return named(system, knob.name).name or knob.name
@@ -363,7 +374,7 @@ def _value(knob: Knob, u: float, system: Oscillator) -> float:
     return float(getattr(system.law, "kinetic", 1.0)) * (1 + value) if knob.kind == "above" else value
 
 
-def _told(knob: Knob, word: str, values: Sequence[float], unit: str, sure: Surety | None) -> str:
+def _status_of(knob: Knob, word: str, values: Sequence[float], unit: str, sure: Surety | None) -> str:
     """What the records can say of a parameter, in words."""
     if sure is None:
         return "not asked how sure"
@@ -375,3 +386,145 @@ def _told(knob: Knob, word: str, values: Sequence[float], unit: str, sure: Suret
     if math.isfinite(high):
         return f"{word} below {high:.2g} {unit} can not be told from none here"
     return f"{word} can not be told from these records"
+
+
+# ---- how sure a fit is
+
+
+@dataclass(frozen=True, eq=False)
+class Surety:
+    """Standard deviation, freedom and ends of each knob's coordinate, and the correlations between them."""
+
+    sd: Array
+    freedom: Array
+    ends: Array  # (p, 2)
+    correlations: Array
+
+
+def surety(problem: Problem, point: Point, tell: Callable[[], None]) -> Surety:
+    """Intervals that hold when residuals are correlated: the sandwich, summed over time as neighbours are alike.
+
+    On a rough surface neighbours are also those that pass the same place.
+
+    Each row's influence on the parameters is ``G^-1 A' r``, G = A'A, A the derivatives less what the starts take over;
+    the parameters vary as its sum does. A parameter that is hardly seen gets the ends of its likelihood instead.
+    """
+    size = len(problem.knobs)
+    slopes = problem.slopes(point) if size else None
+    if slopes is None:
+        wide = np.full(size, math.inf)
+        return Surety(wide, np.ones(size), np.column_stack([-wide, wide]), np.eye(size))
+    seen = sum((np.sum(s.shared**2, axis=0) for s in slopes), np.zeros(size)) > 0
+    sd, freedom, widths, correlations = np.full(size, math.inf), np.ones(size), np.ones(size), np.eye(size)
+    if seen.any():
+        few = [Slopes(s.shared[:, seen], s.own) for s in slopes]
+        covariance, sd[seen], freedom[seen] = _sandwich(problem, point, few)
+        widths[seen] = np.sqrt(np.diag(covariance))
+        correlations[np.ix_(seen, seen)] = covariance / np.outer(widths[seen], widths[seen])
+    quantile = np.array([student(max(1.0, f)) for f in freedom])
+    ends = point.u[:, None] + np.outer(quantile * sd, [-1.0, 1.0])
+    strays = float(np.median((sd[seen] / widths[seen]) ** 2)) if seen.any() else 1.0
+    excess = max(1.0, point.chi2 / sum(map(len, point.residuals)), strays)
+    # over static friction the likelihood is a stair, whose slopes tell nothing of its width
+    faint = [
+        k for k, knob in enumerate(problem.knobs) if knob.kind == "above" or (sd[k] > UNSURE and knob.kind == "log")
+    ]
+    if faint:
+        part = thinned_out(problem)
+        near = descend(part, part.at(point.u, part.own(point.starts)), passes=CLOSE, tell=tell)
+        allowed = 3.84 * excess * sum(map(len, near.residuals)) / sum(map(len, point.residuals))
+        for k in faint:
+            low, high = (_end(part, near, k, side, allowed, tell) for side in (-1.0, 1.0))
+            apart = float(point.u[k] - near.u[k])  # what thinning moved: the ends are to hold about either peak
+            ends[k] = max(problem.knobs[k].least, low + min(0.0, apart)), high + max(0.0, apart)
+    return Surety(sd, freedom, ends, correlations)
+
+
+def _sandwich(problem: Problem, point: Point, slopes: Sequence[Slopes]) -> tuple[Array, Array, Array]:
+    left = without_starts(slopes)
+    normal = sum((a.T @ a for a in left), np.zeros((left[0].shape[1],) * 2))
+    scale = np.sqrt(np.maximum(np.diag(normal), 1e-300))
+    values, vectors = np.linalg.eigh(normal / np.outer(scale, scale))
+    values = np.maximum(values, FAINT)
+    bread = (vectors / values) @ vectors.T / np.outer(scale, scale)
+    variance, square = np.zeros(len(scale)), np.zeros(len(scale))
+    places: dict[int, Array] = {}
+    for stretch, a, r in zip(problem.stretches, left, point.residuals, strict=True):
+        drive = a[sum(len(sensor.time) for sensor in stretch.sensors) :] @ bread
+        scores = _over_time(stretch.sensors, a * r[:, None]) @ bread
+        if problem.profile:
+            for place, total in _over_places(stretch.sensors, scores, problem.profile.length).items():
+                places[place] = places.get(place, np.zeros(len(scale))) + total
+        for k, series in enumerate(scores.T):
+            sd, worth = mean_uncertainty(len(series) * series)
+            variance[k] += sd**2 + float(drive[:, k] @ drive[:, k])
+            square[k] += sd**4 / worth
+    freedom = np.where(square > 0, variance**2 / np.maximum(square, 1e-300), 1.0)
+    if len(places) > 1:
+        again = np.sum(np.square(list(places.values())), axis=0) * len(places) / (len(places) - 1)
+        freedom = np.where(again > variance, np.minimum(freedom, len(places) - 1), freedom)
+        variance = np.maximum(variance, again)
+    return bread, np.sqrt(np.maximum(variance, 1e-300)), freedom
+
+
+def _over_time(sensors: Sequence[object], scores: Array) -> Array:
+    """The sum over the sensors of the rows of one instant."""
+    rows = rows_of(sensors)  # type: ignore[arg-type]
+    total = np.zeros((max(part.stop - part.start for part in rows), scores.shape[1]))
+    for part in rows:
+        total[: part.stop - part.start] += scores[part]
+    return total
+
+
+def _over_places(sensors: Sequence[Sensor], scores: Array, length: float) -> dict[int, Array]:
+    """The sum over all passes of each part of a surface, where what a profile leaves comes back each time."""
+    moved = next((sensor.readings for sensor in sensors if sensor.channel.name == "x"), None)
+    if moved is None:
+        return {}
+    size = min(len(moved), len(scores))
+    part = np.floor((moved[:size] - moved.mean()) / length).astype(int)
+    return {int(place): scores[:size][part == place].sum(axis=0) for place in np.unique(part)}
+
+
+def _end(problem: Problem, point: Point, k: int, side: float, allowed: float, tell: Callable[[], None]) -> float:
+    """Where the likelihood, the others fitted anew, leaves the 95 % interval; infinite where it does not."""
+    least, most = problem.knobs[k].least, problem.knobs[k].most
+
+    def holds(u: float) -> bool:
+        tell()
+        try:
+            fixed = _held(problem, k, u)
+        except ModelError:  # a kinetic friction above a static one that is held, where the releases tell it
+            return False
+        ceiling = point.chi2 + allowed
+        near = fixed.at(np.delete(point.u, k), point.starts)
+        if ceiling < near.chi2 < math.inf:
+            near = descend(fixed, near, passes=CLOSE, settled=CLEAR * allowed, share=2 * SHARE, enough=ceiling)
+        return near.chi2 <= ceiling
+
+    inside = float(point.u[k])
+    for reach in REACH:
+        outside = min(most, max(least, float(point.u[k]) + side * reach))
+        if not holds(outside):
+            break
+        inside = outside
+        if outside == least:
+            return least
+        if outside == most:
+            return math.inf
+    else:
+        return side * math.inf
+    for _ in range(HALVINGS):
+        middle = (inside + outside) / 2
+        inside, outside = (middle, outside) if holds(middle) else (inside, middle)
+    return (inside + outside) / 2
+
+
+def _held(problem: Problem, k: int, u: float) -> Problem:
+    """The problem with one knob held at a coordinate."""
+    every = np.zeros(len(problem.knobs))
+    every[k] = u
+    only: Sequence[Knob] = (problem.knobs[k],)
+    fixed = replace(problem, knobs=tuple(only))
+    others = tuple(knob for j, knob in enumerate(problem.knobs) if j != k)
+    return replace(problem, oscillator=fixed.system(np.array([u])), knobs=others)

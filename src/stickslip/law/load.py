@@ -149,10 +149,10 @@ def friction_over_load(levels: Sequence[Estimate], *, loads: Sequence[float | st
         ).within(0.0, otherwise=why)
         for row, (name, unit, why) in enumerate(named)
     )  # fmt: skip
-    each = tuple(
+    ratios = tuple(
         level.scaled(1 / float(load), "1", f"friction over load of {load:.3g} N")
         for level, load in zip(levels, weights, strict=True)
     )
     doubtful = [level.status for level in levels if level.status != "ok"]
     status = Status(*doubtful)
-    return LoadLine(coefficient, adhesion, each, weights, line, covariance, quantile, status)
+    return LoadLine(coefficient, adhesion, ratios, weights, line, covariance, quantile, status)

@@ -80,7 +80,7 @@ class FrictionMemory(Result):
     @property
     def estimates(self) -> tuple[Estimate, ...]:
         """The phases, and what each memory would be."""
-        return (*self.phases, *(each for each in (self.delay, self.time, self.give) if each is not None))
+        return (*self.phases, *(estimate for estimate in (self.delay, self.time, self.give) if estimate is not None))
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,15 +149,15 @@ def friction_memory(
     given = [records] if isinstance(records, Record) else list(records)
     if not given:
         raise EstimateError("no record", "a memory is told from one record or more", "give a record of each frequency")
-    loops = [_loop(samples_of(each, contact=contact, frequency=frequency)[0]) for each in given]
-    found = {kind: _fitted(kind, loops) for kind in FOLLOWS}
+    loops = [_loop(samples_of(record, contact=contact, frequency=frequency)[0]) for record in given]
+    fits = {kind: _fitted(kind, loops) for kind in FOLLOWS}
     rotation = _rotation(loops)
-    misfit = {kind: value for kind, (_, value) in found.items()}
+    misfit = {kind: value for kind, (_, value) in fits.items()}
     memory, reason = _verdict(loops, rotation, misfit)
     return FrictionMemory(
         memory=memory, rotation=rotation, reason=reason, phases=tuple(loop.phase for loop in loops),
-        frequencies=np.array([loop.frequency for loop in loops]), delay=found["time delay"][0],
-        time=found["state variable"][0], give=found["way"][0], misfit=misfit, status=_status(loops, memory),
+        frequencies=np.array([loop.frequency for loop in loops]), delay=fits["time delay"][0],
+        time=fits["state variable"][0], give=fits["way"][0], misfit=misfit, status=_status(loops, memory),
     )  # fmt: skip
 
 
@@ -182,11 +182,11 @@ def _loop(samples: Samples) -> _Loop:
     mean = velocity.mean(axis=0)
     # against the other cycles' motion, whose noise the friction of a cycle does not share
     others = (count * mean - velocity) / (count - 1) if count > 1 else velocity
-    each = np.array([_angle(v, f) for v, f in zip(others, friction, strict=True)])
+    phases = np.array([_angle(v, f) for v, f in zip(others, friction, strict=True)])
     middle = _angle(mean, friction.mean(axis=0))
     phase = mean_of_cycles(
         f"phase of friction behind velocity at {1 / length:.3g} Hz",
-        middle + np.angle(np.exp(1j * (each - middle))),
+        middle + np.angle(np.exp(1j * (phases - middle))),
         unit="rad",
         method="area of the loop, each cycle",
     )
@@ -244,7 +244,7 @@ FOLLOWS: dict[str, tuple[Callable[[float, _Loop], Array], str, str]] = {
 def _fitted(kind: str, loops: list[_Loop]) -> tuple[Estimate | None, float]:
     """The value of a memory that explains the phases best, and what it leaves of them over what they allow."""
     follows, name, unit = FOLLOWS[kind]
-    phases, sds = (np.array(each) for each in zip(*((loop.phase.value, _sd(loop)) for loop in loops), strict=True))
+    phases, sds = (np.array(column) for column in zip(*((loop.phase.value, _sd(loop)) for loop in loops), strict=True))
     if phases.mean() <= 0:
         return None, float(np.sqrt(np.sum((phases / sds) ** 2) / max(1, len(loops) - 1)))
     slowest = 1 / (2 * math.pi * min(loop.frequency for loop in loops))
@@ -257,12 +257,12 @@ def _fitted(kind: str, loops: list[_Loop]) -> tuple[Estimate | None, float]:
     grid = np.log(scale * np.geomspace(1e-5, 0.99, LAGS))
     start = min(grid, key=lambda log: float(np.sum((phases / sds - misfit(np.array([log]))) ** 2)))
     # one row of no weight more than parameters: a single record still has its value
-    found = minimise(
+    minimum = minimise(
         lambda logs: np.append(misfit(logs), 0.0), np.append(phases / sds, 0.0), [start], settled_at=1e-8, most=60
     )
-    left = float(np.sqrt(found.squares / max(1, len(loops) - 1)))
-    slope = float(np.linalg.norm(found.jacobian))
-    value, wide = math.exp(found.parameters[0]), min(FAR, NORMAL_95 * max(1.0, left) / max(slope, 1e-300))
+    left = float(np.sqrt(minimum.squares / max(1, len(loops) - 1)))
+    slope = float(np.linalg.norm(minimum.jacobian))
+    value, wide = math.exp(minimum.parameters[0]), min(FAR, NORMAL_95 * max(1.0, left) / max(slope, 1e-300))
     interval = (value * math.exp(-wide), value * math.exp(wide))
     return Estimate(
         name, value, interval, value * wide / NORMAL_95, unit, f"least squares of {len(loops)} phases"
@@ -282,28 +282,28 @@ def _rotation(loops: list[_Loop]) -> str:
 
 
 def _verdict(loops: list[_Loop], rotation: str, misfit: dict[str, float]) -> tuple[str, str]:
-    told = ", ".join(f"{loop.phase.value:.3f} rad at {loop.frequency:.3g} Hz" for loop in loops)
+    phases = ", ".join(f"{loop.phase.value:.3f} rad at {loop.frequency:.3g} Hz" for loop in loops)
     unsure = max(NORMAL_95 * _sd(loop) for loop in loops)
     if rotation == "none" and unsure > UNSURE:
-        return "undecided", f"the phases are told to {unsure:.2g} rad alone ({told}): give more cycles, or less noise"
+        return "undecided", f"the phases are told to {unsure:.2g} rad alone ({phases}): give more cycles, or less noise"
     if rotation == "none":
-        return "none", f"friction is in phase with the velocity ({told})"
+        return "none", f"friction is in phase with the velocity ({phases})"
     if rotation != "anticlockwise":
         return "undecided", (
-            f"friction goes ahead of the velocity ({told}): a falling curve that answers late is gone round clockwise, "
-            "and so is friction whose sensor is early"
+            f"friction goes ahead of the velocity ({phases}): a falling curve that answers late is gone round "
+            "clockwise, and so is friction whose sensor is early"
         )
     if len(loops) < 2 or _reach(loops) < FURTHEST:
         return (
             "undecided",
-            f"friction follows the velocity ({told}): a second frequency tells whether by a time or a way",
+            f"friction follows the velocity ({phases}): a second frequency tells whether by a time or a way",
         )
     left = {kind for kind, value in misfit.items() if _chance(value, len(loops) - 1) > REJECTED}
     leaves = ", ".join(f"{kind} {value:.2g}" for kind, value in misfit.items())
     if len(left) == 1:
-        return left.pop(), f"friction follows the velocity ({told}); misfits over what the phases allow: {leaves}"
+        return left.pop(), f"friction follows the velocity ({phases}); misfits over what the phases allow: {leaves}"
     why = "none of them explains" if not left else "each of " + ", ".join(sorted(left)) + " explains"
-    return "undecided", f"{why} how friction follows the velocity ({told}); misfits: {leaves}"
+    return "undecided", f"{why} how friction follows the velocity ({phases}); misfits: {leaves}"
 
 
 def _reach(loops: list[_Loop]) -> float:
@@ -319,14 +319,14 @@ def _chance(misfit: float, freedom: int) -> float:
 
 
 def _status(loops: list[_Loop], memory: str) -> str:
-    words = [loop.phase.status for loop in loops if loop.phase.status != "ok"][:1]
+    doubts = [loop.phase.status for loop in loops if loop.phase.status != "ok"][:1]
     for loop in loops:
         stuck = float(np.mean(np.abs(loop.way) < HALF))
         if stuck > STICKS:
-            words.append(
+            doubts.append(
                 f"at {loop.frequency:.3g} Hz the contact rests {stuck:.0%} of the time, in which no memory shows: "
                 "records in which it slides all the time tell more"
             )
     if memory == "undecided" and len(loops) > 1 and _reach(loops) >= FURTHEST:
-        words.append("give records of higher frequencies, where the memories part")
-    return Status(*words)
+        doubts.append("give records of higher frequencies, where the memories part")
+    return Status(*doubts)

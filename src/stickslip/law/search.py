@@ -196,9 +196,9 @@ class Problem:
             if run is None:
                 return Point(u, starts, (), (), (), (), math.inf)
             runs.append(run)
-            told = stretch.told(run, delays)
-            raw.append(tuple(values for values, _ in told))
-            pieces.append(tuple(piece for _, piece in told))
+            read = stretch.told(run, delays)
+            raw.append(tuple(values for values, _ in read))
+            pieces.append(tuple(piece for _, piece in read))
             left = [
                 sensor.freed(sensor.readings - gains.get(sensor.channel.name, 1.0) * values)
                 for sensor, values in zip(stretch.sensors, raw[-1], strict=True)
@@ -223,7 +223,7 @@ class Problem:
     def slopes(self, point: Point) -> list[Slopes] | None:
         """Derivatives by the knobs and by each stretch's own start; None where the engine refuses a neighbour."""
         moving = [k for k, knob in enumerate(self.knobs) if knob.kind not in OF_SENSORS]
-        system, found = self.system(point.u), []
+        system, tangents = self.system(point.u), []
         for j, stretch in enumerate(self.stretches):
             changed = self._changed(point, j, moving, system)
             if changed is None:
@@ -242,11 +242,11 @@ class Problem:
                         slope = raw if knob.kind == "gain" else -gain * _rate(raw, piece, sensor.time)
                         shared[part, k] = sensor.freed(knob.scale * slope)
             own[rows[-1].stop :, len(self.scales[j]) :] = np.diag(1 / np.array(stretch.drive.unsure))
-            found.append(Slopes(shared, own))
+            tangents.append(Slopes(shared, own))
         trust = self._trust()
-        shared, own = found[0]
-        found[0] = Slopes(np.vstack([shared, trust]), np.vstack([own, np.zeros((len(trust), own.shape[1]))]))
-        return found
+        shared, own = tangents[0]
+        tangents[0] = Slopes(np.vstack([shared, trust]), np.vstack([own, np.zeros((len(trust), own.shape[1]))]))
+        return tangents
 
     def _changed(self, point: Point, j: int, moving: Sequence[int], system: Oscillator) -> list[Array] | None:
         """Derivatives of what the sensors of stretch j would read: by the knobs that move the mass, and its start."""
@@ -262,7 +262,7 @@ class Problem:
             return self._differences(point, j, nearby, system)
         stretch, size = self.stretches[j], len(self.scales[j])
         off = point.starts[j][size:]
-        neighbours, scaled = [stretch.driven(each, off) for each in nearby], []
+        neighbours, scaled = [stretch.driven(neighbour, off) for neighbour in nearby], []
         if isinstance(stretch.drive, Sampled):
             scaled = [1 / (1 + float(share)) for share in off]
         else:
@@ -272,8 +272,8 @@ class Problem:
         motion = sensitivity(
             point.runs[j], neighbours, step=STEP, starts=starts, scaled=scaled, outputs=stretch.outputs
         )
-        order = [*range(len(nearby)), *range(len(nearby) + len(off), len(motion.flow)),
-                 *range(len(nearby), len(nearby) + len(off))]  # fmt: skip
+        begin, end = len(nearby), len(nearby) + len(off)
+        order = [*range(begin), *range(end, len(motion.flow)), *range(begin, end)]
         delays = self.sensor_knobs(point.u, "delay", j)
         return [sensor.changed(motion, delays.get(sensor.channel.name, 0.0))[:, order] for sensor in stretch.sensors]
 
@@ -282,18 +282,20 @@ class Problem:
     ) -> list[Array] | None:
         """As `_changed`, of a curved law: forward differences of its motion."""
         stretch, start, size = self.stretches[j], point.starts[j], len(self.scales[j])
-        beside = [(each, start) for each in nearby] + [(system, start + STEP * unit) for unit in np.eye(len(start))]
+        beside = [(neighbour, start) for neighbour in nearby] + [
+            (system, start + STEP * unit) for unit in np.eye(len(start))
+        ]
         delays, columns = self.sensor_knobs(point.u, "delay", j), []
         for moved, begun in beside:
             run = attempted(stretch, moved, self.start(j, begun), begun[size:])
             if run is None:
                 return None
-            told = stretch.told(run, delays)
+            read = stretch.told(run, delays)
             columns.append(
                 [
                     # a jump that has crossed a sample has no slope
                     (near - raw) / STEP * (1.0 if here is None or there is None else here == there)
-                    for (near, there), raw, here in zip(told, point.raw[j], point.pieces[j], strict=True)
+                    for (near, there), raw, here in zip(read, point.raw[j], point.pieces[j], strict=True)
                 ]
             )
         return [np.column_stack(parts) for parts in zip(*columns, strict=True)]
@@ -353,7 +355,7 @@ def secant(slopes: Sequence[Slopes], point: Point, tried: Point) -> tuple[list[S
 
     Where a jump has crossed a sample the change tells nothing of them.
     """
-    found, foretold, moved = [], point.chi2, tried.u - point.u
+    mended, foretold, moved = [], point.chi2, tried.u - point.u
     for j, (a, b) in enumerate(slopes):
         went = tried.starts[j] - point.starts[j]
         guessed = a @ moved + b @ went
@@ -366,8 +368,8 @@ def secant(slopes: Sequence[Slopes], point: Point, tried: Point) -> tuple[list[S
             row += len(values)
         weights = np.sum(a * a, axis=0) * moved, np.sum(b * b, axis=0) * went
         power = float(weights[0] @ moved + weights[1] @ went) or 1.0
-        found.append(Slopes(a + np.outer(wrong, weights[0] / power), b + np.outer(wrong, weights[1] / power)))
-    return found, foretold
+        mended.append(Slopes(a + np.outer(wrong, weights[0] / power), b + np.outer(wrong, weights[1] / power)))
+    return mended, foretold
 
 
 def _bounded(

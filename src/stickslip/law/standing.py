@@ -153,32 +153,32 @@ def standings(
 
     `likely` is how probable each rigid law is by the friction around rest.
     """
-    order = sorted(misfits, key=lambda each: evidence.criterion(each))
+    order = sorted(misfits, key=lambda law: evidence.criterion(law))
     limits = _limits(order, evidence)
-    order.sort(key=lambda each: each.name in limits)
-    inner = _within([each for each in order if each.family == order[0].family], evidence, likely)
-    best = next(each for each in order if inner.get(each.name) == 1.0)
-    order.sort(key=lambda each: each is not best)
-    others = _odds([each for each in order if each.name not in limits], best, evidence)
+    order.sort(key=lambda law: law.name in limits)
+    inner = _within([law for law in order if law.family == order[0].family], evidence, likely)
+    best = next(law for law in order if inner.get(law.name) == 1.0)
+    order.sort(key=lambda law: law is not best)
+    others = _odds([law for law in order if law.name not in limits], best, evidence)
     odds = {**dict.fromkeys(limits, 0.0), **others, **inner}
-    least = {key: min(each.squares[key] for each in order) for key in evidence.noise}
-    ratios = {each.name: evidence.over(each.squares, least) for each in order}
-    worse = {each.name: evidence.criterion(each) - evidence.criterion(best) for each in order}
+    least = {key: min(law.squares[key] for law in order) for key in evidence.noise}
+    ratios = {law.name: evidence.over(law.squares, least) for law in order}
+    worse = {law.name: evidence.criterion(law) - evidence.criterion(best) for law in order}
     alone = sum(value > UNLIKELY for value in inner.values()) == 1
 
-    def words(law: Misfit) -> str:
+    def verdict(law: Misfit) -> str:
         if law.name in limits:
             return "so stiff that it is a rigid contact, and explains nothing more"
         if odds[law.name] <= UNLIKELY:
             return f"rejected: {_why(law, best, ratios, worse[law.name])}"
         return "best" if law is best and alone else "not rejected"
 
-    told = [
-        Standing(each.name, each.family, ratios[each.name], worse[each.name], odds[each.name],
-                 odds[each.name] > UNLIKELY, words(each), each.name in limits)
-        for each in order
-    ]  # fmt: skip
-    return told, _confidence(inner, others)
+    def standing(law: Misfit) -> Standing:
+        name, chance = law.name, odds[law.name]
+        kept, limit = chance > UNLIKELY, law.name in limits
+        return Standing(name, law.family, ratios[name], worse[name], chance, kept, verdict(law), limit)
+
+    return [standing(law) for law in order], _confidence(inner, others)
 
 
 def _confidence(inner: Mapping[str, float], others: Mapping[str, float]) -> float:
@@ -203,21 +203,21 @@ def seen_above(odds: float) -> float:
 
 def _odds(order: Sequence[Misfit], best: Misfit, evidence: Evidence) -> dict[str, float]:
     """Of the laws of other families against the best law's family, by the criterion."""
-    worth = {each.name: evidence.criterion(each) for each in order}
-    least = min(worth[each.name] for each in order if each.family == best.family)
-    found = {}
-    for each in order:
-        if each.family != best.family:
-            worse = max(0.0, worth[each.name] - least - (evidence.allowance if each.family == "rigid" else 0.0))
-            found[each.name] = math.exp(-worse / BLUNT)
-    return found
+    worth = {law.name: evidence.criterion(law) for law in order}
+    least = min(worth[law.name] for law in order if law.family == best.family)
+    odds = {}
+    for law in order:
+        if law.family != best.family:
+            worse = max(0.0, worth[law.name] - least - (evidence.allowance if law.family == "rigid" else 0.0))
+            odds[law.name] = math.exp(-worse / BLUNT)
+    return odds
 
 
 def _limits(order: Sequence[Misfit], evidence: Evidence) -> set[str]:
     """Laws whose contact is next to rigid, where a rigid law leaves as little: what they say is said by that."""
-    worth = {each.name: evidence.criterion(each) for each in order}
-    rigid = min((worth[each.name] for each in order if each.family == "rigid"), default=math.inf)
-    return {each.name for each in order if each.stiff and rigid - worth[each.name] <= evidence.allowance}
+    worth = {law.name: evidence.criterion(law) for law in order}
+    rigid = min((worth[law.name] for law in order if law.family == "rigid"), default=math.inf)
+    return {law.name for law in order if law.stiff and rigid - worth[law.name] <= evidence.allowance}
 
 
 def _why(law: Misfit, best: Misfit, ratios: Mapping[str, float], worse: float) -> str:
@@ -239,15 +239,16 @@ def _within(family: Sequence[Misfit], evidence: Evidence, likely: Mapping[str, f
 
     How likely each is by what else was seen; its misfit counts where it is larger than a rough surface makes it.
     """
-    worse = {each.name: evidence.criterion(each) for each in family}
+    worse = {law.name: evidence.criterion(law) for law in family}
     beyond = min(worse.values()) + evidence.allowance
     worth = {
-        name: (likely or {}).get(name, 1.0) * math.exp(-max(0.0, each - beyond) / BLUNT) for name, each in worse.items()
+        name: (likely or {}).get(name, 1.0) * math.exp(-max(0.0, value - beyond) / BLUNT)
+        for name, value in worse.items()
     }
     most = max(worth.values()) or 1.0
     return {name: worth[name] / most for name in sorted(worth, key=lambda name: -worth[name])}
 
 
-def undescribed(told: Sequence[Standing]) -> list[Standing]:
+def undescribed(ranking: Sequence[Standing]) -> list[Standing]:
     """The laws where even the best one does not describe the records: none of them is rejected by such a misfit."""
-    return [replace(each, kept=True, verdict=f"misfit {times(each.misfit)}") for each in told]
+    return [replace(standing, kept=True, verdict=f"misfit {times(standing.misfit)}") for standing in ranking]

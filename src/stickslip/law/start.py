@@ -138,13 +138,13 @@ class Shown:
         """Standard deviation of a channel's noise, as stated or as found, its counts' included."""
         stated, values = self.record.channels[name].noise, self.record[name]
         counts = quantisation_step(values) / math.sqrt(12)
-        found = noise_level(values, self.record.fs) if stated is None else math.hypot(stated, counts)
-        return max(found, counts, FINEST * float(np.ptp(values)), 1e-300)
+        level = noise_level(values, self.record.fs) if stated is None else math.hypot(stated, counts)
+        return max(level, counts, FINEST * float(np.ptp(values)), 1e-300)
 
 
 def too_few(shown: Sequence[Shown], count: int) -> str:
     """What to say where a law has more parameters than the records have strokes; nothing where it has not."""
-    strokes = sum(len(each.turns) + 1 for each in shown)
+    strokes = sum(len(motion.turns) + 1 for motion in shown)
     if strokes >= count:
         return ""
     many = f"{strokes} stroke{'s' * (strokes > 1)} from one reversal to the next"
@@ -188,19 +188,19 @@ def _balance(record: Record, velocity: Array, oscillator: Oscillator) -> Array:
 def seen_damping(oscillator: Oscillator, shown: Sequence[Shown]) -> Oscillator:
     """With the damper that the balance of forces shows in fast sliding, beside a friction of one level."""
     columns, values = [], []
-    for number, each in enumerate(shown):
-        record, rows = as_driven(each.record, oscillator.drive), each.slides()
-        left, measured = _balance(record, each.velocity, oscillator)[rows], _friction_of(record)
-        stretched = each.velocity[rows]
+    for number, motion in enumerate(shown):
+        record, rows = as_driven(motion.record, oscillator.drive), motion.slides()
+        left, measured = _balance(record, motion.velocity, oscillator)[rows], _friction_of(record)
+        stretched = motion.velocity[rows]
         if oscillator.damper == "base" and "z" in record:
             stretched = stretched - np.gradient(record["z"])[rows] * record.fs
-        level = np.sign(each.velocity[rows]) if measured is None else np.zeros(len(rows))
+        level = np.sign(motion.velocity[rows]) if measured is None else np.zeros(len(rows))
         offsets = np.zeros((len(rows), len(shown)))
         offsets[:, number] = 1.0
         columns.append(np.column_stack([stretched, level, offsets]))
         values.append(left if measured is None else left - measured[rows])
-    found = np.linalg.lstsq(np.vstack(columns), np.concatenate(values), rcond=None)[0]
-    return oscillator.having(damping=max(0.0, float(found[0])))
+    solution = np.linalg.lstsq(np.vstack(columns), np.concatenate(values), rcond=None)[0]
+    return oscillator.having(damping=max(0.0, float(solution[0])))
 
 
 def _level(felt: Array, velocity: Array) -> float:
@@ -217,28 +217,28 @@ def free_names(oscillator: Oscillator, free: Sequence[str] | None) -> tuple[str,
         for name in free:
             find(oscillator, name)
         return tuple(free)
-    found = []
+    names = []
     law: Any = oscillator.law
     chosen = getattr(law, "chosen", ())
     for field in fields(law):
         value = getattr(law, field.name)
         if isinstance(value, int | float) and not isinstance(value, bool) and value and field.name not in chosen:
             alone = find(oscillator, field.name) == (("law", field.name),)
-            found.append(field.name if alone else f"law.{field.name}")
-    if not found:
+            names.append(field.name if alone else f"law.{field.name}")
+    if not names:
         raise ModelError(
             f"{type(oscillator.law).__name__} has no number to fit",
             "a law is fitted by its parameters",
             "name those to fit in free=, or take another law",
         )
-    return tuple(found)
+    return tuple(names)
 
 
 def require_apart(
     oscillator: Oscillator, names: Sequence[str], nuisance: Sequence[str], shown: Sequence[Shown]
 ) -> None:
     """Refuse a gain or delay of what is not fitted, a parameter of the drive, and one that is named twice."""
-    channels = list(dict.fromkeys(name for each in shown for name in each.channels))
+    channels = list(dict.fromkeys(name for motion in shown for name in motion.channels))
     taken: set[object] = set()
     for name in (*names, *nuisance):
         head, _, tail = name.rpartition(".")
@@ -282,7 +282,7 @@ def usual_nuisance(oscillator: Oscillator, names: Sequence[str], shown: Sequence
 
     The damper stays as stated where the law itself has a viscous part to fit.
     """
-    channels = dict.fromkeys(name for each in shown for name in each.channels)
+    channels = dict.fromkeys(name for motion in shown for name in motion.channels)
     viscous = VISCOUS & {name.rpartition(".")[2] for name in names}
     usual = [
         *(["damping"] if not viscous else []),
@@ -302,7 +302,7 @@ def nuisance_knob(
         calibrated = Knob(name, tail, 1.0, 0.01, prior=max(calibration, 1e-9) / 0.01)
         return calibrated if tail == "gain" else Knob(name, tail, 0.0, 1e-4, prior=DELAYED / 1e-4)
     if name == "damping":
-        fastest = max(float(each.scales[1]) for each in stretches)
+        fastest = max(float(stretch.scales[1]) for stretch in stretches)
         return Knob(name, "positive", oscillator.damping, _level_of(oscillator) / fastest)
     turned = knob(oscillator, name)
     return turned._replace(prior=calibration) if name == "stiffness" and turned.kind == "log" else turned
@@ -339,7 +339,7 @@ def knob(oscillator: Oscillator, name: str) -> Knob:
 
 def stiffest(oscillator: Oscillator, stretches: Sequence[Stretch], share: float) -> float:
     """The contact [N/m] that gives way by a share of the stroke under the sliding friction."""
-    return value_of(oscillator, "kinetic") / (share * max(float(each.scales[0]) for each in stretches))
+    return value_of(oscillator, "kinetic") / (share * max(float(stretch.scales[0]) for stretch in stretches))
 
 
 def bounded(turned: Knob, oscillator: Oscillator, stretches: Sequence[Stretch], share: float) -> Knob:
@@ -358,7 +358,7 @@ def _slides_at(oscillator: Oscillator) -> bool:
 
 def better_start(oscillator: Oscillator, names: Sequence[str], shown: Sequence[Shown]) -> Oscillator:
     """The law with its forces, as far as they are free, scaled to the friction that the records show."""
-    level = float(np.median([each.level for each in shown]))
+    level = float(np.median([motion.level for motion in shown]))
     if "kinetic" not in names or not level > 0:
         return oscillator
     static = getattr(oscillator.law, "static", None)
@@ -392,9 +392,9 @@ def thinned(stretch: Stretch) -> Stretch:
     """The stretch with fewer readings, and a drive that is taken as measured, for a first look."""
     sensors = []
     for sensor in stretch.sensors:
-        each = slice(None, None, max(1, int(len(sensor.time) / THIN)))
-        known, _ = np.linalg.qr(sensor.known[each])
-        sensors.append(replace(sensor, time=sensor.time[each], readings=sensor.readings[each], known=known))
+        rows = slice(None, None, max(1, int(len(sensor.time) / THIN)))
+        known, _ = np.linalg.qr(sensor.known[rows])
+        sensors.append(replace(sensor, time=sensor.time[rows], readings=sensor.readings[rows], known=known))
     drive = replace(stretch.drive, unsure=())  # type: ignore[type-var]
     return replace(stretch, sensors=tuple(sensors), drive=drive)
 
@@ -422,7 +422,7 @@ def best_start(
         problem = Problem.of(trial, few, ())
         point = descend(problem, problem.begin(np.zeros(0)), passes=2)
         looked.append((point.chi2, number, problem, point))
-    looked.sort(key=lambda each: each[:2])
+    looked.sort(key=lambda attempt: attempt[:2])
     ends = []
     for _, number, problem, point in looked[:FINALISTS]:
         knobs = [knob(problem.oscillator, name) for name in names]
@@ -430,22 +430,22 @@ def best_start(
         turned = replace(problem, knobs=tuple(knobs))
         end = descend(turned, replace(point, u=np.zeros(len(knobs))), passes=12, tell=tell)
         ends.append((end.chi2, number, turned, end))
-    _, _, problem, point = min(ends, key=lambda each: each[:2])
+    _, _, problem, point = min(ends, key=lambda attempt: attempt[:2])
     return problem.system(point.u)
 
 
 def seen_profile(shown: Sequence[Shown], level: float) -> Profile:
     """The friction along the surface, as it was felt in sliding forward and back."""
-    span = max(float(np.abs(each.displacement).max()) for each in shown)
+    span = max(float(np.abs(motion.displacement).max()) for motion in shown)
     places = np.linspace(-span, span, KNOTS)
     columns, values = [], []
-    for each in shown:
-        rows = each.slides()
-        side = np.sign(each.velocity[rows])
-        columns.append(np.maximum(0.0, 1 - np.abs(each.displacement[rows, None] - places) / (places[1] - places[0])))
-        values.append((each.felt[rows] - np.mean(each.felt)) * side / level)
-    design, told = np.vstack(columns), np.concatenate(values)
+    for motion in shown:
+        rows = motion.slides()
+        side = np.sign(motion.velocity[rows])
+        columns.append(np.maximum(0.0, 1 - np.abs(motion.displacement[rows, None] - places) / (places[1] - places[0])))
+        values.append((motion.felt[rows] - np.mean(motion.felt)) * side / level)
+    design, wanted = np.vstack(columns), np.concatenate(values)
     # where no slide was fast the profile goes on as it is beside
-    bends = np.diff(np.eye(KNOTS), 2, axis=0) * BENT * math.sqrt(len(told))
-    found = np.linalg.lstsq(np.vstack([design, bends]), np.append(told, np.zeros(len(bends))), rcond=None)[0]
-    return Profile(tuple(np.clip(found, 0.5, 2.0).tolist()), float(places[1] - places[0]))
+    bends = np.diff(np.eye(KNOTS), 2, axis=0) * BENT * math.sqrt(len(wanted))
+    heights = np.linalg.lstsq(np.vstack([design, bends]), np.append(wanted, np.zeros(len(bends))), rcond=None)[0]
+    return Profile(tuple(np.clip(heights, 0.5, 2.0).tolist()), float(places[1] - places[0]))

@@ -211,10 +211,10 @@ def remembered(law: object, speed: float, place: float) -> dict[str, float | str
     run = simulate(glider, duration=GLIDE, start={"v": speed}, rtol=RTOL)
     last = run.state(GLIDE)
     law_places = getattr(law, "places", ())
-    found: dict[str, float | str] = {"mode": run.table.modes[int(last["mode"])].name}
+    memory: dict[str, float | str] = {"mode": run.table.modes[int(last["mode"])].name}
     for name in run.table.names[2 : run.table.physical]:
-        found[name] = last[name] + (place - last["x"] if name in law_places else 0.0)
-    return found
+        memory[name] = last[name] + (place - last["x"] if name in law_places else 0.0)
+    return memory
 
 
 def attempted(

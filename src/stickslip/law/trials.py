@@ -19,7 +19,7 @@ from stickslip.law.drive import Sampled, as_driven, face_of
 from stickslip.law.search import Knob, Point, Problem, descend, rows_of
 from stickslip.law.standing import Evidence, Key, independent
 from stickslip.law.start import Shown, bounded, free_names, knob, nuisance_knobs, thinned
-from stickslip.law.stretch import Motion, Stretch, attempted
+from stickslip.law.stretch import Motion, Sensor, Stretch, attempted
 from stickslip.laws.guessing import LEAST_EXCESS, STIFF, STIFFEST, Observed
 from stickslip.oscillator import Oscillator
 from stickslip.record.record import Record
@@ -78,7 +78,7 @@ class Trial:
     @property
     def scales(self) -> Array:
         """Largest way [m] and speed [m/s] of every stretch (n, 2)."""
-        return np.array([each.scales for each in self.problem.stretches])
+        return np.array([stretch.scales for stretch in self.problem.stretches])
 
     @property
     def count(self) -> int:
@@ -130,11 +130,13 @@ def weighed(
         last = min(last, shown.turned(first, TURNS))
     every = shown.stretch(number, (first, last))
     stretch = every if whole else thinned(every)
-    sensors = tuple(
-        replace(each, noise=evidence.weight((each.channel.name, number), len(each.time)) if evidence
-                else math.hypot(each.noise, calibration * float(np.std(each.readings))))
-        for each in stretch.sensors
-    )  # fmt: skip
+
+    def noise(sensor: Sensor) -> float:
+        if evidence is None:
+            return math.hypot(sensor.noise, calibration * float(np.std(sensor.readings)))
+        return evidence.weight((sensor.channel.name, number), len(sensor.time))
+
+    sensors = tuple(replace(sensor, noise=noise(sensor)) for sensor in stretch.sensors)
     drive = stretch.drive
     if isinstance(drive, Sampled) and not whole:
         drive = drive.coarser(COARSE * calibration)
@@ -159,10 +161,10 @@ def searched(
     problems = [Problem.of(system, stretches, ()) for system in starts]
     begun = [(problem.begin(np.zeros(0)), problem) for problem in problems]
     looks = []
-    for point, still in sorted(begun, key=lambda each: each[0].chi2)[:LOOKS]:
+    for point, still in sorted(begun, key=lambda pair: pair[0].chi2)[:LOOKS]:
         looks.append((descend(still, point, passes=2, share=ENOUGH, tell=tell), still))
     ends = []
-    for look, still in sorted(looks, key=lambda each: each[0].chi2)[:FINALISTS]:
+    for look, still in sorted(looks, key=lambda pair: pair[0].chi2)[:FINALISTS]:
         if not math.isfinite(look.chi2):
             continue
         own = [_knob(still.oscillator, name, stretches) for name in free_names(still.oscillator, None)]
@@ -173,7 +175,7 @@ def searched(
         ends.append((first, descend(first, begin, passes=LAST_PASSES, share=ROUGHLY, tell=tell)))
     if not ends:
         return None
-    first, point = min(ends, key=lambda each: each[1].chi2)
+    first, point = min(ends, key=lambda pair: pair[1].chi2)
     others = [name for name in known if name != "damping"]
     problem = replace(first, knobs=(*first.knobs, *nuisance_knobs(first.oscillator, others, stretches, calibration)))
     whole = problem.at(np.append(point.u, np.zeros(len(problem.knobs) - len(point.u))), point.starts)
@@ -203,7 +205,7 @@ def with_static(trial: Trial, excess: float) -> Trial:
     """
     system = trial.system
     static = system.law.kinetic * (1 + excess)  # type: ignore[union-attr]
-    left = [j for j, each in enumerate(trial.problem.knobs) if each.name != "static"]
+    left = [j for j, knob in enumerate(trial.problem.knobs) if knob.name != "static"]
     knobs = tuple(trial.problem.knobs[j]._replace(origin=trial.problem.knobs[j].value(trial.point.u[j])) for j in left)
     problem = replace(trial.problem, oscillator=system.having(static=static), knobs=knobs)
     return replace(trial, problem=problem, point=problem.at(np.zeros(len(knobs)), trial.point.starts))
@@ -224,24 +226,22 @@ def unexplained(trial: Trial, shown: Sequence[Shown]) -> dict[str, float]:
 
     The motion itself, x or v, always counts.
     """
-    found: dict[str, float] = {}
+    silent: dict[str, float] = {}
     for (name, number), values in trial.left.items():
         channel, readings = shown[number].record.channels[name], shown[number].record[name]
         size = max(float(np.std(readings)), 1e-300)
         share = float(np.std(values)) / size
         noise = shown[number].noise(name) / size
-        told = channel.mount or channel.delay or channel.discharge or channel.inertia
-        if name not in "xv" and not told and share > math.hypot(SILENT, noise):
-            found[name] = max(share, found.get(name, 0.0))
-    return found
+        stated = channel.mount or channel.delay or channel.discharge or channel.inertia
+        if name not in "xv" and not stated and share > math.hypot(SILENT, noise):
+            silent[name] = max(share, silent.get(name, 0.0))
+    return silent
 
 
 def tuned(shown: Sequence[Shown], trial: Trial, stretch: Callable[[Shown, int], Stretch], tell: Tell) -> list[Shown]:
     """The records with each mount's resonance where a law leaves least, within what a calibration is off."""
-    mounts = {
-        name: each.record.channels[name].mount for each in shown for name in each.channels
-        if each.record.channels[name].mount
-    }  # fmt: skip
+    named = ((name, motion.record.channels[name].mount) for motion in shown for name in motion.channels)
+    mounts = {name: mount for name, mount in named if mount}
     best, motions = list(shown), _motions(trial)
     for name, mount in mounts.items():
         assert mount is not None
@@ -250,22 +250,22 @@ def tuned(shown: Sequence[Shown], trial: Trial, stretch: Callable[[Shown, int], 
             middle = min(tried, key=lambda share: tried[share][0]) if tried else 1.0
             for share in {middle + turns * step for turns in (-2, -1, 0, 1, 2)} - set(tried):
                 tell()
-                moved = [_remounted(each, name, (share * mount[0], mount[1])) for each in best]
-                left = [_unread(trial, motions, stretch(each, j), j, name) for j, each in enumerate(moved)]
+                moved = [_remounted(motion, name, (share * mount[0], mount[1])) for motion in best]
+                left = [_unread(trial, motions, stretch(motion, j), j, name) for j, motion in enumerate(moved)]
                 tried[share] = math.fsum(left), moved
-        best = min(tried.items(), key=lambda each: (each[1][0], each[0]))[1][1]
+        best = min(tried.items(), key=lambda item: (item[1][0], item[0]))[1][1]
     return best
 
 
 def _motions(trial: Trial) -> list[Motion | None]:
     """What happens in each stretch at the end of a search."""
-    found = []
+    motions = []
     for j, stretch in enumerate(trial.problem.stretches):
         start = trial.point.starts[j]
         off = start[len(trial.problem.scales[j]) :]
         run = attempted(stretch, trial.system, trial.problem.start(j, start), off)
-        found.append(None if run is None else stretch.motion(run))
-    return found
+        motions.append(None if run is None else stretch.motion(run))
+    return motions
 
 
 def _unread(trial: Trial, motions: Sequence[Motion | None], stretch: Stretch, j: int, name: str) -> float:
@@ -275,9 +275,10 @@ def _unread(trial: Trial, motions: Sequence[Motion | None], stretch: Stretch, j:
     if motion is None or not sensors:
         return 0.0
     late = trial.problem.sensor_knobs(trial.point.u, "delay", j).get(name, 0.0)
-    told, read = (sensors[0].freed(each) for each in (sensors[0].predicted(motion, late)[0], sensors[0].readings))
+    fitted, read = (sensors[0].freed(values) for values in (sensors[0].predicted(motion, late)[0], sensors[0].readings))
     return float(
-        sensors[0].noise ** 2 * np.mean((read - told * (float(told @ read) / max(float(told @ told), 1e-300))) ** 2)
+        sensors[0].noise ** 2
+        * np.mean((read - fitted * (float(fitted @ read) / max(float(fitted @ fitted), 1e-300))) ** 2)
     )
 
 
@@ -307,16 +308,16 @@ class Seen(Observed):
         """What the sensors of the records say together of sliding and friction."""
         slips, speeds, frictions, steps, ways, rests = [], [], [], [], [], []
         for record in records:
-            told = _told(as_driven(record, oscillator.drive), oscillator)
+            balanced = _balanced(as_driven(record, oscillator.drive), oscillator)
             inner = slice(EDGE, -EDGE)
-            face, speed = face_of(oscillator.drive, told)
-            x, v = told["x"] - face, told["v"] - speed
+            face, speed = face_of(oscillator.drive, balanced)
+            x, v = balanced["x"] - face, balanced["v"] - speed
             slips.append(np.diff(x, append=x[-1])[inner])
             speeds.append(v[inner])
-            frictions.append(told["friction"][inner])
-            steps.append(np.full(len(slips[-1]), 1 / told.fs))
+            frictions.append(balanced["friction"][inner])
+            steps.append(np.full(len(slips[-1]), 1 / balanced.fs))
             ways.append(x[inner] - x[inner].mean())
-            rests.append(_rests(told, speeds[-1], frictions[-1], ways[-1]))
+            rests.append(_rests(balanced, speeds[-1], frictions[-1], ways[-1]))
         speed, friction = np.concatenate(speeds), np.concatenate(frictions)
         fast = np.abs(speed) > FAST * np.abs(speed).max()
         level = float(np.median((friction * np.sign(speed))[fast]))
@@ -331,10 +332,9 @@ class Seen(Observed):
                 else "correct the signs of the channels, or mass= and stiffness=",
             )
         way, around = float(np.std(np.concatenate(ways))), Rests.together(rests)
-        return cls(
-            np.concatenate(slips), speed, friction, np.concatenate(steps), level,
-            _excess(speed, friction, level, around), float(np.std(speed)) / way, oscillator.mass, around,
-        )  # fmt: skip
+        excess, turns = _excess(speed, friction, level, around), float(np.std(speed)) / way
+        slip, step = np.concatenate(slips), np.concatenate(steps)
+        return cls(slip, speed, friction, step, level, excess, turns, oscillator.mass, around)
 
 
 def _excess(speed: Array, friction: Array, level: float, rests: Rests) -> float:
@@ -346,20 +346,18 @@ def _excess(speed: Array, friction: Array, level: float, rests: Rests) -> float:
     return max(LEAST_EXCESS, min(1.0, reached / level - 1))
 
 
-def _rests(told: Record, speed: Array, friction: Array, way: Array) -> Rests:
-    unsure = float(np.median(told["v_sd"])) if "v_sd" in told else 0.0
+def _rests(record: Record, speed: Array, friction: Array, way: Array) -> Rests:
+    unsure = float(np.median(record["v_sd"])) if "v_sd" in record else 0.0
     frequency = float(np.std(speed)) / max(float(np.std(way)), 1e-300)
-    width = told.rig.bandwidth if told.rig else None
-    blur = math.ceil(told.fs / (2 * width)) if width else 1
-    return Rests.of(speed, friction, fs=told.fs, frequency=frequency, unsure=unsure, blur=blur)
+    width = record.rig.bandwidth if record.rig else None
+    blur = math.ceil(record.fs / (2 * width)) if width else 1
+    return Rests.of(speed, friction, fs=record.fs, frequency=frequency, unsure=unsure, blur=blur)
 
 
-def _told(record: Record, oscillator: Oscillator) -> Record:
+def _balanced(record: Record, oscillator: Oscillator) -> Record:
     method = "fusion" if {"a", "load"} & set(record) else "smoother"
-    return friction_force(
-        record, mass=oscillator.mass, stiffness=oscillator.stiffness, damping=oscillator.damping,
-        damper=oscillator.damper, method=method, contact=getattr(oscillator.drive, "contact", "ground"),
-    )  # fmt: skip
+    constants = {name: getattr(oscillator, name) for name in ("mass", "stiffness", "damping", "damper")}
+    return friction_force(record, **constants, method=method, contact=getattr(oscillator.drive, "contact", "ground"))
 
 
 @dataclass(frozen=True, eq=False)
@@ -413,14 +411,14 @@ class Rests:
                 if seen and b - a >= max(FEW, 2 * blur) and still < CREEPING * top:
                     rises.append(float(side * friction[a:b].mean()) / level - 1)
                     shapes.append(_stribeck(speed[a:b] / top))
-            held = first - (first if ended is None else ended)
-            if sudden and held >= max(LEAST, HELD / frequency * fs) and first + LEAST <= len(speed):
-                begun = first - held // 2
-                fall, after = _fall(side * friction[begun : first + LEAST], held // 2)
+            duration = first - (first if ended is None else ended)
+            if sudden and duration >= max(LEAST, HELD / frequency * fs) and first + LEAST <= len(speed):
+                begun = first - duration // 2
+                fall, after = _fall(side * friction[begun : first + LEAST], duration // 2)
                 falls.append(fall / level)
                 sinks.append(1 - _stribeck(speed[begun:][after] / top))
             ended = last
-        curves = (np.array(each).reshape(-1, len(FALLS)) for each in (sinks, shapes))
+        curves = (np.array(rows).reshape(-1, len(FALLS)) for rows in (sinks, shapes))
         return cls(np.array(falls), next(curves), np.array(rises), next(curves), np.array(strays))
 
     @classmethod
@@ -437,8 +435,8 @@ class Rests:
         value, sd = _middle(self.falls, self.strays)
         sd = float(np.hypot(sd, ROUNDED))
         ends = (max(0.0, value - NORMAL_95 * sd), max(0.0, value) + NORMAL_95 * sd)
-        words = f"fall of the friction as the contact lets go, median of {len(self.falls)} releases"
-        return Estimate("excess of static friction", max(0.0, value), ends, sd, "1", words)
+        method = f"fall of the friction as the contact lets go, median of {len(self.falls)} releases"
+        return Estimate("excess of static friction", max(0.0, value), ends, sd, "1", method)
 
     def probabilities(self, calibration: float, least: float) -> dict[str, float]:
         r"""How probable each rigid law is, its parameters averaged over what they may be.
@@ -456,17 +454,17 @@ class Rests:
             scatter = max(float(np.std(self.rises, ddof=1)), float(np.median(self.strays)))
             slow = float(np.hypot(scatter / len(self.rises) ** 0.5, max(ROUNDED, GAINS * calibration)))
             rise, shape = float(self.rises.mean()), self.shapes.mean(axis=0)
-        asked = EXCESSES[np.greater(EXCESSES, least)]
+        excesses = EXCESSES[np.greater(EXCESSES, least)]
         flat, still = _likely(rise / slow), _likely(fall / sharp)
-        found = {
+        odds = {
             "Coulomb": still * flat,
-            "static": flat * _likely((fall - asked) / sharp),
+            "static": flat * _likely((fall - excesses) / sharp),
             "Stribeck": _likely(
-                np.hypot((fall - np.outer(asked, sink)) / sharp, (rise - np.outer(asked, shape)) / slow)
+                np.hypot((fall - np.outer(excesses, sink)) / sharp, (rise - np.outer(excesses, shape)) / slow)
             ),
         }
-        total = sum(found.values())
-        return {name: each / total if total > 0 else 1 / len(found) for name, each in found.items()}
+        total = sum(odds.values())
+        return {name: value / total if total > 0 else 1 / len(odds) for name, value in odds.items()}
 
 
 def _stribeck(speeds: Array) -> Array:
@@ -493,20 +491,20 @@ def _strokes(speed: Array, still: float, fast: float) -> list[tuple[int, int]]:
     return [(a, b) for a, b in slides if np.abs(speed[a:b]).max() > fast]
 
 
-def _fall(friction: Array, held: int) -> tuple[float, slice]:
+def _fall(friction: Array, hold: int) -> tuple[float, slice]:
     """By what the friction is less after a release than the line that it followed until then, and where it is told; the
     release is searched.
 
     `held` is the row from which on it surely slides.
     """
-    best, found = np.inf, (0.0, slice(held + CORNER, held + AFTER))
-    for release in range(held // 2, held + 1):
-        rows = np.arange(max(0, release - held // 2), release) - release
-        told = slice(release + CORNER, release + AFTER)
-        after = friction[told]
+    best, fall = np.inf, (0.0, slice(hold + CORNER, hold + AFTER))
+    for release in range(hold // 2, hold + 1):
+        rows = np.arange(max(0, release - hold // 2), release) - release
+        inner = slice(release + CORNER, release + AFTER)
+        after = friction[inner]
         slope, end = np.polyfit(rows, friction[release + rows], 1)
         left = np.concatenate([friction[release + rows] - end - slope * rows, after - after.mean()])
         cost = float(left @ left) / len(left)
         if cost < best:
-            best, found = cost, (float(end - after.mean()), told)
-    return found
+            best, fall = cost, (float(end - after.mean()), inner)
+    return fall

@@ -150,13 +150,13 @@ class LawComparison(Result):
             "confidence": self.confidence,
             "status": self.status,
             "checks": list(self.checks),
-            "laws": [_told(each) for each in self.candidates],
-            "estimates": [each.to_dict() for each in self.estimates],
+            "laws": [_plain(candidate) for candidate in self.candidates],
+            "estimates": [estimate.to_dict() for estimate in self.estimates],
             "history": [step.to_dict() for step in self.history],
         }
 
 
-def _told(candidate: Candidate) -> dict[str, Any]:
+def _plain(candidate: Candidate) -> dict[str, Any]:
     standing = candidate.standing
     values = {"misfit": standing.misfit, "criterion": standing.criterion}
     law = candidate.oscillator.law
@@ -178,22 +178,22 @@ def concluded(
     doubt: str,
     worries: Sequence[Doubt | str],
 ) -> LawComparison:
-    told = [each.standing for each in candidates]
-    kept = [each for each in told if each.kept]
-    families = list(dict.fromkeys(each.family for each in kept))
-    excess_ = excess_ if told[0].family == "rigid" else None
-    checks = tuple(f"{each.name}: misfit {times(each.misfit)} the least" for each in told)
+    ranking = [law.standing for law in candidates]
+    kept = [law for law in ranking if law.kept]
+    families = list(dict.fromkeys(law.family for law in kept))
+    excess_ = excess_ if ranking[0].family == "rigid" else None
+    checks = tuple(f"{law.name}: misfit {times(law.misfit)} the least" for law in ranking)
     step = Step(
         "compare_laws",
-        {"laws": [each.name for each in candidates], "calibration": calibration},
-        f"{', '.join(each.name for each in kept)} not rejected",
+        {"laws": [law.name for law in candidates], "calibration": calibration},
+        f"{', '.join(law.name for law in kept)} not rejected",
     )
     return LawComparison(
         candidates, kept[0].name if len(kept) == 1 and not doubt else None,
         families[0] if len(families) == 1 and not doubt else None,
-        tuple(each.name for each in kept), confidence,
+        tuple(law.name for law in kept), confidence,
         f"None of the laws tried describes these records: {doubt}." if doubt
-        else " ".join(_sentences(told, families, excess_, calibration, confidence, Remainder.of_fit(fit))),
+        else " ".join(_sentences(ranking, families, excess_, calibration, confidence, Remainder.of_fit(fit))),
         fit, excess_, Status(doubt) if doubt else Status(*worries), checks,
         (*records[0].history, step),
     )  # fmt: skip
@@ -201,14 +201,14 @@ def concluded(
 
 def doubt_of(fit: LawFit, stated: Oscillator, calibration: float) -> str:
     """Why even the best law is none for these records; nothing where it is."""
-    shares = {each: each.value for name, each in fit.parameters.items() if "gain" in name.split(".")}
+    shares = {estimate: estimate.value for name, estimate in fit.parameters.items() if "gain" in name.split(".")}
     if "stiffness" in fit.parameters and stated.stiffness > 0:
         shares[fit.parameters["stiffness"]] = fit.parameters["stiffness"].value / stated.stiffness
-    far = [each for each, share in shares.items() if abs(math.log(share)) > FAR * calibration > 0]
+    far = [estimate for estimate, share in shares.items() if abs(math.log(share)) > FAR * calibration > 0]
     if far:
-        told = ", ".join(f"the {each.name} comes out as {each.value:.3g}" for each in far)
+        values = ", ".join(f"the {estimate.name} comes out as {estimate.value:.3g}" for estimate in far)
         return (
-            f"{told}, where calibrations are off by {100 * calibration:.2g} %: check mass=, stiffness= and the "
+            f"{values}, where calibrations are off by {100 * calibration:.2g} %: check mass=, stiffness= and the "
             "channels' units"
         )
     remainder = Remainder.of_fit(fit)
@@ -230,28 +230,28 @@ def _sentences(
     if len(laws) == 1:  # nothing was compared: how well it explains the records is all there is to say
         yield f"{best.name}, the only law tried, {remainder}, {times(remainder.over)} the noise of {remainder.channel}."
         return
-    kept = [each.name for each in laws if each.kept]
-    rivals = [each for each in laws if each.family != best.family and not each.limit]
-    limits = [each.name for each in laws if each.limit]
+    kept = [law.name for law in laws if law.kept]
+    rivals = [law for law in laws if law.family != best.family and not law.limit]
+    limits = [law.name for law in laws if law.limit]
     if len(families) > 1:
         yield (
             f"These records can not tell {_either(kept)} apart: what they leave over differs too little. "
             "A record in which the contact sticks and slips, with a load cell, would tell more."
         )
     else:
-        said = []
+        clauses = []
         if rivals:
-            least = min(each.misfit for each in rivals) / best.misfit
+            least = min(law.misfit for law in rivals) / best.misfit
             larger = f"the misfit of any other family tried is at least {times(least)} as large"
-            said.append(larger if least > 1 else "another family leaves no less where the records tell most")
+            clauses.append(larger if least > 1 else "another family leaves no less where the records tell most")
         if limits:
-            said.append(
+            clauses.append(
                 f"{_either(limits)} would have to be so stiff that {'they are' if limits[1:] else 'it is'} rigid"
             )
-        told = "; ".join(said) or "no law of another family was tried"
+        rivalry = "; ".join(clauses) or "no law of another family was tried"
         fits = f"{kept[0]} fits best: the" if len(kept) == 1 else "The"
         lead = f"The best of those tried {remainder}. Among them the" if remainder.share > LEFT else fits
-        yield f"{lead} friction is {family_of(best.name).said}: {told}."
+        yield f"{lead} friction is {family_of(best.name).said}: {rivalry}."
     if best.family == "rigid" and len(families) == 1 and excess_ is not None:
         low, high = excess_.interval
         exceeds = (
@@ -289,6 +289,6 @@ def unexplained_part(fit: LawFit) -> Doubt | str:
 
 def damper_found(fit: LawFit, stated: float) -> Iterator[str]:
     """The damper that was found, where it is not the stated one."""
-    found = fit.parameters.get("damping")
-    if found is not None and not found.includes(stated):
-        yield f"With it goes a {found}, where {stated:.4g} N s/m is stated."
+    damping = fit.parameters.get("damping")
+    if damping is not None and not damping.includes(stated):
+        yield f"With it goes a {damping}, where {stated:.4g} N s/m is stated."

@@ -12,12 +12,11 @@ from numpy.typing import NDArray
 
 from stickslip.errors import EstimateError, ModelError
 from stickslip.estimate import NORMAL_95, Doubt, Estimate
-from stickslip.law.law import LawFit, answered
+from stickslip.law.law import LawFit, answered, surety, teller
 from stickslip.law.search import descend
 from stickslip.law.standing import CALIBRATIONS, Evidence, Misfit, Standing, standings, undescribed
 from stickslip.law.start import CALIBRATION, Shown, require_apart, seen_damping, too_few, usual_nuisance
 from stickslip.law.stretch import Stretch, channels_of
-from stickslip.law.surety import surety
 from stickslip.law.trials import (
     PASSES,
     Seen,
@@ -126,37 +125,40 @@ def compare_laws(
     if not 0 <= calibration < 1:
         raise ModelError(f"calibration = {calibration}", "it is a part of 1, as 0.01 for 1 %", "correct calibration=")
     kinds = _kinds(laws)
-    shown = [Shown.of(each, channels_of(each, None), oscillator) for each in records]
-    for each in shown:
-        each.require_sliding()
+    shown = [Shown.of(one, channels_of(one, None), oscillator) for one in records]
+    for motion in shown:
+        motion.require_sliding()
     require_apart(oscillator, (), nuisance or (), shown)
     known = tuple(nuisance) if nuisance is not None else usual_nuisance(oscillator, (), shown)
     systems = [oscillator, *([seen_damping(oscillator, shown)] if "damping" in known else [])]
-    search = _Search(kinds, _seen(records, systems), known, calibration, _teller(progress, len(kinds)))
+    search = _Search(kinds, _seen(records, systems), known, calibration, teller(progress, CALLS * len(kinds)))
     trials, looked = search.trials(shown)
     rests = search.seen[-1][1].rests  # of the balance with the likelier damper
     misfits = [
         Misfit(trial.name, trial.count, squares(trial.left), trial.stiff, trial.moved) for trial in trials.values()
     ]
-    evidence = evidence_of(min(trials.values(), key=lambda each: each.point.chi2), looked.shown)
-    told, confidence = standings(misfits, evidence, likely=rests.probabilities(calibration, CALIBRATIONS * calibration))
-    best, final = search.settled(trials[told[0].name], looked, evidence, rests.fall)
+    evidence = evidence_of(min(trials.values(), key=lambda trial: trial.point.chi2), looked.shown)
+    ranking, confidence = standings(
+        misfits, evidence, likely=rests.probabilities(calibration, CALIBRATIONS * calibration)
+    )
+    best, final = search.settled(trials[ranking[0].name], looked, evidence, rests.fall)
     fit = search.fitted(best, final, rests.fall)
     doubt, confidence = doubt_of(fit, oscillator, calibration), min(confidence, evidence.supported)
     if doubt:
-        told, confidence = undescribed(told), 0.0
+        ranking, confidence = undescribed(ranking), 0.0
         fit = _flagged(fit, "none of the laws tried describes these records")
     rigid = _excess(fit) if best.name == "Stribeck" else rests.fall
     fit = _calibrated(fit, records, calibration)
     if progress:
         progress(1.0)
-    candidates = tuple(_candidate(each, trials[each.name], fit, first=each is told[0]) for each in told)
+    candidates = tuple(_candidate(one, trials[one.name], fit, first=one is ranking[0]) for one in ranking)
     if not doubt:
-        candidates = tuple(each.worded(fit, first=each is candidates[0]) for each in candidates)
+        candidates = tuple(one.worded(fit, first=one is candidates[0]) for one in candidates)
     worries: list[Doubt | str] = [*looked.worries]
     worries += filter(None, [too_few(final, best.count), unexplained_part(fit)])
-    found = concluded(candidates, confidence, fit, rigid, calibration, records, doubt, worries)
-    return found if doubt else replace(found, verdict=" ".join([found.verdict, *damper_found(fit, oscillator.damping)]))
+    answer = concluded(candidates, confidence, fit, rigid, calibration, records, doubt, worries)
+    damper = () if doubt else damper_found(fit, oscillator.damping)
+    return replace(answer, verdict=" ".join([answer.verdict, *damper]))
 
 
 class _Looked(NamedTuple):
@@ -184,26 +186,26 @@ class _Search(NamedTuple):
         self, shown: Sequence[Shown], evidence: Evidence | None, passes: int, before: Mapping[str, Trial]
     ) -> dict[str, Trial]:
         """Every law searched, or its search taken up again."""
-        stretches = [self.stretch(evidence)(each, number) for number, each in enumerate(shown)]
-        found: dict[str, Trial] = {}
+        stretches = [self.stretch(evidence)(motion, number) for number, motion in enumerate(shown)]
+        trials: dict[str, Trial] = {}
         for name, given in self.kinds:
-            least = min((each.point.chi2 for each in {**before, **found}.values()), default=math.inf)
+            least = min((one.point.chi2 for one in {**before, **trials}.values()), default=math.inf)
             trial = resumed(before[name], stretches, least, passes, self.tell) if name in before else None
             if trial is None:
-                begun = [replace(system, law=law) for system, told in self.seen for law in _guessed(name, given, told)]
-                begun += _continued(name, found)
+                begun = [replace(system, law=law) for system, seen in self.seen for law in _guessed(name, given, seen)]
+                begun += _continued(name, trials)
                 trial = searched(name, begun, stretches, self.known, self.calibration, least, passes, self.tell)
             if trial is not None:
-                found[name] = trial
-        return found
+                trials[name] = trial
+        return trials
 
     def trials(self, shown: Sequence[Shown]) -> tuple[dict[str, Trial], _Looked]:
         """Every law at the end of its search; a first look tells which channels count, how much, and their mounts."""
         rough, looked, evidence = self.tried(shown, None, LOOK, {}), _Looked(shown, None, ()), None
         if rough:
-            nearest = min(rough.values(), key=lambda each: each.point.chi2)
+            nearest = min(rough.values(), key=lambda trial: trial.point.chi2)
             silent = unexplained(nearest, shown)
-            stated = [replace(each, channels=tuple(n for n in each.channels if n not in silent)) for each in shown]
+            stated = [replace(one, channels=tuple(n for n in one.channels if n not in silent)) for one in shown]
             worries = tuple(
                 f"{name} is left out: the best law leaves {share:.0%} of it, and no mount or delay of its sensor is "
                 "stated"
@@ -229,50 +231,46 @@ class _Search(NamedTuple):
         shown, stretch = looked.shown, self.stretch(evidence)
         for _ in range(0 if looked.stated is None else RETUNED):
             before, shown = shown, tuned(looked.stated or (), best, stretch, self.tell)
-            if [each.record.channels for each in before] == [each.record.channels for each in shown]:
+            if [motion.record.channels for motion in before] == [motion.record.channels for motion in shown]:
                 break
-            stretches = [stretch(each, number) for number, each in enumerate(shown)]
+            stretches = [stretch(motion, number) for number, motion in enumerate(shown)]
             best = resumed(best, stretches, math.inf, PASSES, self.tell) or best
         return best, shown
 
     def fitted(self, best: Trial, shown: Sequence[Shown], rigid: Estimate | None) -> LawFit:
         """The best law's fit to all readings, with the static friction that the releases tell."""
-        whole = [weighed(each, number, self.calibration, whole=True) for number, each in enumerate(shown)]
+        whole = [weighed(motion, number, self.calibration, whole=True) for number, motion in enumerate(shown)]
         fit = _fit(best, shown, whole, self.tell)
         return fit if best.name != "static" or rigid is None else _with_static(fit, rigid)
 
 
 def _seen(records: Sequence[Record], systems: Sequence[Oscillator]) -> list[tuple[Oscillator, Seen]]:
     """What the records show by each of several dampers; one that leaves no friction is none."""
-    found, refused = [], None
+    seen, refused = [], None
     for system in systems:
         try:
-            found.append((system, Seen.of(records, system)))
+            seen.append((system, Seen.of(records, system)))
         except EstimateError as error:
             refused = error
-    if refused and not found:
+    if refused and not seen:
         raise refused
-    return found
+    return seen
 
 
 def _excess(fit: LawFit) -> Estimate:
     """By what part the static friction of a fitted Stribeck curve exceeds the kinetic."""
     level, static = fit.parameters["kinetic"].value, fit.parameters["static"]
     low, high = (end / level - 1 for end in static.interval)
-    return replace(
-        static, name="excess of static friction", value=static.value / level - 1, interval=(max(0.0, low), high),
-        sd=static.sd / level, unit="1",
-    )  # fmt: skip
+    value, ends, sd = static.value / level - 1, (max(0.0, low), high), static.sd / level
+    return replace(static, name="excess of static friction", value=value, interval=ends, sd=sd, unit="1")
 
 
 def _with_static(fit: LawFit, excess: Estimate) -> LawFit:
     """The fit with the static friction that the releases tell."""
     level = fit.parameters["kinetic"].value
     low, high = (level * (1 + end) for end in excess.interval)
-    static = replace(
-        excess, name="static friction", value=level * (1 + excess.value), interval=(low, high), sd=level * excess.sd,
-        unit="N",
-    )  # fmt: skip
+    value, sd = level * (1 + excess.value), level * excess.sd
+    static = replace(excess, name="static friction", value=value, interval=(low, high), sd=sd, unit="N")
     correlations = np.eye(len(fit.correlations) + 1)
     correlations[1:, 1:] = fit.correlations
     return replace(fit, parameters={"static": static, **fit.parameters}, correlations=correlations)
@@ -287,10 +285,10 @@ def _candidate(standing: Standing, trial: Trial, fit: LawFit, *, first: bool) ->
 
 def _left(trial: Trial) -> dict[str, float]:
     """Root mean square of what is left of each channel."""
-    found: dict[str, list[float]] = {}
+    by_channel: dict[str, list[float]] = {}
     for (name, _), square in squares(trial.left).items():
-        found.setdefault(name, []).append(square)
-    return {name: math.sqrt(float(np.mean(values))) for name, values in found.items()}
+        by_channel.setdefault(name, []).append(square)
+    return {name: math.sqrt(float(np.mean(values))) for name, values in by_channel.items()}
 
 
 def _fit(trial: Trial, shown: Sequence[Shown], stretches: Sequence[Stretch], tell: Callable[[], None]) -> LawFit:
@@ -301,22 +299,21 @@ def _fit(trial: Trial, shown: Sequence[Shown], stretches: Sequence[Stretch], tel
     point = descend(problem, begun, passes=PASSES, settled=0.0, tell=tell)
     with np.errstate(all="ignore"):  # of a parameter without effect
         fit = answered(problem, point, surety(problem, point, tell), shown)
-    noise = {name: max(each.noise(name) for each in shown if name in each.channels) for name in fit.residual}
+    noise = {name: max(motion.noise(name) for motion in shown if name in motion.channels) for name in fit.residual}
     checks = tuple(
         f"{name} is left with {left / noise[name]:.3g} times its noise" for name, left in fit.residual.items()
     )
     fit = replace(fit, noise=noise, checks=checks)
     remainder = Remainder.of_fit(fit)
     if remainder.share > LEFT:
-        words = f"the interval does not count that the law misses {remainder.share:.0%} of {remainder.channel}"
-        fit = _flagged(fit, words)
+        doubt = f"the interval does not count that the law misses {remainder.share:.0%} of {remainder.channel}"
+        fit = _flagged(fit, doubt)
     return fit
 
 
-def _flagged(fit: LawFit, words: str) -> LawFit:
+def _flagged(fit: LawFit, status: str) -> LawFit:
     """The fit with a reason why its parameters should not be trusted, where none is told yet."""
-    told = {key: replace(one, status=words) if one.status == "ok" else one for key, one in fit.parameters.items()}
-    return replace(fit, parameters=told)
+    return replace(fit, parameters={key: one.doubted(status) for key, one in fit.parameters.items()})
 
 
 def _calibrated(fit: LawFit, records: Sequence[Record], calibration: float) -> LawFit:
@@ -327,13 +324,13 @@ def _calibrated(fit: LawFit, records: Sequence[Record], calibration: float) -> L
     """
     driven = any(name in record for record in records for name in ("z", "force"))
     felt = any(name in record for record in records for name in ("load", "friction"))
-    told = dict(fit.parameters)
+    parameters = dict(fit.parameters)
     for key, one in fit.parameters.items():
         name = key.removeprefix("law.")
         if name in MOVED | WEIGHED:
             unsure = math.hypot(driven and name in MOVED, not felt and name in WEIGHED)
-            told[key] = _widened(one, unsure * calibration, 1.0 if felt else STRAYS.get(key, STRAY))
-    return replace(fit, parameters=told)
+            parameters[key] = _widened(one, unsure * calibration, 1.0 if felt else STRAYS.get(key, STRAY))
+    return replace(fit, parameters=parameters)
 
 
 def _widened(estimate: Estimate, share: float, times: float) -> Estimate:
@@ -341,10 +338,8 @@ def _widened(estimate: Estimate, share: float, times: float) -> Estimate:
     more, (low, high) = share * abs(estimate.value), estimate.interval
     ends = (estimate.value - low, high - estimate.value)
     below, above = (times * math.hypot(end, NORMAL_95 * more) for end in ends)
-    return replace(
-        estimate, interval=(max(min(0.0, low), estimate.value - below), estimate.value + above),
-        sd=times * math.hypot(estimate.sd, more),
-    )  # fmt: skip
+    interval = (max(min(0.0, low), estimate.value - below), estimate.value + above)
+    return replace(estimate, interval=interval, sd=times * math.hypot(estimate.sd, more))
 
 
 def _guessed(name: str, given: Sequence[Any], seen: Seen) -> list[Any]:
@@ -358,34 +353,21 @@ def _continued(name: str, before: Mapping[str, Trial]) -> list[Oscillator]:
     known = hypotheses().get(name)
     if known is None or not before:
         return []
-    nearest = min(before.values(), key=lambda each: each.point.chi2)
+    nearest = min(before.values(), key=lambda trial: trial.point.chi2)
     stated = nearest.problem.oscillator.having(damping=nearest.system.damping)
     return [replace(stated, law=law) for law in known.continued(before)]
 
 
-def _teller(progress: Callable[[float], object] | None, laws: int) -> Callable[[], None]:
-    """Progress that comes nearer to its end with each call, as nobody knows how many there will be."""
-    calls = 0
-
-    def tell() -> None:
-        nonlocal calls
-        calls += 1
-        if progress:
-            progress(1 - math.exp(-calls / (CALLS * laws)))
-
-    return tell
-
-
 def _kinds(laws: Sequence[Any] | None) -> list[tuple[str, list[Any]]]:
     """The laws to try: name, and the values to start from where they are given."""
-    found: dict[str, list[Any]] = {}
-    for each in hypotheses() if laws is None else [laws] if isinstance(laws, str) else laws:
-        name = _name(each)
-        found.setdefault(name, []).extend([] if isinstance(each, str | type) else [each])
-    if not found:
+    kinds: dict[str, list[Any]] = {}
+    for law in hypotheses() if laws is None else [laws] if isinstance(laws, str) else laws:
+        name = _name(law)
+        kinds.setdefault(name, []).extend([] if isinstance(law, str | type) else [law])
+    if not kinds:
         raise ModelError("no law", "laws are compared by trying some", f"name some of {', '.join(hypotheses())}")
     order = list(hypotheses())
-    return sorted(found.items(), key=lambda each: order.index(each[0]) if each[0] in order else len(order))
+    return sorted(kinds.items(), key=lambda kind: order.index(kind[0]) if kind[0] in order else len(order))
 
 
 def _name(law: Any) -> str:
@@ -397,7 +379,7 @@ def _name(law: Any) -> str:
         return fits[0]
     kind = law if isinstance(law, type) else type(law)
     if hasattr(kind, "hypotheses"):
-        fits = [each.name for each in kind.hypotheses() if law is kind or each.holds(law)]
+        fits = [hypothesis.name for hypothesis in kind.hypotheses() if law is kind or hypothesis.holds(law)]
         return fits[0] if law is kind else fits[-1]
     if isinstance(law, type) or not (hasattr(law, "modes") or hasattr(law, "rates")):
         raise ModelError(

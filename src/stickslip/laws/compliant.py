@@ -208,13 +208,13 @@ class InertialContact:
         force = {"stretch": self.stiffness, "v": self.damping, "u": -self.damping}
         level = static_level(self.static, self.kinetic)
         borne = {"stretch": self.stiffness, "v": self.damping, "face_acceleration": -self.mass}
-        held = (
+        exits = (
             Exit({**borne, "1": -level}, "forward"),
             Exit({**{name: -value for name, value in borne.items()}, "1": -level}, "back"),
         )
         return (
             self._slip("back", -1, force),
-            Mode("stuck", "microstick", 0, force, held, {"stretch": {"v": 1.0}}),
+            Mode("stuck", "microstick", 0, force, exits, {"stretch": {"v": 1.0}}),
             self._slip("forward", 1, force),
         )
 

@@ -46,7 +46,7 @@ class Geared(Rigid):
     def _under(self, sign: int, ending: str) -> tuple[Mode, ...]:
         """The modes under a load of one sign; those under the other have the other ending."""
         ahead, behind = self._level(1, sign), self._level(-1, sign)
-        held = (
+        exits = (
             Exit({"f": 1.0, **{key: -value for key, value in ahead.items()}}, f"forward{ending}"),
             Exit({"f": -1.0, **{key: -value for key, value in behind.items()}}, f"back{ending}"),
         )
@@ -54,7 +54,7 @@ class Geared(Rigid):
         forward = {**ahead, "v": self.viscous_forward}
         return (
             Mode(f"back{ending}", "slip", -1, back, (Exit({"v": 1.0}, f"stuck{ending}"), *self._turned("back", sign))),
-            Mode(f"stuck{ending}", "stick", 0, None, (*held, *self._turned("stuck", sign))),
+            Mode(f"stuck{ending}", "stick", 0, None, (*exits, *self._turned("stuck", sign))),
             Mode(
                 f"forward{ending}", "slip", 1, forward,
                 (Exit({"v": -1.0}, f"stuck{ending}"), *self._turned("forward", sign)),

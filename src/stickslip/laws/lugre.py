@@ -127,9 +127,9 @@ def _from_simpler(simpler: Mapping[str, Searched]) -> list[LuGre]:
     """The Stribeck curve with bristles next to rigid, where the contact is; else the contact with a steep curve."""
     contact, curve = simpler.get("compliant"), simpler.get("Stribeck")
     if contact is not None and not contact.stiff:
-        held, speed = contact.law, FALLS[-1] * float(contact.scales[:, 1].max())
-        static = (1 + LITTLE) * held.kinetic
-        return [LuGre(held.kinetic, static, speed=speed, stiffness=held.stiffness, damping=held.damping)]
+        bristle, speed = contact.law, FALLS[-1] * float(contact.scales[:, 1].max())
+        static = (1 + LITTLE) * bristle.kinetic
+        return [LuGre(bristle.kinetic, static, speed=speed, stiffness=bristle.stiffness, damping=bristle.damping)]
     if contact is None or curve is None:
         return []
     law = curve.law

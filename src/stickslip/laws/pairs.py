@@ -139,18 +139,18 @@ def pair(name: str) -> Pair:
     known = _known()
     if name not in known["pairs"]:
         raise ModelError(f"a pair '{name}'", f"known are {', '.join(known['pairs'])}", "choose one of them").of("name")
-    told = known["pairs"][name]
+    friction = known["pairs"][name]
     materials = [known["materials"][word] for word in name.removeprefix("wet ").split(" on ")]
     gives = [_compliance(material) for material in materials]
     shear = sum(along for _, along in gives)
     return Pair(
         name,
-        told["kinetic"],
-        told["static"],
+        friction["kinetic"],
+        friction["static"],
         1 / sum(across for across, _ in gives),
         1 / shear,
         sum(material["loss"] * along for material, (_, along) in zip(materials, gives, strict=True)) / shear,
-        (told["source"], *dict.fromkeys(material["source"] for material in materials)),
+        (friction["source"], *dict.fromkeys(material["source"] for material in materials)),
     )
 
 

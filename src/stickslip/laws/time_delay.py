@@ -106,11 +106,11 @@ class TimeDelay(Rigid):
 
         friction = lifted(curve(symbol(DELAYED)))
         level = self._held(friction, low, high)
-        held = (Exit({"f": 1.0, "level": -1.0}, named("forward")), Exit({"f": -1.0, "level": -1.0}, named("back")))
+        stops = (Exit({"f": 1.0, "level": -1.0}, named("forward")), Exit({"f": -1.0, "level": -1.0}, named("back")))
         stopped = {side: (Exit({"v": -float(side)}, named("stuck")),) for side in (-1, 1)}
         for name, kind, side, force, exits in (
             ("back", "slip", -1, -friction, stopped[-1]),
-            ("stuck", "stick", 0, None, held),
+            ("stuck", "stick", 0, None, stops),
             ("forward", "slip", 1, friction, stopped[1]),
         ):
             slower = (Exit({DELAYED: -1.0, "1": low}, named(name, number - 1)),) * (number > 0)

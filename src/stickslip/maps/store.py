@@ -53,7 +53,7 @@ class Store(AbstractContextManager["Store"]):
             lock = locked(self.path) if self.path.is_dir() else None
         if lock is None:
             raise self._written_by_another() if self.path.is_dir() else self._not_ours()
-        with lock as held:
+        with lock as ours:
             self._place = self.path.stat()
             if not self._new:
                 self._require_own()
@@ -61,7 +61,7 @@ class Store(AbstractContextManager["Store"]):
                     self._mend(layout)
             self._group = self._zarr.open_group(self.path, mode="r+")
             self._done[:] = [self._stands(number) for number in plan.blocks]
-            self._lock = held.pop_all()
+            self._lock = ours.pop_all()
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
@@ -120,10 +120,10 @@ class Store(AbstractContextManager["Store"]):
         """Every file of the group before there is a block, by its place in it: the plan decides them all."""
         from zarr.storage import MemoryStore
 
-        plan, held = self.plan, dict[str, Any]()
+        plan, files = self.plan, dict[str, Any]()
         frame = assemble(plan, {})
         del frame.attrs["status"]  # the seals say it, at any moment
-        memory = MemoryStore(held)
+        memory = MemoryStore(files)
         with warnings.catch_warnings():
             warnings.filterwarnings("ignore", message=".*Zarr V3 specification.*")  # axes of words
             frame.to_zarr(memory, zarr_format=3, consolidated=False)
@@ -132,7 +132,7 @@ class Store(AbstractContextManager["Store"]):
             array = self._array(group, name, plan.shape, plan.chunks, variable.dtype, variable.fill, plan.dims)
             array.attrs.update({"units": variable.unit, "long_name": variable.words, **variable.attributes})
         self._array(group, DONE, (len(plan.blocks),), (1,), np.uint64, 0, ("block",))
-        return {name: contents.to_bytes() for name, contents in held.items()}
+        return {name: contents.to_bytes() for name, contents in files.items()}
 
     def _lay_out(self, layout: Mapping[str, bytes]) -> bool:
         """Put the group without blocks in its place; whether nobody else did meanwhile."""

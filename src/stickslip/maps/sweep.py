@@ -272,13 +272,13 @@ def first_of(plan: Plan) -> tuple[System, dict[str, float | str]]:
 
 def sensible(keep: Keep, plan: Plan) -> Keep:
     """`keep`, which refuses a law whose modes change for ever without time: the first motion that failed tells."""
-    asked = False
+    is_asked = False
 
     def kept(number: int, arrays: Arrays, events: Arrays | None) -> None:
-        nonlocal asked
+        nonlocal is_asked
         failed = np.flatnonzero(arrays["status"] == FAILED)
-        if len(failed) and not asked:
-            asked = True
+        if len(failed) and not is_asked:
+            is_asked = True
             require_end(plan, plan.points(number)[failed[0]])
         keep(number, arrays, events)
 

@@ -351,7 +351,7 @@ def _count(i, count, motion, clock, settled, given, sums):
     )
     look, paths, one = given.look, given.wants[PATHS] == 1, given.wants[ONE]
     n, tones = state.shape[0], linear.tones
-    held = motion.work[6, :n]
+    moving = motion.work[6, :n]
     if count == 0:
         return
     place, after, speed = _read(look.gap[i], pieces.states[0], tones, pieces.offsets[0]) if paths else 0.0, 0.0, 0.0
@@ -372,17 +372,17 @@ def _count(i, count, motion, clock, settled, given, sums):
             varies = look.works[m] == VARIES
             if look.inner[m] or varies or not first:
                 for k in range(n):
-                    held[k] = pieces.states[p, k]
-                set_tones(tones, held, offset, period)
+                    moving[k] = pieces.states[p, k]
+                set_tones(tones, moving, offset, period)
                 if not first:
-                    follow(linear, m, held, -begun, motion.work[7:10, :n])
-                    place = _read(look.gap[i], held, tones, offset - begun)
-            sums[REACH] = max(sums[REACH], abs(x), abs(pieces.states[p, 0] if first else held[0]))
+                    follow(linear, m, moving, -begun, motion.work[7:10, :n])
+                    place = _read(look.gap[i], moving, tones, offset - begun)
+            sums[REACH] = max(sums[REACH], abs(x), abs(pieces.states[p, 0] if first else moving[0]))
             if look.works[m] == CONSTANT:
                 sums[WORK] += look.friction[i, m, one] * (after - place)
             if look.inner[m] or varies:
                 friction, slip = look.friction[i, m], look.slip[i]
-                _inside(linear, m, held, span, look.inner[m], varies, friction, slip, sums, motion.work)
+                _inside(linear, m, moving, span, look.inner[m], varies, friction, slip, sums, motion.work)
         place = after
 
 
@@ -434,18 +434,18 @@ def _skip(clock, marks, settled, until, sums):
 
 
 @compiled(**OPTIONS)
-def _inside(linear, mode, held, span, turns, varies, friction, slip, sums, work):
+def _inside(linear, mode, moving, span, turns, varies, friction, slip, sums, work):
     """The farthest turn within a piece, and the work of a friction that changes in it, cell by cell."""
-    flow, n = linear.flow[mode], held.shape[0]
+    flow, n = linear.flow[mode], moving.shape[0]
     scratch, here, tail = work[7:9, :n], work[9, :n], work[10, :n]
     steps = 1 + int(2.0 * span / linear.cell[mode])
     step = span / steps
     for _ in range(steps):
-        before, reached = held[1], 0.0
+        before, reached = moving[1], 0.0
         if varies:
             for j in range(len(POINTS)):
                 for k in range(n):
-                    here[k], tail[k] = held[k], 0.0
+                    here[k], tail[k] = moving[k], 0.0
                 advance(flow, here, tail, POINTS[j] * step, scratch)
                 force, speed = 0.0, 0.0
                 for k in range(n):
@@ -453,14 +453,14 @@ def _inside(linear, mode, held, span, turns, varies, friction, slip, sums, work)
                     speed += slip[k] * here[k]
                 sums[WORK] += WEIGHTS[j] * step * force * speed
         for k in range(n):
-            here[k], tail[k] = held[k], 0.0
+            here[k], tail[k] = moving[k], 0.0
         advance(flow, here, tail, step, scratch)
         if turns and before * here[1] < 0.0:
             near = step * before / (before - here[1])
             after, tip = here[1], work[11, :n]
             for _ in range(5):
                 for k in range(n):
-                    tip[k], tail[k] = held[k], 0.0
+                    tip[k], tail[k] = moving[k], 0.0
                 advance(flow, tip, tail, near, scratch)
                 rate = 0.0
                 for k in range(n):
@@ -471,7 +471,7 @@ def _inside(linear, mode, held, span, turns, varies, friction, slip, sums, work)
             here[1] = after
         sums[REACH] = max(sums[REACH], reached, abs(here[0]) if turns else 0.0)
         for k in range(n):
-            held[k] = here[k]
+            moving[k] = here[k]
 
 
 @compiled(**OPTIONS, nogil=True)

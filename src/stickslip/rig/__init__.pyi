@@ -9,6 +9,7 @@ from stickslip.rig.settings import RigSettings as RigSettings
 from stickslip.rig.settings import ShakerSettings as ShakerSettings
 from stickslip.rig.settings import read_rig as read_rig
 from stickslip.rig.settings import rig_settings as rig_settings
+from stickslip.rig.settings import rig_toml as rig_toml
 from stickslip.rig.shaker import Shaker as Shaker
 
 __all__: list[str]

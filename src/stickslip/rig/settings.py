@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import fnmatch
+import json
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -257,6 +258,42 @@ class RigSettings(BaseModel):
             return None
         first, last = self.rows.split(":")
         return int(first or 0), int(last) if last.strip() else None
+
+
+def rig_toml(settings: Mapping[str, Any]) -> Iterator[str]:
+    """The lines of a rig.toml: plain values first, then the tables.
+
+    Parameters
+    ----------
+    settings : mapping
+        Keys as in :class:`RigSettings`.
+
+    Yields
+    ------
+    str
+
+    Examples
+    --------
+    >>> print(*rig_toml({"mass": "2.42 kg", "channels": {"x": "plate [mm]"}}), sep="\\n")
+    mass = "2.42 kg"
+    <BLANKLINE>
+    [channels]
+    "x" = "plate [mm]"
+    """
+    tables = {key: value for key, value in settings.items() if isinstance(value, Mapping)}
+    yield from (f"{key} = {_toml_value(value)}" for key, value in settings.items() if key not in tables)
+    for key, table in tables.items():
+        plain = {name: value for name, value in table.items() if not isinstance(value, Mapping)}
+        if plain:
+            entries = (f"{json.dumps(name)} = {_toml_value(value)}" for name, value in plain.items())
+            yield from ("", f"[{key}]", *entries)
+        for name in table.keys() - plain.keys():
+            inner = (f"{word} = {_toml_value(value)}" for word, value in table[name].items() if value is not None)
+            yield from ("", f"[{key}.{json.dumps(name)}]", *inner)
+
+
+def _toml_value(value: Any) -> str:
+    return json.dumps(list(value) if isinstance(value, tuple) else value, ensure_ascii=False)
 
 
 def rig_settings(values: Mapping[str, Any], *, source: str = "the settings", lines: Sequence[str] = ()) -> RigSettings:

@@ -70,8 +70,8 @@ def keep_band(
         )
     kind = "bandpass" if len(edges) == 2 else "highpass" if high is None else "lowpass"
     between = " to ".join(f"{edge:g}" for edge in edges)
-    outcome = {"bandpass": f"kept {between} Hz", "highpass": f"kept above {low:g} Hz" if low else "",
-             "lowpass": f"kept below {high:g} Hz" if high else ""}[kind]  # fmt: skip
+    below, above = (f"kept below {high:g} Hz" if high else ""), (f"kept above {low:g} Hz" if low else "")
+    outcome = {"bandpass": f"kept {between} Hz", "highpass": above, "lowpass": below}[kind]
     return _filtered(record, channels, edges, kind, Step("keep_band", {"low": low, "high": high}, outcome))
 
 

@@ -195,9 +195,9 @@ class _Builder:
         known[:, FACE], known[:, FACE_RATE], known[:, FACE_ACCELERATION] = self.face
         return known
 
-    def _faces(self, held: Sequence[int], order: int) -> Rows:
+    def _faces(self, stuck: Sequence[int], order: int) -> Rows:
         """The counter-face's motion under the contacts that hold: (B, held, N)."""
-        carried = np.array([self.contacts[c].carried for c in held]).reshape(-1, 1)
+        carried = np.array([self.contacts[c].carried for c in stuck]).reshape(-1, 1)
         return np.asarray(carried * self.face[order][:, None])
 
     def motion_in(self, j: int) -> tuple[Rows, Rows, list[Rows]]:
@@ -208,14 +208,14 @@ class _Builder:
         if any(part.kind == "landing" for part in parts):  # no time passes: a contact has yet to find its mode
             return np.zeros_like(self.signals), friction, known
         flow, force = self.signals.copy(), self.push.copy()
-        n, held = self.degrees, [c for c, part in enumerate(parts) if part.friction is None]
+        n, stuck = self.degrees, [c for c, part in enumerate(parts) if part.friction is None]
         for c, (part, contact) in enumerate(zip(parts, self.contacts, strict=True)):
             if contact.normal is not None and part.kind != "flight":
                 force -= contact.normal[:, None] * known[c][:, None, 2]
             if part.friction is not None:
                 friction[:, c] = (self.forms[c].modes[numbers[c]][:, :1] @ known[c])[:, 0]
                 force -= contact.tangent[:, None] * friction[:, None, c]
-        flow[:, :n], flow[:, n : 2 * n], friction[:, held] = self._moving(force, parts, held)
+        flow[:, :n], flow[:, n : 2 * n], friction[:, stuck] = self._moving(force, parts, stuck)
         rates = [self.forms[c].modes[numbers[c]][:, 1 : 1 + len(own)] for c, own in enumerate(self.memory)]
         follows = any(rate[:, :, [FRICTION_RATE, LOAD_RATE]].any() for rate in rates)
         for c, own in enumerate(known):
@@ -228,14 +228,14 @@ class _Builder:
             own[:, FRICTION_RATE], own[:, LOAD_RATE] = (_through(own[:, k], flow) for k in (FRICTION, 2))
         return flow, friction, known
 
-    def _moving(self, force: Rows, parts: Sequence[Mode], held: list[int]) -> tuple[Rows, Rows, Rows]:
+    def _moving(self, force: Rows, parts: Sequence[Mode], stuck: list[int]) -> tuple[Rows, Rows, Rows]:
         """Velocity and acceleration of every mass, and the friction of the contacts that hold."""
-        if not held:
+        if not stuck:
             return self.speed, self._accelerated(force), np.zeros((self.count, 0, self.size))
-        rows = np.array([self.contacts[c].tangent for c in held], dtype=self.digits)
-        speed = self._faces(held, 1) + np.outer([parts[c].speed for c in held], self.one)
-        acceleration = self._faces(held, 2)
-        if len(held) == self.degrees:  # nothing is free: the contacts take what the masses' forced motion leaves
+        rows = np.array([self.contacts[c].tangent for c in stuck], dtype=self.digits)
+        speed = self._faces(stuck, 1) + np.outer([parts[c].speed for c in stuck], self.one)
+        acceleration = self._faces(stuck, 2)
+        if len(stuck) == self.degrees:  # nothing is free: the contacts take what the masses' forced motion leaves
             spread = rows.T @ _solved(rows @ rows.T, np.eye(len(rows)))
             forced = spread @ acceleration
             return spread @ speed, forced, spread.T @ (force - self.mass @ forced)
@@ -270,11 +270,11 @@ class _Builder:
                 place = self.memory[c][self.forms[c].memory.index(name)]
                 carry[:, place] = rows[c][:, taken[c]]
                 taken[c] += 1
-            held = self._held(j, e)
-            if held:
-                if held not in self.still:
-                    self.still[held] = self._stilled(dict(held))
-                out[:, e] = self.still[held] if carry is None else self.still[held] @ carry
+            stuck = self._held(j, e)
+            if stuck:
+                if stuck not in self.still:
+                    self.still[stuck] = self._stilled(dict(stuck))
+                out[:, e] = self.still[stuck] if carry is None else self.still[stuck] @ carry
             elif carry is not None:
                 out[:, e] = carry
 
@@ -283,19 +283,19 @@ class _Builder:
         joint = self.joints[j]
         c, number = joint.exits[e]
         parts, following = self.parts[j], self.parts[joint.targets[e]]
-        held = {k: part.speed for k, part in enumerate(following) if part.friction is None}
+        stuck = {k: part.speed for k, part in enumerate(following) if part.friction is None}
         if self.degrees > 1:  # one mass that is held has the counter-face's motion to the last digit
-            held = {k: part.speed for k, part in enumerate(parts) if part.friction is None} | held
+            stuck = {k: part.speed for k, part in enumerate(parts) if part.friction is None} | stuck
         # an exit at zero velocity leaves exactly none: rounding must not decide what follows
         if set(parts[c].exits[number].quantity) == {"v"} and parts[c].kind != "landing":
-            held.setdefault(c, 0.0)
-        return tuple(sorted(held.items()))
+            stuck.setdefault(c, 0.0)
+        return tuple(sorted(stuck.items()))
 
-    def _stilled(self, held: Mapping[int, float]) -> Rows:
+    def _stilled(self, stuck: Mapping[int, float]) -> Rows:
         """The state with the velocities of some contacts told, none where they hold."""
         columns = {
             c: (self.contacts[c].tangent, self.contacts[c].carried * self.face[1] + speed * self.one)
-            for c, speed in held.items()
+            for c, speed in stuck.items()
         }
         return np.asarray(stilled(np.tile(self.unit, (self.count, 1, 1)), self.degrees, columns))
 

@@ -26,7 +26,7 @@ class Scratch(NamedTuple):
     each entry is measured by, the coefficients of an exit with the noise of each, and room for the fast path."""
 
     pair: Array
-    held: Array
+    moving: Array
     tail: Array
     scale: Array
     c: Array
@@ -196,7 +196,7 @@ def begin(linear, mode, state, span, faded, work):
 
 @compiled(**OPTIONS)
 def next_exit(linear, mode, opened, armed, span, work):
-    """The first exit within `span` [s] of the cell ahead of the state `work.held`: (time, exit, armed).
+    """The first exit within `span` [s] of the cell ahead of the state `work.moving`: (time, exit, armed).
 
     The exit is -1 where there is none, UNTOLD where that is not proved. `opened` is true in the first cell of a piece,
     where roots at the very start are the way in, not the way out. `armed` has a bit for each exit that has been below
@@ -207,7 +207,7 @@ def next_exit(linear, mode, opened, armed, span, work):
     best, which = NONE, -1
     count = c.shape[0]
     for e in range(linear.first[mode], linear.first[mode + 1]):
-        expand(linear.series[e], work.held, work.scale, cell, c, noise)
+        expand(linear.series[e], work.moving, work.scale, cell, c, noise)
         low = opening_order(c, noise, count)
         if low == count:
             continue  # on the tie, and staying there
@@ -240,20 +240,20 @@ def next_exit(linear, mode, opened, armed, span, work):
 def _polished(linear, mode, leaving, dt, work):
     """Newton's last step, to where the state itself, not the polynomial, has the exit at zero: its length [s]."""
     g, d = 0.0, 0.0
-    for j in range(work.held.shape[0]):
-        g += linear.series[leaving, 0, j] * work.held[j]
-        d += linear.series[leaving, 1, j] * work.held[j]
+    for j in range(work.moving.shape[0]):
+        g += linear.series[leaving, 0, j] * work.moving[j]
+        d += linear.series[leaving, 1, j] * work.moving[j]
     if not (d > 0.0 and abs(g) < 1e-9 * d * min(linear.cell[mode], dt)):
         return 0.0
-    advance(linear.flow[mode], work.held, work.tail, -g / d, work.pair)
+    advance(linear.flow[mode], work.moving, work.tail, -g / d, work.pair)
     return -g / d
 
 
 @compiled(**OPTIONS)
 def _crossed(model, mode, clock, left, patience, work):
-    """Take the state `work.held` through a mode until an exit ends it, the time that is left is over, or `patience`
+    """Take the state `work.moving` through a mode until an exit ends it, the time that is left is over, or `patience`
     cells are gone through: the time [s], the exit (-1: none) and the cells."""
-    linear, held, tail = model.linear, work.held, work.tail
+    linear, moving, tail = model.linear, work.moving, work.tail
     cell, gone, armed, cells = linear.cell[mode], 0.0, np.int64(0), 0
     while True:
         span = left - gone
@@ -261,21 +261,21 @@ def _crossed(model, mode, clock, left, patience, work):
         if leaving == UNTOLD:
             return gone, leaving, cells
         if leaving >= 0:
-            advance(linear.flow[mode], held, tail, dt, work.pair)
+            advance(linear.flow[mode], moving, tail, dt, work.pair)
             gone += dt
             gone += _polished(linear, mode, leaving, dt, work)
             return gone, leaving, cells
         if span <= cell:
-            advance(linear.flow[mode], held, tail, span, work.pair)
+            advance(linear.flow[mode], moving, tail, span, work.pair)
             return left, leaving, cells
         # in twice the digits: a long piece has thousands of cells
-        leap(linear.hop[mode], held, tail, work.pair)
-        for i in range(held.shape[0]):
-            work.scale[i] = max(work.scale[i], abs(held[i]))
+        leap(linear.hop[mode], moving, tail, work.pair)
+        for i in range(moving.shape[0]):
+            work.scale[i] = max(work.scale[i], abs(moving[i]))
         cells += 1
         gone = cells * cell
         if linear.tones.shape[0] == 1 and model.period < math.inf:
-            set_tones(linear.tones, held, clock.time + gone, model.period)
+            set_tones(linear.tones, moving, clock.time + gone, model.period)
             tail[int(linear.tones[0, 0])], tail[int(linear.tones[0, 1])] = 0.0, 0.0
         if gone > 2.0 * model.period and _rests(linear.flow[mode], linear.tones):
             return left, leaving, cells  # held through two periods of the drive: held for good
@@ -316,7 +316,7 @@ def march(model, clock, state, mode, limit, past, out, work, patience):
     """
     n, linear, spent = state.shape[0], model.linear, 0
     count = np.int64(0)  # a plain 0 is a type of its own to numba: what it is handed to would be compiled once more
-    room, held = parts_of(work, n), parts_of(work, n).held
+    room, moving = parts_of(work, n), parts_of(work, n).moving
     capacity, quick = out.laps.shape[0], model.fast.nodes.shape[0] > 0
     while True:
         if quick:
@@ -335,7 +335,7 @@ def march(model, clock, state, mode, limit, past, out, work, patience):
         for i in range(out.states.shape[1]):
             out.states[count, i] = state[i]
         for i in range(n):
-            held[i], room.tail[i] = state[i], 0.0
+            moving[i], room.tail[i] = state[i], 0.0
         gone, leaving, cells = _crossed(model, mode, clock, left, patience, room)
         spent += cells
         if leaving == UNTOLD:
@@ -349,7 +349,7 @@ def march(model, clock, state, mode, limit, past, out, work, patience):
             new_lap(past)
         clock = now
         for i in range(n):
-            state[i] = held[i]
+            state[i] = moving[i]
         if over:
             set_tones(linear.tones, state, clock.time, model.period)
             return DONE, count, mode, clock
@@ -357,9 +357,9 @@ def march(model, clock, state, mode, limit, past, out, work, patience):
             return FULL, count, mode, clock
         # the event: carry the state over, and take what is due at once
         set_tones(linear.tones, state, clock.time, model.period)
-        multiply(linear.reset[leaving], state, held)
+        multiply(linear.reset[leaving], state, moving)
         for i in range(n):
-            state[i] = held[i]
+            state[i] = moving[i]
         measure(linear.tones, state, room.scale, 0.5)
         came = linear.target[leaving]
         mode = settle(linear, came, state, min(linear.cell[came], left), room)
@@ -473,7 +473,7 @@ def sample(linear, begin, modes, states, times, rows, piece, out, work, c):
         Scratch.
     """
     n, last = states.shape[1], begin.shape[0] - 1
-    scratch, held, tail = work[:2], work[2], work[3]
+    scratch, moving, tail = work[:2], work[2], work[3]
     j, count, known = -1, 0, 0
     for t in range(times.shape[0]):
         if j < 0 or (j < last and begin[j + 1] <= times[t]):
@@ -482,17 +482,17 @@ def sample(linear, begin, modes, states, times, rows, piece, out, work, c):
                 j += 1
             count, known = 0, 0
             for i in range(n):
-                held[i], tail[i] = states[j, i], 0.0
+                moving[i], tail[i] = states[j, i], 0.0
         mode = modes[j]
         cell = linear.cell[mode]
         time = times[t] - begin[j]
         while time - count * cell > cell:
-            leap(linear.hop[mode], held, tail, scratch)
+            leap(linear.hop[mode], moving, tail, scratch)
             count += 1
             known = 0
         unit = cell if cell < math.inf else 1.0
         if known == 0:
-            known = outputs(linear.flow[mode], held, tail, rows[mode], unit, c, scratch)
+            known = outputs(linear.flow[mode], moving, tail, rows[mode], unit, c, scratch)
         share = (time - count * cell if count else time) / unit
         piece[t] = j
         for r in range(rows.shape[1]):

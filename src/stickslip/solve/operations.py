@@ -81,7 +81,7 @@ def _through(matrix: Array, forms: Sequence[Form]) -> list[Form]:
     return [combined(zip(map(float, row), forms, strict=True)) for row in matrix]
 
 
-def stilled(unit: Any, degrees: int, held: Mapping[int, tuple[Array, Any]]) -> Any:
+def stilled(unit: Any, degrees: int, stuck: Mapping[int, tuple[Array, Any]]) -> Any:
     """The state with the velocities of some contacts told, but for the rounding of its own terms: (B, N, N).
 
     Of each contact its direction and, as rows (B, N), the velocity that it is left. One degree of freedom after the
@@ -89,8 +89,8 @@ def stilled(unit: Any, degrees: int, held: Mapping[int, tuple[Array, Any]]) -> A
     in the rounding of velocities that a contact does not see, and rounding must not decide what follows.
     """
     still, speeds = unit.copy(), slice(degrees, 2 * degrees)
-    for c in sorted(held, key=lambda c: int(np.count_nonzero(held[c][0]))):
-        tangent, speed = held[c]
+    for c in sorted(stuck, key=lambda c: int(np.count_nonzero(stuck[c][0]))):
+        tangent, speed = stuck[c]
         left = speed - tangent @ still[:, speeds]
         p = degrees + int(np.argmax(np.abs(left[0, speeds])))
         if abs(left[0, p]) > 1e-12 * np.max(np.abs(tangent)):

@@ -322,7 +322,7 @@ def closed_orbit(system: System, table: Table, state: Array, mode: int, order: i
             break  # Newton's method left what moves; the motion itself goes on
         end, after = orbit.end()
         size = extent(orbit)
-        if point is not state and all(table.modes[held].friction is None for held in orbit.modes):
+        if point is not state and all(table.modes[mode].friction is None for mode in orbit.modes):
             break  # Newton's method stepped to where the contact would rest; the motion itself does not
         gap = (end - point)[: table.physical]
         relative = float(np.max(np.abs(gap) / np.maximum(size, 1e-300), initial=0.0, where=size > 0))

@@ -250,5 +250,5 @@ def _deeds(inner: Array) -> Array:
     unit = np.eye(inner.shape[-1])[1 : 1 + inner.shape[-2]]
     stopped = unit.copy()
     stopped[0] = 0.0
-    kept, held = (np.all(inner == like, axis=(-2, -1)) for like in (unit, stopped))
-    return np.where(kept, KEEPS, np.where(held, STOPS, CARRIES))
+    kept, stops = (np.all(inner == like, axis=(-2, -1)) for like in (unit, stopped))
+    return np.where(kept, KEEPS, np.where(stops, STOPS, CARRIES))

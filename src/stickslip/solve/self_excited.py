@@ -347,7 +347,7 @@ def _returns(motion: Trajectory, shortest: float) -> list[tuple[float, float]]:
 def _sliding(motion: Trajectory) -> float:
     """The last instant in the middle of a piece in which no contact holds."""
     kinds = [mode.kind for mode in motion.table.modes]
-    held = np.array(["stick" in kind or "landing" in kind for kind in kinds])
-    free = np.flatnonzero(~held[motion.modes] & (motion.durations > 0))
+    stuck = np.array(["stick" in kind or "landing" in kind for kind in kinds])
+    free = np.flatnonzero(~stuck[motion.modes] & (motion.durations > 0))
     piece = int(free[-1]) if len(free) else len(motion.modes) - 1
     return float(motion.starts[piece] + motion.durations[piece] / 2)

@@ -63,10 +63,8 @@ class Sensitivity:
         out = np.empty((count, len(times)))
         forms = np.ascontiguousarray(run.rows(name)[:, 0]), self.rows[name]
         series = np.empty((DEGREE + 1, 1 + count))
-        sample_tangents(
-            run.table.linear, self.flow, (run.starts, run.modes, run.states, self.begun), times, forms, out, series,
-            np.empty((3, 1 + count, size)),
-        )  # fmt: skip
+        pieces, work = (run.starts, run.modes, run.states, self.begun), np.empty((3, 1 + count, size))
+        sample_tangents(run.table.linear, self.flow, pieces, times, forms, out, series, work)
         return out
 
     def jumps(self, name: str) -> Array:
@@ -123,10 +121,8 @@ def sensitivity(
     begun[0, first:last, signals] += np.outer(scaled, run.states[0, signals])
     for k, (name, unit) in enumerate(starts.items(), start=last):
         begun[0, k, table.names.index(name)] = unit
-    carry_parameters(
-        table.linear, changes.of_events, table.leap, (run.modes, run.states, run.durations, run.exits),
-        (knotted, grown), begun, later, np.empty((4, 1 + count, size)),
-    )  # fmt: skip
+    pieces, work = (run.modes, run.states, run.durations, run.exits), np.empty((4, 1 + count, size))
+    carry_parameters(table.linear, changes.of_events, table.leap, pieces, (knotted, grown), begun, later, work)
     return Sensitivity(run, changes.flow, changes.rows, begun, later)
 
 
@@ -238,7 +234,7 @@ def carry_parameters(linear, changes, leap, pieces, signals, begun, later, work)
             speed = 0.0
             for i in range(n):
                 speed += linear.series[e, 0, i] * spare[0, i]
-            held = leap[linear.target[e], following]
+            passed = leap[linear.target[e], following]
             for p in range(count):
                 late = 0.0
                 for i in range(n):
@@ -253,7 +249,7 @@ def carry_parameters(linear, changes, leap, pieces, signals, begun, later, work)
                 multiply(linear.reset[e], both[1 + p], work[2, 0])
                 for i in range(n):
                     work[2, 0, i] += work[1, 1, i]
-                multiply(held, work[2, 0], both[1 + p])
+                multiply(passed, work[2, 0], both[1 + p])
                 multiply(passage[p, linear.target[e], following], work[1, 0], work[2, 1])
                 multiply(linear.flow[following], states[j + 1], work[1, 1])
                 for i in range(n):
@@ -271,7 +267,7 @@ def sample_tangents(linear, change, pieces, times, forms, out, series, work):
     begin, modes, states, begun = pieces
     rows, moved = forms
     count, n, last = begun.shape[1], states.shape[1], begin.shape[0] - 1
-    held, spare = work[0], work[1:]
+    both, spare = work[0], work[1:]
     j, known, cells = -1, 0, 0
     for t in range(times.shape[0]):
         if j < 0 or (j < last and begin[j + 1] <= times[t]):
@@ -280,20 +276,20 @@ def sample_tangents(linear, change, pieces, times, forms, out, series, work):
                 j += 1
             known, cells = 0, 0
             for i in range(n):
-                held[0, i] = states[j, i]
+                both[0, i] = states[j, i]
                 for p in range(count):
-                    held[1 + p, i] = begun[j, p, i]
+                    both[1 + p, i] = begun[j, p, i]
         mode = modes[j]
         cell = linear.cell[mode]
         unit = cell if cell < np.inf else 1.0
         time = times[t] - begin[j]
         while cell < np.inf and time - cells * cell > cell:
-            grow(linear.flow[mode], change[:, mode], cell, held, spare)
+            grow(linear.flow[mode], change[:, mode], cell, both, spare)
             cells += 1
             known = 0
         if known == 0:
             known = _polynomial(
-                linear.flow[mode], change[:, mode], unit, held, rows[mode], moved[:, mode], series, spare
+                linear.flow[mode], change[:, mode], unit, both, rows[mode], moved[:, mode], series, spare
             )
         at = (time - cells * cell if cells else time) / unit
         for p in range(count):
@@ -304,12 +300,12 @@ def sample_tangents(linear, change, pieces, times, forms, out, series, work):
 
 
 @compiled(**OPTIONS)
-def _polynomial(flow, change, cell, held, row, moved, series, term):
+def _polynomial(flow, change, cell, both, row, moved, series, term):
     """Taylor coefficients of a form's derivatives over a cell; returns how many there are."""
-    count, n = held.shape
+    count, n = both.shape
     for p in range(count):
         for i in range(n):
-            term[0, p, i] = held[p, i]
+            term[0, p, i] = both[p, i]
     for k in range(series.shape[0]):
         for p in range(1, count):
             total = 0.0
@@ -325,7 +321,7 @@ def _polynomial(flow, change, cell, held, row, moved, series, term):
                     if p > 0:
                         total += change[p - 1, i, j] * term[0, 0, j]
                 term[1, p, i] = total * scale
-                small = small and held[p, i] + term[1, p, i] == held[p, i]
+                small = small and both[p, i] + term[1, p, i] == both[p, i]
         for p in range(count):
             for i in range(n):
                 term[0, p, i] = term[1, p, i]

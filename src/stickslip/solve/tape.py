@@ -116,9 +116,9 @@ class Tape:
         parts = own.parts if isinstance(own, JointMode) else (own,)
         contacts = self.system.contacts if isinstance(self.system, Structure) else ()
         tangents = [c.tangent for c in contacts] if contacts else [np.ones(1)]
-        held = np.array([row for row, part in zip(tangents, parts, strict=True) if part.friction is None])
-        if len(held):
-            free[n : 2 * n, n : 2 * n] -= np.linalg.pinv(held) @ held
+        stuck = np.array([row for row, part in zip(tangents, parts, strict=True) if part.friction is None])
+        if len(stuck):
+            free[n : 2 * n, n : 2 * n] -= np.linalg.pinv(stuck) @ stuck
         return free
 
     def index(self, mode: str) -> int:
@@ -323,18 +323,18 @@ class _Builder:
             force = [
                 combined([(1.0, force[i]), (-contact.tangent[i], friction[c]), (-pressed[i], load)]) for i in range(n)
             ]
-        held = [c for c, part in enumerate(parts) if part.friction is None]
-        bound = self.bound(held)
-        for c, form in zip(held, bound.friction(force, [self.faced(c, 2) for c in held]), strict=True):
+        stuck = [c for c, part in enumerate(parts) if part.friction is None]
+        bound = self.bound(stuck)
+        for c, form in zip(stuck, bound.friction(force, [self.faced(c, 2) for c in stuck]), strict=True):
             friction[c] = form
         known = [self.knows(c, part, friction[c], moving) for c, part in enumerate(parts)]
         speeds = [
             combined([(1.0, self.faced(c, 1)), (1.0, ({}, parts[c].speed))]
                      + [(1.0, known[c]["v"])] * (getattr(parts[c], "creep", None) is not None))
-            for c in held
+            for c in stuck
         ]  # fmt: skip
         rates = dict(enumerate(bound.speed(speeds)))
-        rates |= {n + i: form for i, form in enumerate(bound.acceleration(force, [self.faced(c, 2) for c in held]))}
+        rates |= {n + i: form for i, form in enumerate(bound.acceleration(force, [self.faced(c, 2) for c in stuck]))}
         if self.imposed:  # whatever acts on it
             rates[n] = self.imposed[2]
         for c, (part, contact) in enumerate(zip(parts, self.contacts, strict=True)):
@@ -351,10 +351,10 @@ class _Builder:
         """The counter-face's motion under a contact."""
         return combined([(self.contacts[c].contact.carried, self.face[order])])
 
-    def bound(self, held: Sequence[int]) -> Bound:
+    def bound(self, stuck: Sequence[int]) -> Bound:
         """How the masses move that some contacts hold."""
         return Bound(
-            self.mass, self.inverse, np.array([self.contacts[c].tangent for c in held]).reshape(-1, self.degrees)
+            self.mass, self.inverse, np.array([self.contacts[c].tangent for c in stuck]).reshape(-1, self.degrees)
         )
 
     def knows(self, c: int, part: Any, friction: Form, moving: Operations) -> dict[str, Form]:
@@ -501,12 +501,12 @@ class _Builder:
             for name, row in exit_.reset.items():
                 j_ = contact.memory[list(contact.law.memory).index(name)]
                 reset[e, j_] = self.row(self.remade(contact, name, row, contact.symbols))
-            held = {} if math.isnan(speeds[e]) else {c: speeds[e]}
+            stuck = {} if math.isnan(speeds[e]) else {c: speeds[e]}
             if self.degrees > 1:  # one mass that is held has the counter-face's motion to the last digit
                 following = {k: part.speed for k, part in enumerate(parts[t]) if part.friction is None}
                 before = {k: part.speed for k, part in enumerate(parts[j]) if part.friction is None}
-                held = before | following | held
-            reset[e] = self.stilled(held) @ reset[e]
+                stuck = before | following | stuck
+            reset[e] = self.stilled(stuck) @ reset[e]
         return Exits(
             node=np.array([node for own in quantities for node, _ in own], dtype=np.int64),
             factor=np.array([factor for own in quantities for _, factor in own], dtype=np.float64),
@@ -518,11 +518,12 @@ class _Builder:
             first=np.cumsum([0, *(len(joint.exits) for joint in joints)]),
         )
 
-    def stilled(self, held: Mapping[int, float]) -> Array:
+    def stilled(self, stuck: Mapping[int, float]) -> Array:
         """The state with the velocities of some contacts told, and no more of them left but for rounding."""
         one = self.row(({}, 1.0))
         columns = {
-            c: (self.contacts[c].tangent, (self.row(self.faced(c, 1)) + speed * one)[None]) for c, speed in held.items()
+            c: (self.contacts[c].tangent, (self.row(self.faced(c, 1)) + speed * one)[None])
+            for c, speed in stuck.items()
         }
         return np.asarray(stilled(np.eye(self.size)[None], self.degrees, columns)[0])
 

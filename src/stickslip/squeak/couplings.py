@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stickslip.errors import EstimateError
-from stickslip.estimate import NORMAL_95, Doubt, Estimate, Result, Status, plain
+from stickslip.estimate import NORMAL_95, Doubt, Estimate, Plain, Result, Status, plain
 from stickslip.parameters import finite
 from stickslip.record.record import Record
 from stickslip.squeak.bursts import find_squeaks
@@ -92,7 +92,7 @@ class Pair:
 
 
 @dataclass(frozen=True)
-class Coupling(Result):
+class Coupling(Result, Plain):
     """How the motions of a squeak hang together.
 
     Attributes
@@ -137,10 +137,6 @@ class Coupling(Result):
             known = ", ".join(f"{pair.first} and {pair.second}" for pair in self.pairs)
             raise EstimateError(f"no pair of {first} and {second}", f"there are {known}", "choose one of them")
         return match
-
-    def to_dict(self) -> dict[str, Any]:
-        """Plain data for JSON."""
-        return dict(plain(vars(self)))
 
     def __repr__(self) -> str:
         rows = [

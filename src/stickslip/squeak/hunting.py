@@ -45,8 +45,8 @@ class _Integrating(Rigid):
 
     def _exit(self, way: Exit) -> Exit:
         """What holds at rest is friction and the integral's torque together."""
-        held = way.quantity.get("f", 0.0)
-        return replace(way, quantity={**way.quantity, "integral": -held * self.gain}) if held else way
+        friction = way.quantity.get("f", 0.0)
+        return replace(way, quantity={**way.quantity, "integral": -friction * self.gain}) if friction else way
 
 
 @dataclass(frozen=True)

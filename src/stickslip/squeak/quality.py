@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stickslip.errors import FormatError, RecordError
-from stickslip.estimate import plain
+from stickslip.estimate import Plain, plain
 from stickslip.record.record import Record
 from stickslip.squeak.bursts import LOWEST, chosen_channel
 from stickslip.squeak.hearing import PULSE, clipped_rows, filtered, short_time_level
@@ -67,7 +67,7 @@ class SoundQuality:
 
 
 @dataclass(frozen=True, eq=False)
-class Impulsiveness:
+class Impulsiveness(Plain):
     """How much a sound or a vibration is made of pulses. These are no standardised metrics.
 
     Attributes
@@ -91,10 +91,6 @@ class Impulsiveness:
     rate: float
     pulses: Array
     channel: str
-
-    def to_dict(self) -> dict[str, Any]:
-        """Plain data for JSON."""
-        return dict(plain(vars(self)))
 
 
 def sound_quality(record: Record, *, channel: str = "sound") -> SoundQuality:

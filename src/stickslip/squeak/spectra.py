@@ -330,14 +330,14 @@ def write_sound(
     return scale
 
 
-def burst_clips(found: Squeaks, *, most: int | None = None) -> tuple[Clip, ...]:
+def burst_clips(squeaks: Squeaks, *, most: int | None = None) -> tuple[Clip, ...]:
     """The bursts cut out, each in the band that was listened to, with a twentieth of a second before and after it.
 
     All share one full scale, so that a loud burst stays louder than a soft one.
 
     Parameters
     ----------
-    found : Squeaks
+    squeaks : Squeaks
         What :func:`find_squeaks` returned.
     most : int, optional
         The loudest so many, in the order of time; all where left out.
@@ -355,10 +355,10 @@ def burst_clips(found: Squeaks, *, most: int | None = None) -> tuple[Clip, ...]:
     >>> clip.name, clip.wav[:4]
     ('1-tonal-500-Hz', b'RIFF')
     """
-    record = found.record
-    unit = record.channels[found.channel].unit
-    values = filtered(record[found.channel], record.fs, found.band)
-    pieces = [_cut(values, record, burst) for burst in found.bursts]
+    record = squeaks.record
+    unit = record.channels[squeaks.channel].unit
+    values = filtered(record[squeaks.channel], record.fs, squeaks.band)
+    pieces = [_cut(values, record, burst) for burst in squeaks.bursts]
     scale = max((float(np.max(np.abs(piece))) for piece in pieces), default=0.0) * COUNTS / (COUNTS - 1) or 1.0
     kept = _loudest(pieces, most)
     return tuple(
@@ -370,7 +370,7 @@ def burst_clips(found: Squeaks, *, most: int | None = None) -> tuple[Clip, ...]:
             float(np.mean(pieces[number] ** 2)),
             wav_bytes(pieces[number], record.fs, scale),
         )
-        for number, burst in enumerate(found.bursts)
+        for number, burst in enumerate(squeaks.bursts)
         if number in kept
     )
 

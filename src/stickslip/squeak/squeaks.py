@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from stickslip.errors import RecordError
-from stickslip.estimate import Estimate, Result, plain
+from stickslip.estimate import Estimate, Plain, Result, plain
 from stickslip.record.record import Record
 from stickslip.statistics import mean_of_cycles
 
@@ -21,7 +21,7 @@ OF_MEDIAN = math.sqrt(math.pi / 2)  # its standard deviation over that of the me
 
 
 @dataclass(frozen=True)
-class Squeak:
+class Squeak(Plain):
     """A burst.
 
     Attributes
@@ -82,10 +82,6 @@ class Squeak:
     def end(self) -> float:
         """When it ends [s]."""
         return self.start + self.duration
-
-    def to_dict(self) -> dict[str, Any]:
-        """Plain data for JSON; what is not known is None."""
-        return dict(plain(vars(self)))
 
 
 @dataclass(frozen=True, eq=False)

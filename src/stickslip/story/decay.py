@@ -63,7 +63,7 @@ def _scope(findings: Findings) -> Scope | None:
     if findings.settings["restoring"] != "linear":
         question += ["--restoring", findings.settings["restoring"]]
     time, fitted = np.concatenate(fit.time), np.concatenate(fit.fitted)
-    return of_fit(findings.record, fit.channel, time, fitted, question, fit.model)
+    return of_fit(findings.record, {fit.channel: (time, fitted)}, question, fit.model)
 
 
 def _by_other_ways(estimates: list[Estimate]) -> Iterator[Table]:

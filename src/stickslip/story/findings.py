@@ -37,10 +37,11 @@ FAMILIES = {"decay": "decay", "squeaks": "squeak", "joint": "joint", "tribometer
 FIRST = (
     "coefficient of friction, plateau", "coefficient of friction, static",
     "sliding friction", "Coulomb friction", "viscous friction", "inertia", "friction coefficient",
-    "static over sliding friction", "stuck share of the time", "stops per cycle", "slope of friction against speed",
-    "presliding stiffness", "contact stiffness", "forcing frequency", "sliding friction forward",
-    "sliding friction back", "damping ratio", "damping ratio, whichever motion", "dry friction displacement",
-    "dry friction force", "natural frequency", "static friction displacement",
+    "static over sliding friction", "static friction forward", "static friction back", "stuck share of the time",
+    "stops per cycle", "slope of friction against speed", "presliding stiffness", "contact stiffness",
+    "forcing frequency", "sliding friction forward", "sliding friction back", "damping ratio",
+    "damping ratio, whichever motion", "dry friction displacement", "dry friction force", "natural frequency",
+    "static friction displacement",
 )  # fmt: skip
 
 

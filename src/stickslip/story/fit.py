@@ -24,7 +24,8 @@ from stickslip.laws.export import export_law, toml_table
 from stickslip.laws.formula import quoted
 from stickslip.parameters import unit
 from stickslip.record.record import Record
-from stickslip.story.scope import Panel, Scope, command_of, of_fit
+from stickslip.rig.settings import rig_toml
+from stickslip.story.scope import Scope, of_fit, reading_of
 from stickslip.story.story import Line, Story, Table
 from stickslip.story.words import Caution, doubts, interval_of, leading, number, value_of
 
@@ -36,6 +37,7 @@ FILES = {
     "toml": "law.toml", "python": "friction.py", "c": "friction.c", "mujoco": "mujoco.xml", "modelica": "friction.mo",
     "simulink": "friction.m",
 }  # fmt: skip
+COLUMNS = "rig.toml"  # beside the law: columns and units of the record that it was fitted to
 STEADY = 0.05  # of its spread that a base may stray from a straight line: a tone over its half period strays by 0.2
 ALONE = "# a law alone: to simulate it, add [system] with its mass and stiffness, and [drive]"
 DEFINITION = (
@@ -63,11 +65,14 @@ def of_laws(comparison: LawComparison, *, record: Records = ()) -> Story:
         for law in laws
     ]
     verdicts = [(law.name, law.standing.verdict) for law in laws]
-    note = "Misfit: mean square left over, in channels and records together, over the least that any law leaves."
-    ranked = Table("Laws by misfit", ("law", "misfit", "possible", "parameters"), rows, note)
-    why = Table("Why each law is possible or not", ("law", "verdict"), verdicts, folded=True)
+    note = (
+        "Misfit: mean square left over, in channels and records together, over the least that any law leaves. Kept: "
+        "what explains the records, with no parameter more than it takes."
+    )
+    ranked = Table("Laws by misfit", ("law", "misfit", "kept", "parameters"), rows, note)
+    why = Table("Why each law is kept or not", ("law", "verdict"), verdicts, folded=True)
     return _story(
-        comparison, record, [comparison.verdict], notes=[*comparison.checks, *comparison.fit.checks],
+        comparison, record, [comparison.verdict], notes=comparison.fit.checks,
         tables=[ranked, why], history=comparison.history, data=comparison.to_dict,
     )  # fmt: skip
 
@@ -94,13 +99,13 @@ def _story(fit: Fit, record: Records, headline: list[str], **content: Any) -> St
 
 
 def _scope(result: Fit, records: Sequence[Record]) -> Scope | None:
-    """The first record's first channel with what the law's sensor would have read."""
+    """The first record's first channel with what the law's sensor would have read, and what is left."""
     fit = result.fit if isinstance(result, LawComparison) else result
     if not records or isinstance(fit, CurveFit) or not fit.traces:
         return None
     traces = fit.traces[0]
     name = next(iter(traces.measured))
-    return of_fit(records[0], name, traces.time[name], traces.fitted[name], ["fit"], type(fit.law).__name__)
+    return of_fit(records[0], {name: (traces.time[name], traces.fitted[name])}, ["fit"], type(fit.law).__name__)
 
 
 def _ratio(misfit: float) -> str:
@@ -143,7 +148,7 @@ def _curve_numbers(fit: CurveFit) -> dict[str, object]:
 
 
 def write_law(draft: Path, result: LawComparison | LawFit | CurveFit, records: Sequence[Record]) -> None:
-    """The fitted law in every form that it has, into the folder law."""
+    """The fitted law in every form that it has, into the folder law, and how its record was read for the next one."""
     law = result.fit.law if isinstance(result, LawComparison) else result.law
     if law is None:
         return
@@ -156,6 +161,9 @@ def write_law(draft: Path, result: LawComparison | LawFit | CurveFit, records: S
         if form == "toml":
             text = _whole(text, result, records[0]) if records else f"{ALONE}\n{text}"
         (draft / "law" / file).write_text(text.rstrip("\n") + "\n", encoding="utf-8")
+    reading = reading_of(records[0]) if records else {}
+    if reading:
+        (draft / "law" / COLUMNS).write_text("\n".join(rig_toml(reading)) + "\n", encoding="utf-8")
 
 
 def _whole(law: str, result: LawComparison | LawFit | CurveFit, record: Record) -> str:
@@ -213,12 +221,14 @@ def of_predictions(predictions: Predictions) -> Story:
     least = _listed(predictions.least)
     headline = f"{_law(predictions)}, as it was given, follows at least {least} in each of {len(parts)} records."
     first = next(iter(predictions.least))
+    compared = any(part.plain for part in predictions.parts)
     rows = [
-        (part.name, *(_percent(part.follows.get(name)) for name in predictions.least), _percent(part.plain.get(first)),
-         *_stops(part)) for part in predictions.parts
+        (part.name, *(_percent(part.follows.get(name)) for name in predictions.least),
+         *([_percent(part.plain.get(first))] if compared else []), *_stops(part)) for part in predictions.parts
     ]  # fmt: skip
-    headings = ("record", *predictions.least, f"{first}, Coulomb", "stops per cycle", "predicted")
-    table = Table("How much is followed", headings, rows, f"{DEFINITION} {COMPARED}")
+    beside = [f"{first}, Coulomb"] if compared else []
+    headings = ("record", *predictions.least, *beside, "stops per cycle", "predicted")
+    table = Table("How much is followed", headings, rows, f"{DEFINITION} {COMPARED}" if compared else DEFINITION)
     return _noted(Story(f"{len(parts)} records predicted", [headline], tables=[table], parts=parts), predictions)
 
 
@@ -229,10 +239,10 @@ def _noted(story: Story, predictions: Predictions) -> Story:
 def _of_one(part: Prediction, law: str) -> Story:
     record, fit = part.record, part.fit
     rows = [
-        (name, _percent(value), _percent(part.plain.get(name)), _left(part, name), f"{fit.misfit[name]:.3g}")
-        for name, value in part.follows.items()
-    ]
-    headings = ("channel", "follows", "Coulomb", "left (rms)", "over its noise")
+        (name, _percent(value), *([_percent(part.plain.get(name))] if part.plain else []), _left(part, name),
+         f"{fit.misfit[name]:.3g}") for name, value in part.follows.items()
+    ]  # fmt: skip
+    headings = ("channel", "follows", *(["Coulomb"] if part.plain else []), "left (rms)", "over its noise")
     note = f"{DEFINITION} {COMPARED}" if part.plain else DEFINITION
     tables = [Table("How much is followed", headings, rows, note)]
     if part.sticks:
@@ -265,18 +275,10 @@ def _cautions(part: Prediction) -> Iterator[str]:
 
 
 def _scope_of(part: Prediction, law: str) -> Scope | None:
-    """Each channel with what the law's sensor would have read over it; none of a broken clock."""
-    record, traces = part.record, part.fit.traces[0]
-    if record.stamps is not None:
-        return None
-    panels = [
-        Panel(name, record.channels[name].unit, {
-            "measured": record[name],
-            "model": np.interp(record.time, traces.time[name], traces.fitted[name], left=np.nan, right=np.nan),
-        }) for name in part.follows
-    ]  # fmt: skip
-    command, first = command_of(record, "analyze")
-    return Scope(record.start, record.fs, panels, f"{law}, as it was given", command=command, first=first)
+    """Each channel with what the law's sensor would have read over it, and what is left; none of a broken clock."""
+    traces = part.fit.traces[0]
+    fitted = {name: (traces.time[name], traces.fitted[name]) for name in part.follows}
+    return of_fit(part.record, fitted, ["analyze"], f"{law}, as it was given")
 
 
 def _law(predictions: Predictions) -> str:

@@ -5,8 +5,10 @@ from __future__ import annotations
 import base64
 import json
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
+from functools import partial
 from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -75,23 +77,28 @@ def report(result: Any, path: str | Path, **context: Any) -> Path:
     return Path(path)
 
 
-def sections(story: Story, *, png: bool = False) -> list[Story]:
-    """The sections of the page, with their figures drawn; as PNG too where these are asked for."""
-    return [part.drawn(png=png) for part in (story, *story.parts)]
+def sections(story: Story, *, png: bool = False, figures: bool = True) -> list[Story]:
+    """The sections of the page, with their figures drawn, as PNG too where asked for; or as soon as can be."""
+    return [part.drawn(png=png) if figures else _quick(part) for part in (story, *story.parts)]
 
 
-def render(stories: Sequence[Story]) -> str:
-    """The page as text."""
-    return templates().get_template(TEMPLATE).render(stories=stories, version=__version__)
+def _quick(story: Story) -> Story:
+    """What the page draws itself, else the figure that leads: all others take longer than the answers."""
+    return replace(story, draw=tuple) if story.scope else replace(story, draw=lambda: story.plates[:1]).drawn()
 
 
-def templates(*folders: Path) -> Environment:
+def render(stories: Sequence[Story], wording: Callable[[str], str] = str) -> str:
+    """The page as text, each sentence as `wording` has it."""
+    return templates(wording=wording).get_template(TEMPLATE).render(stories=stories, version=__version__)
+
+
+def templates(*folders: Path, wording: Callable[[str], str] = str) -> Environment:
     """The page's template and those of other folders that extend it, with the filters that they use."""
     from jinja2 import ChoiceLoader, Environment, FileSystemLoader, PackageLoader, StrictUndefined
 
     environment = Environment(
         loader=ChoiceLoader([PackageLoader("stickslip.story"), FileSystemLoader(folders)]), autoescape=True,
-        undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True, finalize=_visible,
+        undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True, finalize=partial(_visible, wording),
     )  # fmt: skip
     environment.filters.update(
         inline_svg=inline_svg,
@@ -106,9 +113,11 @@ def templates(*folders: Path) -> Environment:
     return environment
 
 
-def _visible(value: Any) -> Any:
-    """What the page is given: text of others shows its hidden signs."""
-    return type(value)(printable(value)) if isinstance(value, str) else value
+def _visible(wording: Callable[[str], str], value: Any) -> Any:
+    """What the page is given: sentences in its own wording, and text of others shows its hidden signs."""
+    if not isinstance(value, str):
+        return value
+    return type(value)(printable(value)) if hasattr(value, "__html__") else printable(wording(value))
 
 
 def packed(scope: Scope) -> str:
@@ -166,7 +175,14 @@ PROGRAM = "stickslip"
 NUMBERS = "results.json"
 
 
-def publish(result: Any, *, folder: str | Path, **context: Any) -> Path:
+def publish(
+    result: Any,
+    *,
+    folder: str | Path,
+    figures: bool = True,
+    wording: Callable[[str], str] = str,
+    **context: Any,
+) -> Path:
     """Write ``report.html``, ``results.json``, the figures as SVG and PNG, and what else a result has into a folder.
 
     That is each burst as WAV, and a fitted law for other programs. The folder appears when all is written, and is on
@@ -179,6 +195,11 @@ def publish(result: Any, *, folder: str | Path, **context: Any) -> Path:
         As in :func:`summary`.
     folder : path
         The folder to make.
+    figures : bool
+        Whether figures are drawn. Without them the folder is there three times as soon, and the page shows the record
+        with its loop, which it draws itself.
+    wording : callable
+        What the page makes of each sentence: a command puts its options where a sentence names arguments of Python.
     **context
         As in :func:`summary`: of a fit ``record`` tells what it was fitted to, and how the law's system moved.
 
@@ -206,12 +227,13 @@ def publish(result: Any, *, folder: str | Path, **context: Any) -> Path:
     folder = Path(folder)
     check_folder(folder)
     story = summary(result, **context)
-    stories = sections(story, png=True)
+    stories = sections(story, png=True, figures=figures)
     with results_folder(folder, story.data()) as draft:
-        (draft / "report.html").write_text(render(stories), encoding="utf-8")
+        (draft / "report.html").write_text(render(stories, wording), encoding="utf-8")
         for number, part in enumerate(stories):
             prefix = f"{number}-{_fit_for_a_file(part.title)}-" if len(stories) > 1 else ""
-            write_figures(draft / "figures", prefix, part.plates)
+            if figures:
+                write_figures(draft / "figures", prefix, part.plates)
             _write_sounds(draft / "sounds", prefix, part.clips)
         story.write(draft)
     return folder

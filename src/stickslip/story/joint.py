@@ -11,7 +11,7 @@ import numpy as np
 
 from stickslip.answers.findings import Comparison, Findings
 from stickslip.cycle.joint import JointFriction
-from stickslip.cycle.joint_logs import JointLogs
+from stickslip.cycle.joint_fit import JointLogs
 from stickslip.errors import ModelError
 from stickslip.estimate import stands
 from stickslip.figures.joint import plates_of, plates_together

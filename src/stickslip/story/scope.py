@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from stickslip.answers.findings import Findings
-from stickslip.balance.motion import is_measured
+from stickslip.balance.motion import forcing_frequency, is_measured
 from stickslip.consistent.checks import Slip
 from stickslip.errors import StickslipError
 from stickslip.figures.contact import across
@@ -31,6 +31,8 @@ LEVELS = 65_534  # of a value, in two bytes; one more is a gap
 MOST_PANELS = 4
 PANELS = ("x", "theta", "v", "a", "load", "force", "friction", "normal", "sound")
 EXPLAINED = "inertia, viscous and dry friction"  # the model of a regression
+LEFT = "left"  # the line of what a model leaves
+CYCLES = 6.0  # that are shown first of a fit: the lines of more run into one another
 BESIDE = {"x": "z"}  # drawn in the same panel
 HERE = "{here}"  # before the name of a file that lies beside the page, which knows its folder
 ROWS = "--rows {first}:{last}"  # of a command, with the rows left open
@@ -45,7 +47,7 @@ class Panel:
     name, unit : str
         What it is, in SI.
     lines : mapping of str to ndarray
-        "measured", "model" and others by name, all of one length.
+        "measured", "model", "left" and others by name, all of one length.
     """
 
     name: str
@@ -54,7 +56,7 @@ class Panel:
 
     def packed(self, detail: slice) -> dict[str, Any]:
         """For the page, in a readable unit."""
-        factor, unit = prefixed(self.lines["measured"], self.unit)
+        factor, unit = prefixed(next(iter(self.lines.values())), self.unit)
         model = self.lines.get("model")
         merit = None if model is None else follows(self.lines["measured"], model)
         lines = {name: _line(factor * values, detail) for name, values in self.lines.items()}
@@ -204,14 +206,34 @@ def _moved(findings: Findings, twin: Record | None) -> Panel:
     return Panel("displacement", findings.loops.unit, lines)
 
 
-def of_fit(record: Record, name: str, time: Array, fitted: Array, question: Sequence[str], model: str) -> Scope | None:
-    """A channel with what was fitted to it at some times; none of a broken clock."""
+def of_fit(
+    record: Record, fitted: Mapping[str, tuple[Array, Array]], question: Sequence[str], model: str
+) -> Scope | None:
+    """Some cycles of channels, each with what was fitted to it and what is left; none of a broken clock."""
     if record.stamps is not None:
         return None
-    lines = {"measured": record[name], "model": np.interp(record.time, time, fitted, left=np.nan, right=np.nan)}
+    panels = []
+    for name, (time, values) in fitted.items():
+        over = np.interp(record.time, time, values, left=np.nan, right=np.nan)
+        unit = record.channels[name].unit
+        panels += [
+            Panel(name, unit, {"measured": record[name], "model": over}),
+            Panel(f"{name}, measured less model", unit, {LEFT: record[name] - over}),
+        ]
     command, first = command_of(record, *question)
-    panels = [Panel(name, record.channels[name].unit, lines)]
-    return Scope(record.start, record.fs, panels, model, command=command, first=first)
+    return Scope(record.start, record.fs, panels, model, command=command, first=first, view=_middle(record))
+
+
+def _middle(record: Record) -> tuple[float, float] | None:
+    """From when to when some cycles of the middle last; None where nothing shook the record, or not for so many."""
+    drive = next(
+        (record[name] for name in ("z", "force") if name in record and 0 < np.ptp(record[name]) < np.inf), None
+    )
+    if drive is None:
+        return None
+    length = CYCLES / forcing_frequency(drive, record.fs).value
+    middle = record.start + record.duration / 2
+    return (middle - length / 2, middle + length / 2) if 2 * length < record.duration else None
 
 
 def of_run(record: Record, period: float, view: tuple[float, float], constants: Mapping[str, Any], file: str) -> Scope:
@@ -307,6 +329,12 @@ def _read(record: Record) -> Mapping[str, Any]:
     """The arguments by which the record was read, once; none of another record."""
     reads = [step.arguments for step in record.history if step.arguments.get("files")]
     return reads[0] if len(reads) == 1 else {}
+
+
+def reading_of(record: Record) -> dict[str, Any]:
+    """The options by which the record was read."""
+    read = _read(record)
+    return {option: read[option] for option in READING if read.get(option) is not None}
 
 
 def _command(record: Record, question: str, options: Sequence[str], read: Mapping[str, Any] | None = None) -> list[str]:

@@ -226,6 +226,17 @@ class Story:
         rows = {line.name for line in self.lines}
         return str(self.notices.index(caution) + 1) if rows.intersection(caution.names) else ""
 
+    def how(self, line: Line) -> list[str]:
+        """How a row was found and checked; what an earlier row says in the same words is told there."""
+        texts = (line.method, *line.checks)
+        first = {
+            text: other.name
+            for other in reversed(self.lines[: self.lines.index(line)])
+            for text in (other.method, *other.checks)
+        }
+        rows = dict.fromkeys(first[text] for text in texts if text in first)
+        return [*(f"as {row}" for row in rows), *(text for text in texts if text not in first)]
+
     @property
     def leading(self) -> Sequence[Line]:
         """The rows that are shown first."""

@@ -337,7 +337,8 @@ def _tried(quick: Estimate, pairs: list[tuple[Estimate | None, float]], misfit: 
     doubts = [doubt for doubt in doubts_of(quick.status) if doubt.kind != FEW]
     if misfit.doubt or both:  # the twins share what is not so, or was not stated
         interval = _hull(value, interval, quick)
-    checks = (*quick.checks, f"a bias of {errors.mean():.3g} {quick.unit} is taken off")
+    bias = f"{-errors.mean():+.3g} {quick.unit}".removesuffix(" 1")
+    checks = (*quick.checks, f"corrected by {bias}, the mean error of this answer on the twins")
     return _estimate(quick, value, interval, f"{quick.method}; tried on {len(errors)} twins", doubts, misfit, checks)
 
 

@@ -3,7 +3,7 @@ import { Conversation } from "./socket.js";
 import { axes, line, prefixed, range, shortly } from "./canvas.js";
 
 const SPAN = 4, LOOPS = 12, FORGOTTEN = 3; // s of traces, loops that stay, cycles for which a flaw stays on the page
-let lab, conversation, state = {}, traces = new Map(), loops = [], flaws = new Map(), cycle = 0, number = 0, drawing = false, oldest = 0;
+let lab, conversation, state = {}, traces = new Map(), loops = [], flaws = new Map(), cycle = 0, number = 0, drawing = false, turned = true, oldest = 0;
 const $ = (id) => document.getElementById(id);
 const ask = (want, more = {}) => conversation.send({ id: ++number, want, ...more });
 
@@ -20,8 +20,8 @@ export function start(root, given) {
     ask("drive", { output: $("live-output").value, amplitude: value("live-amplitude"), frequency: value("live-frequency") });
   });
   $("live-rest").addEventListener("click", () => ask("drive", { output: $("live-output").value, amplitude: 0, frequency: 0 }));
-  lab.onTheme(soon);
-  new ResizeObserver(soon).observe($("live-traces"));
+  lab.onTheme(afresh);
+  new ResizeObserver(afresh).observe($("live-shown"));
 }
 
 function form() {
@@ -80,7 +80,7 @@ function begin(answer) {
   $("live-traces").style.height = `${Math.max(1, traces.size) * 92 + 30}px`;
   if (answer.failed) lab.say(answer.failed, true);
   checkup();
-  soon();
+  afresh();
 }
 
 function block(answer) {
@@ -106,6 +106,7 @@ function block(answer) {
 function ended(answer) {
   cycle += 1;
   if (answer.arrays.friction.length) { loops.push(answer.arrays); loops.splice(0, loops.length - LOOPS); }
+  turned = true;
   for (const flaw of answer.flaws) flaws.set(flaw.channel + flaw.kind, { ...flaw, cycle });
   for (const [key, flaw] of flaws) if (cycle - flaw.cycle > FORGOTTEN) flaws.delete(key);
   checkup();
@@ -128,6 +129,8 @@ function numbers(answer) {
   $("live-untold").textContent = answer.untold.join(" ");
 }
 
+function afresh() { turned = true; soon(); }
+
 function soon() {
   if (drawing || $("live").hidden) return;
   drawing = true;
@@ -142,8 +145,10 @@ function soon() {
 }
 
 function draw() {
-  const palette = lab.colours(), canvas = $("live-traces");
-  strips(canvas, palette);
+  const palette = lab.colours();
+  strips($("live-traces"), palette);
+  if (!turned) return; // loops change with a cycle alone
+  turned = false;
   loop($("live-loop-x"), "x", { label: "displacement", unit: "m" }, palette);
   loop($("live-loop-v"), "v", { label: "velocity", unit: "m/s" }, palette);
 }

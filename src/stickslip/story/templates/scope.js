@@ -34,7 +34,7 @@ for (const place of document.querySelectorAll(".scope")) {
   const colour = (name) => paper ? { ink: "#000", soft: "#444", rule: "#ccc", blue: "#0072b2", orange: "#d55e00", faint: "#999", shade: "#dde3ea" }[name]
     : getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
   // The model is a thin line on a broad, pale one: both are seen where they agree.
-  const STYLES = { measured: ["blue", 3, 0.5], model: ["orange", 1.3, 1] };
+  const STYLES = { measured: ["blue", 3, 0.5], model: ["orange", 1.3, 1], left: ["ink", 1, 1] };
   const style = (name) => (name === "measured" && !told.model ? ["blue", 1.5, 1] : STYLES[name] || ["faint", 1, 1]);
 
   function surface(canvas) {
@@ -114,7 +114,7 @@ for (const place of document.querySelectorAll(".scope")) {
       const parts = Object.entries(panel.lines).map(([name, line]) => [name, seen(line, view)]);
       const [low, high] = range(parts.map(([, part]) => part.values));
       const y = (value) => floor - (floor - top) * (value - low) / (high - low);
-      const { found, digits } = ticks(low, high, Math.max(2, (floor - top) / 14));
+      const { found, digits } = ticks(low, high, Math.min(8, Math.max(2, (floor - top) / 14)));
       pen.fillStyle = colour("soft");
       pen.textAlign = "right";
       pen.textBaseline = "middle";

@@ -1,4 +1,4 @@
-"""stickslip joint"""
+"""stickslip joint and tribometer: friction of machines"""
 
 from __future__ import annotations
 
@@ -9,14 +9,12 @@ from typing import TYPE_CHECKING, Any
 import click
 
 import stickslip as ss
-from stickslip.cli.options import reading_options, result_options
-from stickslip.cli.records import answers, default_folder, groups_of, name_left_out, read, rig_of, with_left_out
-from stickslip.cli.show import show
-from stickslip.cli.terminal import progress
+from stickslip.cli.options import normal_option, number_of, reading_options, result_options
+from stickslip.cli.records import answer_together, default_folder, groups_of, read, require_fits, rig_of
 
 if TYPE_CHECKING:
     from stickslip import Record
-    from stickslip.answers import Findings
+    from stickslip.answers import Comparison, Findings
 
 
 @click.command()
@@ -56,28 +54,66 @@ def joint(
     stickslip joint episode.parquet --axis 2 --kp "17.8 N m/rad" --units "observation.state.2=deg"
     """
     names, axis = ("inertia", "kp", "kd", "torque_constant", "gravity"), options.pop("axis")
-    asked = {name: options.pop(name) for name in names}
+    stated = {name: options.pop(name) for name in names}
     if propose is not None and propose.exists():
         raise click.BadParameter(f"'{propose}' is there already; name another file", param_hint="--propose")
     rig = rig_of(**options)
-    groups = [group for argument in files for group in groups_of(argument)]
+    groups = groups_of(*files)
     folder = output or (None if as_json else default_folder(groups, "joint"))
 
     def ask(record: Record) -> list[Findings]:
         parts = list(ss.answers.episodes(record))
         names = [f", {part.history[-1].outcome}" if len(parts) > 1 else "" for part in parts]
-        told = [ss.answers.analyze_joint(part, **asked, axis=axis) for part in parts]
-        return [replace(one, name=one.name + name) for one, name in zip(told, names, strict=True)]
+        joints = [ss.answers.analyze_joint(part, **stated, axis=axis) for part in parts]
+        return [replace(one, name=one.name + name) for one, name in zip(joints, names, strict=True)]
 
-    with progress(2 * len(groups) + 1) as tell:
-        if propose is not None:
-            log = ss.answers.axis_record(next(ss.answers.episodes(read(groups[0], rig))), axis=axis)
-            ss.write_record(ss.cycle.telling_motion(log), propose)
-        found, refused = answers(groups, rig, ask, tell)
-        logs = [one for part in found for one in part]
-        results = ss.answers.compare_joints(logs, **asked) if len(logs) > 1 else logs[0]
-        results = with_left_out(results, refused)
-        tell("drawing and writing", 2 * len(groups))
-        written = ss.publish(results, folder=folder) if folder else None
-    name_left_out(refused)
-    show(results, written, as_json=as_json, everything=everything)
+    def together(findings: list[list[Findings]]) -> Findings | Comparison:
+        logs = [log for part in findings for log in part]
+        return ss.answers.compare_joints(logs, **stated) if len(logs) > 1 else logs[0]
+
+    if propose is not None:
+        log = ss.answers.axis_record(next(ss.answers.episodes(read(groups[0], rig))), axis=axis)
+        ss.write_record(ss.cycle.telling_motion(log), propose)
+    shown = {"as_json": as_json, "everything": everything}
+    answer_together(groups, rig, ask, together=together, folder=folder, **shown)
+
+
+@click.command()
+@click.argument("files", nargs=-1, required=True, metavar="FILES...")
+@normal_option
+@click.option("--frequency", metavar="HZ", help="Strokes to and fro in a second; found unless given.")
+@result_options("FILE-tribometer")
+@reading_options
+def tribometer(
+    files: tuple[str, ...], output: Path | None, as_json: bool, everything: bool, frequency: str | None, **options: Any
+) -> None:
+    """What is the coefficient of friction, by which definition, and how does it wear in?
+
+    FILES are tests of a tribometer that slides to and fro: displacement or velocity, the friction force, and the
+    normal load, measured (normal) or stated (--normal).
+
+    Told are the coefficient by plateau, stroke, cycle and energy side by side with intervals, the static one where the
+    record tells breakaway, the wear-in over the cycles, and the friction along the stroke, cycle after cycle. Several
+    tests are told together, too.
+
+    Results go into a folder: report.html to open in a browser, results.json, and the figures.
+
+    \b
+    stickslip tribometer test.csv --channels "x=stroke [mm]" --channels "friction=Ft [N]" --normal 10
+    stickslip tribometer "test_*.csv" --channels "friction=Ft [N]" --channels "normal=Fn [N]"
+    """
+    strokes = None if frequency is None else number_of(frequency, "Hz", "--frequency")
+    rig = rig_of(**options)
+    groups = groups_of(*files)
+    require_fits(options["normal"], groups)
+    folder = output or (None if as_json else default_folder(groups, "tribometer"))
+
+    answer_together(
+        groups,
+        rig,
+        lambda record: ss.answers.analyze_tribometer(record, frequency=strokes, rig=rig),
+        together=lambda tests: ss.answers.compare_tribometers(tests) if len(tests) > 1 else tests[0],
+        folder=folder,
+        as_json=as_json,
+        everything=everything,
+    )

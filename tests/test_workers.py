@@ -1,0 +1,41 @@
+"""Other processes: none outlives the one that asked it."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+ASKS = """
+import os, time
+from stickslip.workers import pool
+if __name__ == "__main__":
+    processes = pool(1, "stickslip")
+    print(processes.submit(os.getpid).result(), flush=True)
+    time.sleep(600)
+"""
+
+
+@pytest.mark.skipif(os.name != "posix", reason="nothing is killed by a signal here")
+def test_a_process_ends_with_the_one_that_asked_it(tmp_path: Path) -> None:
+    path = tmp_path / "asks.py"
+    path.write_text(ASKS, encoding="utf-8")
+    with subprocess.Popen([sys.executable, path], stdout=subprocess.PIPE, text=True) as asking:
+        assert asking.stdout is not None
+        worker = int(asking.stdout.readline())
+        asking.send_signal(signal.SIGKILL)
+        asking.wait()
+    end = time.monotonic() + 60
+    while time.monotonic() < end:
+        try:
+            os.kill(worker, 0)
+        except ProcessLookupError:
+            return
+        time.sleep(0.05)
+    os.kill(worker, signal.SIGKILL)
+    pytest.fail("it lives on")
