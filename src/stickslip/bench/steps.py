@@ -239,6 +239,7 @@ def commission(
     steps: Sequence[BenchStep] = STEPS,
     truth: Mapping[str, float] | None = None,
     progress: Callable[[str, float], None] | None = None,
+    answered: Callable[[BenchStep, Result | str], None] | None = None,
 ) -> Commissioned:
     """Which constants, and which sensors, does a rig have?
 
@@ -259,6 +260,8 @@ def commission(
         True values by the names of estimates.
     progress : callable, optional
         Called with words and the number of steps that are done.
+    answered : callable, optional
+        Called with each step and its result, or why it was refused.
 
     Returns
     -------
@@ -284,6 +287,8 @@ def commission(
             known = known.having(step.name, step.ask(record, known))
         except (EstimateError, RecordError) as error:  # what is asked wrongly ends all
             refused[step.name] = str(error)
+        if answered is not None:
+            answered(step, refused.get(step.name) or known.results[step.name])
     return Commissioned(known, refused, truth or {})
 
 

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
 import importlib.util
 import re
+import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -79,10 +81,14 @@ def commission(
     if device is None and not given and not (folder and (folder / "records").is_dir()):
         raise click.UsageError("nothing measures; name a --device (sim needs no hardware), or STEP=FILE")
     source, truth = _source(given, device, rig, folder, seed=options["seed"], anew=anew)
-    with progress(len(chosen) + 1) as tell:
-        done = bench.commission(source, rig=rig, steps=chosen, truth=truth, progress=tell)
-        tell("drawing and writing", len(chosen))
+    if device is not None and not isinstance(device, bench.Sim):  # who is at the rig is asked, and no bar runs beside
+        done = bench.commission(source, rig=rig, steps=chosen, answered=_answered)
         written = _written(done, folder) if folder else None
+    else:
+        with progress(len(chosen) + 1) as tell:
+            done = bench.commission(source, rig=rig, steps=chosen, truth=truth, progress=tell)
+            tell("drawing and writing", len(chosen))
+            written = _written(done, folder) if folder else None
     show(done, written, as_json=as_json, everything=everything)
     if folder and not as_json:
         say(f"Settings: {folder / 'rig.toml'}")
@@ -142,7 +148,7 @@ def _asked_at_rig(device: Device, step: BenchStep, kept: Path | None, rig: RigSe
     """The record of a step at a real rig, once its hands are ready."""
     if any(name not in [one.name for one in device.inputs] for name in step.needs):
         return None
-    say(f"{step.title}\n  {step.todo}")
+    say(f"{step.title}\n  {step.todo}", err=True)
     if not click.confirm(f"  Record {step.seconds:g} s now?", default=True, err=True):
         return None
     if kept is None:
@@ -151,8 +157,38 @@ def _asked_at_rig(device: Device, step: BenchStep, kept: Path | None, rig: RigSe
         kept.unlink()
     moved = {"base": bench.sweep_of(device.fs)} if step.drives and device.outputs else {}
     wanted = bench.Wanted(seconds=step.seconds, drive=moved, log=rig.log)
-    done = bench.acquire(device, output=kept, wanted=wanted)
+    with _picture(step.seconds) as watch:
+        done = bench.acquire(device, output=kept, wanted=wanted, watch=watch)
     return ss.read_record(done.paths[0])
+
+
+@contextlib.contextmanager
+def _picture(seconds: float) -> Iterator[Callable[[Device, bench.Block], None] | None]:
+    """What draws the blocks of a recording on the error stream as they come; nothing where nobody watches."""
+    if not sys.stderr.isatty():
+        yield None
+        return
+    from rich.console import Console
+    from rich.live import Live
+    from rich.text import Text
+
+    drawn, due = bench.Picture(seconds), 0.0
+    with Live(console=Console(stderr=True), auto_refresh=False, transient=True) as live:
+
+        def watch(device: Device, block: bench.Block) -> None:
+            nonlocal due
+            drawn.add(device, block)
+            if time.monotonic() >= due:
+                live.update(Text("\n".join(drawn.lines(device)), overflow="crop", no_wrap=True), refresh=True)
+                due = time.monotonic() + 0.1
+
+        yield watch
+
+
+def _answered(step: BenchStep, outcome: Any) -> None:
+    """What a step found, before the next one is asked; on the error stream, as the questions are."""
+    rows = [f"not answered: {outcome}"] if isinstance(outcome, str) else [*map(str, outcome.estimates)]
+    say("\n".join(line for row in rows for line in wrapped(row, "  ")), err=True)
 
 
 def _written(done: Any, folder: Path) -> Path:

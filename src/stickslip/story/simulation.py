@@ -166,12 +166,19 @@ def _scope(run: Trajectory, rate: float, file: str = "record.csv") -> Scope:
     return of_motion(run.record(fs=rate), cycle_of(run), last_cycles(run, LOOKED_CYCLES), alone, file)
 
 
+def _answer(value: Any) -> str:
+    """To the digits that are compared; results.json has all."""
+    if isinstance(value, (list, tuple)):
+        return ", ".join(map(_answer, value))
+    return f"{value:.10g}" if isinstance(value, float) else str(value)
+
+
 def _tables(result: Outcome) -> Iterator[Table]:
     """The quantities, the known answers and the first events."""
     yield Table("Quantities", ("quantity", "value"), result.rows)
     if result.known:
-        answers = [(name, str(pair["known"]), str(pair["found"])) for name, pair in result.known.items()]
-        yield Table("Known of this scenario, and what the engine finds:", ("answer", "known", "found"), answers)
+        answers = [(name, _answer(pair["known"]), _answer(pair["found"])) for name, pair in result.known.items()]
+        yield Table("Known of this scenario, and what the engine finds", ("answer", "known", "found"), answers)
     count, events = result.run.event_counts().total(), list(itertools.islice(result.run.each_event(), SHOWN_EVENTS))
     if events:
         several = any(event.contact for event in events)

@@ -1,0 +1,44 @@
+"""A step at the rig: what to do, what the sensors read meanwhile, and what came of it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from click.testing import CliRunner
+
+import stickslip as ss
+from stickslip import bench
+from stickslip.bench import Block, Input, Picture
+from stickslip.bench.picture import HEIGHTS
+from stickslip.bench.replay import Replay
+from stickslip.cli.program import main
+
+
+def test_a_step_at_the_rig_is_asked_recorded_and_answered_at_once(tmp_path: Path) -> None:
+    ss.write_record(bench.SimulatedBench(fs=1000).record("rest"), tmp_path / "rest.csv")
+    rig = tmp_path / "rig.toml"
+    rig.write_text('[devices.desk]\nkind = "file"\npath = "rest.csv"\nfast = true\n', encoding="utf-8")
+    arguments = ["commission", "--device", "desk", "--config", str(rig), "--step", "rest", "--output", str(tmp_path)]
+    done = CliRunner().invoke(main, arguments, input="y\n")
+    assert done.exit_code == 0, done.output
+    assert "Touch nothing while it records." in done.stderr
+    assert "Record 10 s now?" in done.stderr
+    assert "  noise of x 0.9" in done.stderr  # at once, and not in the report alone
+    assert (tmp_path / "report" / "report.html").exists()
+
+
+def test_the_picture_shows_what_a_channel_read_last() -> None:
+    device = Replay(ss.Record.of({"x": np.zeros(10), "load": np.zeros(10)}, fs=1000), fast=True)
+    vars(device)["inputs"] = (Input("x", "m", limit=1e-3), Input("load", "N"))
+    seen = Picture(10.0)
+    for number in range(60):  # a ramp of 1 mm in six seconds, of which four are kept; the other is not there
+        x = np.full(100, (number + 1) / 60 * 1e-3)
+        seen.add(device, Block(100 * number, 0.0, np.stack([x, np.full(100, np.nan)])))
+    first, x_line, load_line = seen.lines(device)
+    assert first == "6.0 of 10 s"
+    trace = x_line[9:49]
+    assert [*trace] == sorted(trace)
+    assert set(trace) == {*HEIGHTS}
+    assert x_line[49:] == " 0.3333 to 1 mm  at the end of its range"
+    assert load_line == "load     gives no numbers"
