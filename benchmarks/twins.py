@@ -15,6 +15,7 @@ import sys
 import time
 import warnings
 from collections import defaultdict
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -79,7 +80,7 @@ def counted(findings: ss.answers.Findings, rig: stepped.Rig, tally: dict[str, li
         if estimate.name == LEVEL and low > 0:
             note("claim: dry friction", rig.kinetic > 0, estimate)
         if estimate.name == FALL and not low <= 0 <= high:
-            note("claim: falls or rises with speed", rig.slope > 0 or rig.speed > 0, estimate)
+            note("claim: falls or rises with speed", truth.get(FALL, 0.0) > 0 or rig.speed > 0, estimate)
     return wrong
 
 
@@ -117,8 +118,9 @@ def broken(record: ss.Record, stated: dict, rng: np.random.Generator) -> tuple[s
         spring, factor = np.array(stated["stiffness"]), rng.choice([0.5, 0.9, 1.1, 2.0])
         stated = {**stated, "stiffness": tuple(factor * spring) if spring.ndim else float(factor * spring)}
     elif what == 4:
-        stated = {name: value for name, value in stated.items() if name != "damping"}
-        stated["damping"] = 0.0
+        slope = record.truth[FALL] + float(np.ravel(stated["damping"])[0])  # the damper that nobody stated is in it
+        record = replace(record, truth={**record.truth, FALL: slope, ENERGY: np.nan})
+        stated = {**stated, "damping": 0.0}
     else:
         x = x.copy()
         x[rng.integers(0, len(x), 10)] += rng.standard_normal(10) * float(np.ptp(x))

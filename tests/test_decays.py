@@ -12,6 +12,7 @@ from click.testing import CliRunner
 import stickslip as ss
 from motions import free_decay
 from stickslip.cli.program import main
+from stickslip.estimate import stands
 
 
 @pytest.fixture
@@ -310,6 +311,8 @@ def test_the_headline_names_the_motion_that_the_record_leaves():
     assert estimates["quadratic damping"].includes(quadratic)
     assert estimates["quadratic damping"].unit == "1/m"
     assert "dry friction displacement" not in estimates
+    # what takes the motion for another one had stood beside it without a doubt, ten deviations off
+    assert not stands(estimates["damping ratio, by decrements"].status)
     assert ss.summary(found).plates
 
 

@@ -128,6 +128,20 @@ def test_a_mistake_is_named_first_and_the_command_printed_mends_it(name: str) ->
     assert right(mended(result))
 
 
+@pytest.mark.parametrize("question", ["analyze", "fit", "decay"])
+def test_columns_that_nobody_named_are_asked_for(question: str) -> None:
+    """The refusal named an option to fill in; `init` knows a "Weg Schlitten" for a displacement itself."""
+    path = written("t [s],x [m],z [m]")
+    text = path.read_text().replace("x [m],z [m]", "Weg Schlitten [m],Weg Tisch [m]")
+    path.write_text(text)
+    result = CliRunner().invoke(main, [question, str(path), *(RIG if question != "decay" else ())])
+    assert result.exit_code == 1
+    command = command_in(result)
+    assert command == ["stickslip", "init", str(path)]
+    assert CliRunner().invoke(main, [*command[1:], "--yes", *RIG]).exit_code == 0
+    assert right(ask("analyze", path).stdout)
+
+
 def test_page_and_python_each_name_their_own_options(tmp_path: Path) -> None:
     path = written("t,x [m],z [m],a [m/s^2]")
     ask("analyze", path, *RIG, "--output", tmp_path / "out")

@@ -261,6 +261,24 @@ def test_a_contact_of_another_kind_is_unlike_its_twins() -> None:
     assert not any(stands(e.status) for e in tried.loops.estimates if e.name != "forcing frequency")
 
 
+def test_an_x_that_comes_late_is_told_and_is_no_static_friction() -> None:
+    # x 1.4 ms behind z was a Stribeck curve with 8.5 times the friction at rest, sure within 5 %
+    rig = stepped.Rig("Coulomb", 0.367, 304.4, 0.613, 3.29e-3, 6.997, kinetic=0.1724)
+    record = stepped.record(rig, np.random.default_rng(11), noise=2.7e-3)
+    late = record.with_channel("x", np.roll(record["x"], 4), unit="m")
+    tried = ss.tried(ss.analyze(late, **rig.stated), twins=8)
+    assert "x 1.4 ms late" in tried.trial.doubt.words
+    assert not stands(tried.loops.level.status)
+    assert not any(stands(e.status) for e in tried.breakaway.estimates)
+
+
+def test_a_constant_that_is_off_is_told_where_no_law_explains_x() -> None:
+    record = stepped.record(STOPS, np.random.default_rng(11))
+    tried = ss.tried(ss.analyze(record, **{**STOPS.stated, "mass": 1.02 * STOPS.mass}), twins=8)
+    assert "a mass 2 % smaller" in tried.trial.doubt.words
+    assert not stands(tried.loops.level.status)
+
+
 def test_a_force_that_drives_the_mass_is_written_by_its_twins_too() -> None:
     # twins without it answered nothing of the loops, and the quick answers stood untried
     record = stepped.record(STOPS, np.random.default_rng(11))

@@ -21,7 +21,7 @@ from stickslip.decay.release import Releases, find_releases
 from stickslip.decay.start import SEEN
 from stickslip.decay.which_motion import PLAIN, DecayMotion, choose_motion, whichever
 from stickslip.errors import EstimateError, StickslipError
-from stickslip.estimate import Constant, Estimate, Result
+from stickslip.estimate import Constant, Doubt, Estimate, Result, Status
 from stickslip.record.record import Record, require_record
 from stickslip.statistics import disagreement, weighted_mean
 from stickslip.units import parse_constant
@@ -31,6 +31,7 @@ LOST = 0.1  # of the motion: a fit that leaves more of it does not follow it
 CLEAR = 1e-3  # p-value below which a motion's rejection is no chance of one true motion in twenty
 CHANCE = 0.01  # of a record without dry friction to be told to have some
 ONE_IN_100 = 2.33 / 1.96  # by which the lower end of 95 % lies farther off where one in a hundred lies beyond it
+DENIED = Doubt("the record speaks against viscous and dry friction, which the decrements take for granted", "denied")
 METHODS = ("thesis", "waveform", "all")
 OLDER: dict[str, Callable[..., EnvelopeDecay]] = {
     "logarithmic decrement": log_decrement, "linear decrement": linear_decrement, EXTREMES: extreme_decay,
@@ -206,7 +207,11 @@ class Decay(Result):
             self._other_ratio,
             () if self.thesis is None or self.best is self.thesis else self.thesis.estimates,
         )
-        estimates = [replace(estimate, name=f"{estimate.name}{BY_DECREMENTS}") for estimate in more]
+        denied = [DENIED] if self.against < CLEAR else []  # of another motion they may be off by ten deviations
+        estimates = [
+            replace(estimate, name=f"{estimate.name}{BY_DECREMENTS}", status=Status(estimate.status, *denied))
+            for estimate in more
+        ]
         return tuple(estimates) if other is None else (other, *estimates)
 
     @property

@@ -12,7 +12,7 @@ from stickslip.answers.preparation import normal_load, with_sensors
 from stickslip.balance.force import friction_force
 from stickslip.cycle.sticks import Sticks, find_sticks
 from stickslip.drives.kinds import HarmonicBase, Release
-from stickslip.errors import EstimateError, ModelError, RecordError, StickslipError
+from stickslip.errors import UNNAMED, EstimateError, ModelError, RecordError, StickslipError
 from stickslip.estimate import Estimate, Result
 from stickslip.law.fit_curve import CurveFit, fit_curve
 from stickslip.law.law import LawFit, fit_law
@@ -107,6 +107,7 @@ def _only_curve(record: Record, *, has_law: bool) -> str | None:
             f"no motion of the mass (the record has {', '.join(record)})",
             "a law is fitted to the displacement x or the velocity v of the mass",
             'name its column, as in channels={"x": "COLUMN [mm]"}',
+            kind=UNNAMED,
         )
     return None
 

@@ -26,7 +26,7 @@ from stickslip.cycle.loops import friction_loops
 from stickslip.cycle.onset import breakaway
 from stickslip.cycle.regression import Regression, regress_friction
 from stickslip.cycle.sticks import find_sticks
-from stickslip.errors import TOO_SHORT, EstimateError, StickslipError
+from stickslip.errors import TOO_SHORT, UNNAMED, EstimateError, StickslipError
 from stickslip.estimate import Constant, Doubt
 from stickslip.record.flaws import constant
 from stickslip.record.record import RIG_UNITS, Record, require_record
@@ -285,6 +285,7 @@ def _nothing(name: str, record: Record, refusals: list[StickslipError]) -> Estim
         f"{value}: its channels are {', '.join(f'{c.name} [{c.unit}]' for c in record.channels.values())}",
         "a displacement x or velocity v is needed, and a force, or mass and stiffness to find it",
         'name the columns, as in channels={"x": "COLUMN [mm]"}',
+        kind=UNNAMED,
     )
 
 

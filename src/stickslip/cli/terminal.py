@@ -16,11 +16,12 @@ import sys
 import textwrap
 import threading
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 import click
 
-from stickslip.errors import MISSTATED, TOO_SHORT, StickslipError
+from stickslip.errors import MISSTATED, TOO_SHORT, UNNAMED, StickslipError
 from stickslip.printing import printable
 
 WIDEST = 110  # columns: longer lines are hard to read
@@ -178,7 +179,12 @@ def spoken(sentence: object) -> str:
 
 
 def mended(arguments: Sequence[str], error: StickslipError) -> Iterator[str]:
-    """Two lines with the command that mends an error, where leaving an option out may do it."""
+    """Two lines with the command that mends an error: one that asks for columns, or this one without an option."""
+    files = [word for word in arguments if Path(word).is_file()]
+    if error.kind == UNNAMED and files:
+        yield "To mend it:"
+        yield shlex.join(["stickslip", "init", *files])
+        return
     kept = list(_without(arguments, CAUSES.get(error.kind, ())))
     if len(kept) < len(arguments):
         yield "To mend it:"

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stickslip.decay.start import SEEN, Run, Swings, bounds_of, free_decays
-from stickslip.errors import EstimateError, RecordError
+from stickslip.errors import UNNAMED, EstimateError, RecordError
 from stickslip.estimate import Status
 from stickslip.record.check import in_words
 from stickslip.record.flaws import clipped, spikes
@@ -272,6 +272,7 @@ def _prepared(record: Record, channel: str | None) -> tuple[Record, str]:
             f"the record has {', '.join(record)}",
             "a free decay is read from x, theta, v or a",
             'name the column when reading: channels={"x": "COLUMN [unit]"}',
+            kind=UNNAMED,
         )
     name = present[0] if channel is None else channel
     if name not in ORDERS:

@@ -34,6 +34,7 @@ from stickslip.figures.style import (
     INK,
     ORANGE,
     PURPLE,
+    SKY,
     axes_of,
     axis_label,
     empty_figure,
@@ -248,6 +249,7 @@ def plot_load_dependence(comparison: Comparison, *, ax: Axes | None = None) -> A
 
 ACROSS, EACH = 8, 64  # small pictures in a row, and in a figure
 MOST_PAGES = 4  # figures of them
+CROWD = 200  # records whose intervals hide their values unless they are drawn thin
 QUANTITIES = 3  # that are drawn over the records
 FULL = 40  # letters of a name over a small picture that is read without being cut
 
@@ -273,9 +275,14 @@ def plot_over_records(estimates: Sequence[Estimate], *, ax: Axes | None = None) 
     factor, unit = prefixed(values, estimates[0].unit)
     ends = np.array([estimate.interval for estimate in estimates])
     lengths = np.where(np.isfinite(ends), np.abs(ends - values[:, None]), 0.0).T
-    ax.errorbar(
-        np.arange(1, len(estimates) + 1), factor * values, factor * lengths, fmt="o", color=BLUE, ms=2, elinewidth=0.6
-    )
+    look: Any = {
+        "fmt": "o",
+        "color": BLUE,
+        "ms": 2,
+        "ecolor": SKY,
+        "elinewidth": 0.6 if len(estimates) < CROWD else 0.2,
+    }
+    ax.errorbar(np.arange(1, len(estimates) + 1), factor * values, factor * lengths, **look)
     ax.set_xlabel("record")
     ax.set_ylabel(axis_label(estimates[0].name, unit))
     return ax

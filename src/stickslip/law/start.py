@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from stickslip.errors import EstimateError, ModelError, RecordError
+from stickslip.errors import UNNAMED, EstimateError, ModelError, RecordError
 from stickslip.law.drive import DriveFrom, as_driven, measured_drive
 from stickslip.law.search import ABOVE, Knob, Point, Problem, Profile, descend
 from stickslip.law.stretch import Sensor, Stretch
@@ -64,6 +64,7 @@ class Shown:
                 f"a record of {', '.join(record)}",
                 "a law is fitted to a motion: displacement x or velocity v",
                 'name its column, as in channels={"x": "COLUMN [mm]"}, or integrate the acceleration first',
+                kind=UNNAMED,
             )
         record.require_clean(*channels, name, question="a fitted law", samples=2 * LEAST)
         values, late = record[name], record.channels[name].delay

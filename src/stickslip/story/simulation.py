@@ -18,7 +18,6 @@ from stickslip.figures.plate import Plate
 from stickslip.figures.trajectory import (
     contacts_of,
     cycle_of,
-    kinds_of,
     last_cycles,
     numbered_words,
     period_of,
@@ -166,12 +165,19 @@ def _scope(run: Trajectory, rate: float, file: str = "record.csv") -> Scope:
     return of_motion(run.record(fs=rate), cycle_of(run), last_cycles(run, LOOKED_CYCLES), alone, file)
 
 
+def _answer(value: Any) -> str:
+    """To the digits that are compared; results.json has all."""
+    if isinstance(value, (list, tuple)):
+        return ", ".join(map(_answer, value))
+    return f"{value:.10g}" if isinstance(value, float) else str(value)
+
+
 def _tables(result: Outcome) -> Iterator[Table]:
     """The quantities, the known answers and the first events."""
     yield Table("Quantities", ("quantity", "value"), result.rows)
     if result.known:
-        answers = [(name, str(pair["known"]), str(pair["found"])) for name, pair in result.known.items()]
-        yield Table("Known of this scenario, and what the engine finds:", ("answer", "known", "found"), answers)
+        answers = [(name, _answer(pair["known"]), _answer(pair["found"])) for name, pair in result.known.items()]
+        yield Table("Known of this scenario, and what the engine finds", ("answer", "known", "found"), answers)
     count, events = result.run.event_counts().total(), list(itertools.islice(result.run.each_event(), SHOWN_EVENTS))
     if events:
         several = any(event.contact for event in events)
@@ -329,12 +335,10 @@ def _ways(run: Trajectory, row: int) -> tuple[str, str]:
 def _shares(run: Trajectory) -> dict[str, tuple[float, str]]:
     """How the time is shared by what each contact does."""
     shares: dict[str, tuple[float, str]] = {}
-    spent = np.bincount(run.modes, weights=run.durations, minlength=len(run.table.modes)) / run.duration
     for contact in range(contacts_of(run)):
-        kinds = kinds_of(run, contact)
-        for kind in [kind for kind in KINDS if kind in kinds]:
-            share = float(sum(s for s, k in zip(spent, kinds, strict=True) if k == kind))
-            shares[numbered_words(run, f"share of time in {kind}", "friction", contact)] = (share, "1")
+        spent = run.shares(contact)
+        for kind in [kind for kind in KINDS if kind in spent]:
+            shares[numbered_words(run, f"share of time in {kind}", "friction", contact)] = (spent[kind], "1")
     return shares
 
 

@@ -32,8 +32,9 @@ Values = Mapping[str, float]
 KINETIC, SLOPE, EXCESS, GIVE, LOSS, SPEED, POWER, RATE, HELD = (
     "kinetic", "slope", "excess", "stiffness", "loss", "speed", "exponent", "rate", "friction at the start"
 )  # fmt: skip
-MASS, SPRING, DAMPER, GAIN = "mass", "spring", "damper", "gain of x"
+MASS, SPRING, DAMPER, GAIN, LATE = "mass", "spring", "damper", "gain of x", "x late"
 DRIVE = ("drive 0", "drive 1", "drive 2")  # ways in which the measured drive may be off
+SLIPS = (LATE, GAIN, SPRING, MASS)  # what may be off by more than anybody stated
 LOGARITHMS = (
     GIVE,
     SPEED,
@@ -77,7 +78,7 @@ class Belief:
         What is believed: where the mass begins ("x" [m], "v" [m/s]), the law's parts ("kinetic" [N], "slope" [N s/m],
         "excess" of static over sliding friction [N], logarithms of contact "stiffness" [N/m], of Stribeck "speed"
         [m/s] and "exponent", or of the "rate" [1/s] at which friction follows; the contact's "loss" c / sqrt(K m); the
-        "friction at the start" over the sliding one), and by how much a constant is off.
+        "friction at the start" over the sliding one), and by how much a constant is off, or x late [s].
     drive : DriveFrom
         The motion of the base, or the force, as it was recorded.
     rig : Rig
@@ -231,6 +232,16 @@ class Belief:
         return self.at(**dict.fromkeys(self.unsure, 0.0))
 
     @property
+    def slip(self) -> str:
+        """What it takes to be off by more than was stated, in words; empty where there is nothing."""
+        name = next((name for name in SLIPS if name in self.values and name not in self.unsure), "")
+        if name == LATE:
+            late = 1e3 * self.values[LATE]
+            return f"x {abs(late):.2g} ms {'late' if late > 0 else 'early'}"
+        off = 100 * math.expm1(self.values[name]) if name else 0.0
+        return f"a {name} {abs(off):.2g} % {'larger' if off > 0 else 'smaller'} than stated" if name else ""
+
+    @property
     def strain(self) -> float:
         """The largest number of standard deviations by which it takes a constant to be off."""
         return max((abs(self.values[name]) / sd for name, sd in self.unsure.items()), default=0.0)
@@ -253,6 +264,8 @@ class Belief:
             return max(NUDGE, self.unsure[name])
         if name in (*LOGARITHMS, LOSS, HELD):
             return 1.0
+        if name == LATE:
+            return 1 / self.record.fs
         friction = float(np.std(self.record["friction"]))
         return friction / float(np.std(self.record["v"])) if name == SLOPE else friction
 
@@ -342,7 +355,8 @@ class Belief:
         """The motion."""
         last = (len(self.record) - 1) / self.record.fs
         off = [self.values[name] for name in DRIVE if name in self.values]
-        moved = self.oscillator.having(drive=self.drive(0.0, last, off))
+        late = self.values.get(LATE, 0.0)  # x's clock is the run's: what moves it came before
+        moved = self.oscillator.having(drive=self.drive(-late, last - late, off))
         return simulate(moved, duration=last, start=self.start, budget=EVENTS, rtol=FOLLOWED)
 
     def work(self, duration: float) -> float:

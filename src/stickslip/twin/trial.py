@@ -114,7 +114,7 @@ class Trial:
     @property
     def doubt(self) -> Doubt | None:
         """Why the record is not of the kind of its twins; None where it is."""
-        return _Misfit(self.strays, self.belief.strain, self.belief.left).doubt
+        return _Misfit.of(self.belief, self.strays).doubt
 
     @property
     def unlike(self) -> bool:
@@ -190,7 +190,7 @@ def try_on_twins(
             "an answer is tried on most of its twins",
             "take the quick answers",
         )
-    misfit = _Misfit(_strays(belief, twins), belief.strain, belief.left)
+    misfit = _Misfit.of(belief, _strays(belief, twins))
     tried = {}
     others = _counted(belief, frequency)
     for name in ASKED:
@@ -223,6 +223,13 @@ class _Misfit:
     strays: float
     strain: float
     left: float
+    slip: str
+
+    @classmethod
+    def of(cls, belief: Belief, strays: float) -> _Misfit:
+        """That of a belief's record, with what else as well as its slip would be one."""
+        slips = dict.fromkeys(rig.slip for rig in (belief, *belief.rivals) if belief.slip and rig.slip)
+        return cls(strays, belief.strain, belief.left, " or ".join(slips))
 
     @property
     def doubt(self) -> Doubt | None:
@@ -237,6 +244,11 @@ class _Misfit:
             return Doubt(
                 f"x strays {self.strays:.2g} times as far from its twins as noise explains: the contact is of no kind "
                 "that was tried, or a constant is not as stated",
+                ASTRAY,
+            )
+        if self.slip:
+            return Doubt(
+                f"its nearest twin has {self.slip}: correct that, or the contact is of no kind that was tried",
                 ASTRAY,
             )
         if self.strain > STRAINED:
