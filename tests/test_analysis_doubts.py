@@ -150,4 +150,4 @@ def test_a_sound_record_of_sensors_that_are_not_described_is_trusted_with_a_caut
 def test_how_far_a_contact_gives_is_told_in_readable_units() -> None:
     found = of_the_demo()
     assert re.search(r"up to 1\.1\d* N it moves -?\d+(\.\d+)? [µn]?m forward", words(found))
-    assert "e-0" not in words(found).split("it moves", 1)[1].split("would be felt", 1)[0]
+    assert "e-0" not in words(found).split("it moves", 1)[1].split("would be seen", 1)[0]

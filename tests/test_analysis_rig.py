@@ -184,7 +184,7 @@ def test_without_mass_and_spring_both_are_weighed_by_the_load_cell(readings: ss.
     assert found.level is not None
     assert found.level.value == pytest.approx(1.1, rel=0.005)
     assert found.settings["mass"] == pytest.approx(2.42, rel=0.02)
-    assert "found from what the load cell feels" in " ".join(found.notes)
+    assert "found from what the load cell measures" in " ".join(found.notes)
 
 
 def test_without_mass_spring_and_load_cell_the_friction_per_mass_is_said(short: ss.Record) -> None:
@@ -199,7 +199,7 @@ def test_a_base_that_moves_unseen_leaves_the_load_cell_alone(readings: ss.Record
     if stated:
         record = record.with_details("load", mount=(250.0, 0.05), inertia=0.05)
     found = ss.analyze(record, mass=2.42, stiffness=2310)
-    assert "another force than the load cell feels" in " ".join(found.notes)
+    assert "another force than the load cell measures" in " ".join(found.notes)
     assert found.level is not None
     assert found.level.value == pytest.approx(1.1, rel=0.001 if stated else 0.01)
     assert found.breakaway is not None

@@ -138,7 +138,7 @@ def test_a_rigid_contact_is_called_rigid() -> None:
     found = ss.cycle.presliding(driven(ss.laws.Coulomb(1.0)))
     assert found.verdict == "rigid"
     assert found.stiffness is None
-    assert "would be felt" in found.evidence
+    assert "would be seen" in found.evidence
 
 
 def test_a_mass_that_moves_against_its_load_leaves_it_open() -> None:

@@ -239,8 +239,8 @@ def quick(monkeypatch: pytest.MonkeyPatch) -> None:
         return SimpleNamespace(part=part, data=results.to_dict, write=lambda draft: None)
 
     monkeypatch.setattr(folder_module, "summary", told)
-    monkeypatch.setattr(folder_module, "sections", lambda story, png: [story.part])
-    monkeypatch.setattr(folder_module, "render", lambda stories: f"<title>{stories[0].title}</title>")
+    monkeypatch.setattr(folder_module, "sections", lambda story, png, figures: [story.part])
+    monkeypatch.setattr(folder_module, "render", lambda stories, wording: f"<title>{stories[0].title}</title>")
 
 
 def results_in(folder: Path) -> str | None:
@@ -401,10 +401,10 @@ def quiet(steps: Steps) -> Iterator[None]:
 def test_no_file_of_others_is_replaced_by_a_result_of_its_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     place, render = tmp_path / "results", folder_module.render
 
-    def meanwhile(parts: Any) -> str:
+    def meanwhile(*given: Any) -> str:
         place.mkdir()
         (place / "report.html").write_text("mine")
-        return str(render(parts))
+        return str(render(*given))
 
     monkeypatch.setattr(folder_module, "render", meanwhile)
     publish(Answers("new"), folder=place)  # type: ignore[arg-type]

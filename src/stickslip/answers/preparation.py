@@ -181,7 +181,7 @@ def without(record: Record, *names: str) -> Record:
 
 
 def _weighed(record: Record, rig: RigSettings, inquiry: Inquiry) -> RigSettings:
-    """The rig with its mass and its spring by what the load cell feels, where neither was stated."""
+    """The rig with its mass and its spring by what the load cell measures, where neither was stated."""
     if rig.mass is not None or rig.stiffness is not None or "friction" in record:
         return rig
     if not {"x", "load"} <= set(record) or not _base_seen(record):
@@ -197,7 +197,7 @@ def _weighed(record: Record, rig: RigSettings, inquiry: Inquiry) -> RigSettings:
     mass, stiffness = constants
     inquiry.notes.append(
         f"No mass and no stiffness were stated: {mass.value:.4g} kg and {stiffness.value:.4g} N/m are found from what "
-        "the load cell feels."
+        "the load cell measures."
     )
     return rig.model_copy(update={"mass": mass.value, "stiffness": stiffness.value})
 
@@ -213,7 +213,7 @@ def _base_moves(record: Record, comparison: ForceComparison | None, inquiry: Inq
     if moves:
         inquiry.notes.append(
             f"{'z does not change' if 'z' in record else 'There is no channel z'}, and with the spring's other end at "
-            "rest the motion leaves another force than the load cell feels: mass and spring are not used."
+            "rest the motion leaves another force than the load cell measures: mass and spring are not used."
         )
     return moves
 
@@ -401,7 +401,7 @@ def normal_load(record: Record, rig: RigSettings, name: str, notes: list[str]) -
             notes.append(f"The normal load reads {mean:.4g} N: its magnitude is taken.")
         if mean:
             return abs(mean)
-        notes.append("The channel normal tells no load: it holds " + ("zeros." if len(finite) else "no numbers."))
+        notes.append("The channel normal holds no load but " + ("zeros." if len(finite) else "no numbers."))
     if record.log is not None and isinstance(record.log.normal, float):
         return record.log.normal
     loads = (rig.normal_load(part) for part in [*name.split(" + "), name])

@@ -204,7 +204,7 @@ BEYOND = 2.0  # times its mount's frequency up to which a load cell's reading is
 
 
 def felt(record: Record, rig: StatedRig) -> Record:
-    """What the load cell feels, less the inertia of its flange: the thesis's F2, or through its mount's inverse."""
+    """What the load cell measures, less the inertia of its flange: the thesis's F2, or through its mount's inverse."""
     method, cell = rig.method, record.channels["load"]
     source = next((name for name in ("a", "v", "x") if name in record), "") if cell.inertia else ""
     used = ["load", *([source] if source else [])]

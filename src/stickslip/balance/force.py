@@ -102,7 +102,7 @@ def friction_force(
         measured, "motion" without the load cell, "load" with x and load alone. ``friction_sd`` is then that of the
         smoother: two of it hold 93 to 97 % of the samples, if the mounts are right. Where the load cell or the
         accelerometer is missing, or at the end of its range, the others go on. With neither mass nor stiffness,
-        "fusion" finds both from what the load cell feels, and "load" is the load cell alone: its reading through the
+        "fusion" finds both from what the load cell measures, and "load" is the load cell alone: its reading through the
         inverse of its mount, less its flange's inertia. The last three are the thesis's
         (section 2.4): "F" is ``k z - k x - m a`` as read, "F1" its five-point average (A.1), "F2" the
         five-point average of the load cell less its flange's inertia (stated by ``with_details("load",
@@ -227,11 +227,11 @@ def _lacking(record: Record, requested: str, wanted: Sequence[str]) -> list[str]
 
 
 def _weighed(record: Record, rig: Rig) -> Record:
-    """The friction force by all sensors, with mass and stiffness from what the load cell feels."""
+    """The friction force by all sensors, with mass and stiffness from what the load cell measures."""
     mass, stiffness = mass_and_stiffness(record, damping=rig.damping, damper=rig.damper, contact=rig.contact)
     made = _fused(record, replace(rig, mass=mass.value, stiffness=stiffness.value), "fusion", "fusion")
     sd = np.sqrt(made["friction_sd"] ** 2 + (mass.sd * made["a"]) ** 2 + (stiffness.sd * stretch(made)) ** 2)
-    note = f"m = {mass.value:.5g} kg and k = {stiffness.value:.5g} N/m from what the load cell feels"
+    note = f"m = {mass.value:.5g} kg and k = {stiffness.value:.5g} N/m from what the load cell measures"
     return _less_sure(made, sd, note)
 
 

@@ -1,4 +1,4 @@
-"""Mass and stiffness, where the rig's owner does not know them: from how the mass slides, or what a load cell feels.
+"""Mass and stiffness, where the rig's owner does not know them: from how the mass slides, or what a load cell measures.
 
 Channels as complex amplitudes: of each cycle where the motion repeats, of windows where it does not.
 """
@@ -94,7 +94,7 @@ def stiffness_per_mass(
 def mass_and_stiffness(
     record: Record, *, damping: float = 0.0, damper: str = "ground", contact: str = "ground"
 ) -> tuple[Estimate, Estimate]:
-    r"""How large are mass and spring, if what the load cell feels is what they leave over?
+    r"""How large are mass and spring, if what the load cell measures is what they leave over?
 
     By least squares over the first harmonics of each cycle on :math:`L = k (z - x) - m a - c v + P`, with what is
     stated of the sensors taken out; the mean over the cycles, which their scatter tells how sure it is. Calibrations
@@ -138,7 +138,7 @@ def mass_and_stiffness(
     stiffness, mass = np.transpose([values for values, _ in fits])
     if left_over > LEFT_OVER or stiffness.mean() <= 0 or mass.mean() <= 0:
         raise EstimateError(
-            f"{100 * left_over:.0f} % of what the load cell feels is left over by m = {mass.mean():.3g} kg and "
+            f"{100 * left_over:.0f} % of what the load cell measures is left over by m = {mass.mean():.3g} kg and "
             f"k = {stiffness.mean():.4g} N/m",
             "a mass and a spring explain it where all channels tell of one motion",
             "correct signs, delays and mounts, or give mass and stiffness",
@@ -146,7 +146,7 @@ def mass_and_stiffness(
     return tuple(
         Estimate.normal(
             name, values.mean(), sd=mean_uncertainty(values)[0], unit=unit,
-            method=f"least squares on {HARMONICS} harmonics of what the load cell feels, over {len(values)} cycles",
+            method=f"least squares on {HARMONICS} harmonics of what the load cell measures, over {len(values)} cycles",
             checks=(f"{100 * left_over:.1f} % of the force is left over",),
         )
         for name, values, unit in (("mass", mass, "kg"), ("stiffness", stiffness, "N/m"))

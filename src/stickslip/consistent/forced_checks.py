@@ -199,7 +199,7 @@ def forces_check(seen: Seen) -> Check:
     rest = complex((felt - computed).mean())
     return judged(
         name, float(abs(felt.mean())), float(abs(computed.mean())), abs(rest) / sd,
-        unit="N", holds="the load cell feels what the motion leaves over",
+        unit="N", holds="the load cell measures what the motion leaves over",
         fails=_unbalanced(rest, complex(felt.mean()), complex((inertia / m).mean()), complex((z - x).mean()), seen, sd),
     )  # fmt: skip
 
@@ -216,7 +216,7 @@ def _unbalanced(rest: complex, felt: complex, acceleration: complex, stretch: co
             cures.append(f"a {name} of {other:.4g} {unit}")
     turned = math.degrees(float(np.angle(felt / (felt - rest))))
     leaves = f"the motion leaves {abs(felt - rest):.3g} N, {turned:.0f} degrees apart"
-    sentence = f"the load cell feels {abs(felt):.3g} N where {leaves}"
+    sentence = f"the load cell measures {abs(felt):.3g} N where {leaves}"
     return (
         f"{sentence}; {' or '.join(cures)} would balance them"
         if cures

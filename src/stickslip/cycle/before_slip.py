@@ -198,7 +198,7 @@ def _verdict(
     if all(abs(slope.value) < least or slope.includes(0.0) for slope in slopes):
         if any(slope.interval[1] > max(rigid, least) for slope in slopes):
             return "can not be told", f"{moves}, or much more: it scatters too much"
-        return "rigid", f"{moves}; {factor * least * level:.2g} {unit} would be felt"
+        return "rigid", f"{moves}; {factor * least * level:.2g} {unit} would be seen"
     if any(slope.value < least or slope.interval[0] <= 0 for slope in slopes):
         return "can not be told", f"{moves}: not in both directions"
     return "gives way", moves

@@ -26,7 +26,7 @@ from stickslip.figures.style import (
     prefixed,
     styled,
 )
-from stickslip.figures.trajectory import MASSES, contacts_of, curve, kinds_of, last_cycles, numbered_words, sampled
+from stickslip.figures.trajectory import MASSES, contacts_of, curve, last_cycles, numbered_words, sampled
 from stickslip.structure import Structure
 from stickslip.whole import whole_file
 
@@ -119,7 +119,7 @@ def frames(run: Trajectory, *, tell: Callable[[int, int], None] | None = None) -
     canvas, scenes, dots = _stage(run, times)
     _, pieces = run.sample(times, ("x",))
     still = canvas.copy_from_bbox(canvas.figure.bbox)
-    marks = [[_MARKS.get(kind, _FREE) for kind in kinds_of(run, scene.contact)] for scene in scenes]
+    marks = [[_MARKS.get(kind, _FREE) for kind in run.kinds(scene.contact)] for scene in scenes]
     for number, piece in enumerate(pieces):
         if tell is not None:
             tell(number, FRAMES)

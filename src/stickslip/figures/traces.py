@@ -236,7 +236,7 @@ def _ratio(comparison: ForceComparison, ax: Axes) -> None:
     gain, sd = (np.array([getattr(band, name) for band in comparison.bands]) for name in ("gain", "gain_sd"))
     within = f"within {100 * tolerance:g} %"
     ax.axhspan(1 - tolerance, 1 + tolerance, color=SHADE, alpha=0.5, linewidth=0, label=within)
-    look: Any = {"fmt": "o-", "color": INK, "markersize": 3, "linewidth": 1.0, "label": "computed over felt"}
+    look: Any = {"fmt": "o-", "color": INK, "markersize": 3, "linewidth": 1.0, "label": "computed over measured"}
     ax.errorbar(frequency[heard], gain[heard], yerr=2 * sd[heard], **look)
     coherence = [band.coherence for band in comparison.bands]
     ax.plot(frequency, coherence, color=GREEN, linewidth=1.0, label="coherence")

@@ -29,7 +29,6 @@ from stickslip.figures.style import (
     prefixed,
     styled,
 )
-from stickslip.solve.tables import JointMode
 from stickslip.structure import Structure
 
 if TYPE_CHECKING:
@@ -72,14 +71,6 @@ def numbered_words(run: Trajectory, label: str, name: str, row: int) -> str:
     if name in ("z", "force") or len(run.labels("x" if name in ("x", "v") else "friction")) == 1:
         return label
     return f"{label} {name}{row + 1}" if name in ("x", "v") else f"{label}, contact {row + 1}"
-
-
-def kinds_of(run: Trajectory, contact: int) -> list[str]:
-    """What each mode of the table is called at one contact: "slip", "stick", "microstick", "flight"."""
-    return [
-        mode.parts[contact].kind if isinstance(mode, JointMode) and mode.parts else mode.kind
-        for mode in run.table.modes
-    ]
 
 
 def period_of(run: Trajectory) -> float:
@@ -143,7 +134,7 @@ def curve(run: Trajectory, wanted: Sequence[str | Quantity], *, first: float, la
 def stretches(run: Trajectory, kind: str, *, first: float, last: float, contact: int = 0) -> Array:
     """Start and length of each stretch of one kind of mode at a contact ("slip", "stick", "microstick", "flight"),
     within two instants (n, 2)."""
-    chosen = np.array([mode == kind for mode in kinds_of(run, contact)])[run.modes]
+    chosen = np.array([mode == kind for mode in run.kinds(contact)])[run.modes]
     chosen &= (run.starts < last) & (run.starts + run.durations > first)
     begin, end = (np.clip(ends[chosen], first, last) for ends in (run.starts, run.starts + run.durations))
     spans: Array = np.column_stack([begin, end - begin])[end > begin]
@@ -251,7 +242,7 @@ def plot_phase(run: Trajectory, *, mass: int = 0, ax: Axes | None = None) -> Axe
 def plates_of(run: Trajectory) -> tuple[Plate, ...]:
     """The figures that show a run, in reading order."""
     seen = np.unique(run.modes)
-    kinds = {kinds_of(run, c)[mode] for c in range(contacts_of(run)) for mode in seen}
+    kinds = {run.kinds(c)[mode] for c in range(contacts_of(run)) for mode in seen}
     marks = {"stick": "dark grey: it sticks", "microstick": "light grey: the contact holds and yields a little",
              "flight": "blue: the contact has lifted off"}  # fmt: skip
     shaded = "; ".join(label for kind, label in marks.items() if kind in kinds)

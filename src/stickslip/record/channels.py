@@ -67,7 +67,7 @@ class Channel:
     mount : tuple of (float, float), or None
         Resonance [Hz] and damping ratio of what the sensor stands on, where it matters.
     inertia : float
-        Mass [kg] between the contact and a load cell, whose inertia the cell feels too.
+        Mass [kg] between the contact and a load cell, whose inertia the cell measures too.
     discharge : float or None
         Time constant [s] with which a piezoelectric sensor forgets; None: it does not.
     gain_sd : float

@@ -29,7 +29,7 @@ class Mount:
     damping : float
         Damping ratio zeta.
     mass : float
-        Of a load cell's mount: mass [kg] between contact and cell, whose inertia the cell feels too: f + mass a.
+        Of a load cell's mount: mass [kg] between contact and cell, whose inertia the cell measures too: f + mass a.
     on : str
         The acceleration of this mass among the run's: "a", or of a structure "a2" ...
 

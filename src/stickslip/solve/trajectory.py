@@ -17,7 +17,7 @@ from stickslip.record.channels import Channel, described
 from stickslip.record.record import Record, Step
 from stickslip.solve.cells import DEGREE
 from stickslip.solve.kernel import follow, sample
-from stickslip.solve.tables import Array, System, Tables
+from stickslip.solve.tables import Array, JointMode, System, Tables
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -168,6 +168,50 @@ class Trajectory:
             for kind, *_ in self._words(int(code)):
                 counts[kind] += int(count)
         return counts
+
+    def kinds(self, contact: int = 0) -> list[str]:
+        """What each mode of the table is at one contact: "slip", "stick", "microstick" or "flight".
+
+        Parameters
+        ----------
+        contact : int
+            Number of the contact, from 0.
+
+        Returns
+        -------
+        list of str
+        """
+        return [
+            mode.parts[contact].kind if isinstance(mode, JointMode) and mode.parts else mode.kind
+            for mode in self.table.modes
+        ]
+
+    def shares(self, contact: int = 0) -> dict[str, float]:
+        """Which shares of the time does a contact stick and slip?
+
+        Parameters
+        ----------
+        contact : int
+            Number of the contact, from 0.
+
+        Returns
+        -------
+        dict of str to float
+            By kind; they add up to 1.
+
+        Examples
+        --------
+        >>> from stickslip import Oscillator, drives, laws, simulate
+        >>> drive = drives.HarmonicBase(6.5e-4, frequency=2.5)
+        >>> run = simulate(Oscillator(2.42, 2310, laws.Coulomb(1.1), drive), cycles=20)
+        >>> {kind: round(share, 2) for kind, share in run.shares().items()}
+        {'slip': 0.74, 'stick': 0.26}
+        """
+        spent = np.bincount(self.modes, weights=self.durations, minlength=len(self.table.modes)) / self.duration
+        shares: dict[str, float] = {}
+        for kind, share in zip(self.kinds(contact), spent.tolist(), strict=True):
+            shares[kind] = shares.get(kind, 0.0) + share
+        return shares
 
     @cached_property
     def _changes(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

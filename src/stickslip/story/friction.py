@@ -232,7 +232,7 @@ def _of_sticks(findings: Findings) -> str:
         return (
             f"no stick is resolved: it sticks below {100 * most:.2g} % of the time (95 %)"
             if most < MOSTLY
-            else "how long it sticks is not told"
+            else "how long it sticks is not resolved"
         )
     if not any(event.kind == "stick" for event in sticks.events):
         brief = sticks.share.value >= RARELY

@@ -18,7 +18,6 @@ from stickslip.figures.plate import Plate
 from stickslip.figures.trajectory import (
     contacts_of,
     cycle_of,
-    kinds_of,
     last_cycles,
     numbered_words,
     period_of,
@@ -336,12 +335,10 @@ def _ways(run: Trajectory, row: int) -> tuple[str, str]:
 def _shares(run: Trajectory) -> dict[str, tuple[float, str]]:
     """How the time is shared by what each contact does."""
     shares: dict[str, tuple[float, str]] = {}
-    spent = np.bincount(run.modes, weights=run.durations, minlength=len(run.table.modes)) / run.duration
     for contact in range(contacts_of(run)):
-        kinds = kinds_of(run, contact)
-        for kind in [kind for kind in KINDS if kind in kinds]:
-            share = float(sum(s for s, k in zip(spent, kinds, strict=True) if k == kind))
-            shares[numbered_words(run, f"share of time in {kind}", "friction", contact)] = (share, "1")
+        spent = run.shares(contact)
+        for kind in [kind for kind in KINDS if kind in spent]:
+            shares[numbered_words(run, f"share of time in {kind}", "friction", contact)] = (spent[kind], "1")
     return shares
 
 
