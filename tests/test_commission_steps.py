@@ -209,6 +209,18 @@ def test_modal_fit_of_a_base_needs_a_mass_and_finds_delays_and_gains() -> None:
     assert abs(found.delay.value) < 1e-4
 
 
+def test_the_doubt_of_both_gains_is_in_that_of_their_ratio() -> None:
+    """Without it the interval of a commissioned rig's ratio was six times too narrow: 79 of 96 held."""
+    record = _driven("base", 0.2)
+    plain, calibrated = (
+        bench.modal_fit(one, mass=2.42)
+        for one in (record, record.with_details("x", gain_sd=3e-4).with_details("z", gain_sd=4e-4))
+    )
+    assert plain.gain is not None
+    assert calibrated.gain is not None
+    assert calibrated.gain.spread == pytest.approx(math.hypot(plain.gain.spread, 5e-4), rel=1e-3)
+
+
 def test_h1_is_the_closed_form_where_the_window_is_long_enough() -> None:
     record = _driven("force", 12.0)
     found = bench.frequency_response(record, channels=("force", "x"), segment=6.0)

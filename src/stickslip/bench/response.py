@@ -317,6 +317,7 @@ class _Lines:
     noise: tuple[float, float]
     of_base: bool
     damper: str
+    gains: float  # standard deviation of both channels' gains, as a part
 
     @classmethod
     def of(cls, record: Record, channels: tuple[str, str], damper: str) -> _Lines:
@@ -338,7 +339,8 @@ class _Lines:
             )
         turn = 2j * np.pi * frequency[kept]
         level = derivative_spectra(np.ones(len(record)), fs=record.fs, orders=[0])[0, kept]
-        return cls(turn, x[:, kept], u[:, kept], level, (noise[0], noise[1]), channels[0] == "z", damper)
+        gains = math.hypot(*(record.channels[name].gain_sd for name in channels))
+        return cls(turn, x[:, kept], u[:, kept], level, (noise[0], noise[1]), channels[0] == "z", damper, gains)
 
     def start(self) -> Array:
         """By least squares, no delay. A base: (w^2, c/m, delay, gain, level), a force: (m, c, delay, k, level)."""
@@ -390,7 +392,7 @@ def _modal_of(lines: _Lines, p: Array, cover: Array, given: dict[str, Estimate],
         w = math.sqrt(p[0])
         frequency = of("natural frequency", w / math.tau, [1 / (2 * w * math.tau), 0, 0, 0], "Hz")
         ratio = of("damping ratio", p[1] / (2 * w), [-p[1] / (4 * w**3), 1 / (2 * w), 0, 0], "1").within(0.0)
-        gain = of("gain of the displacement over that of the base", p[3], [0, 0, 0, 1], "1")
+        gain = of("gain of the displacement over that of the base", p[3], [0, 0, 0, 1], "1", lines.gains * p[3])
         weight = given.get("mass")
         if weight is None and "stiffness" in given:
             spring = given["stiffness"]

@@ -310,7 +310,7 @@ class SimulatedBench:
         """
         made: dict[str, Callable[[], Record]] = {
             "rest": lambda: self._read({}, 10.0),
-            "gauge": lambda: self._levels(channel or "x", self._placed(self.hand.gauges, seated=SEATED)),
+            "gauge": lambda: self._levels(channel or "x", self._placed(self.hand.gauges, seated=SEATED, at=channel)),
             "turn": lambda: self._levels("a", self.hand.turns),
             "weigh": lambda: self._levels("friction", self._placed(self.hand.weights, part=TRUE_TO)),
             "spring": self._spring,
@@ -388,9 +388,11 @@ class SimulatedBench:
         added = Estimate.stated("mass", self.hand.added, "kg")
         return replace(self._loose, mass=self.system.mass + added.value + added.sd * self._chance("added").normal())
 
-    def _placed(self, levels: Sequence[float], *, seated: float = 0.0, part: float = 0.0) -> Sequence[float]:
+    def _placed(
+        self, levels: Sequence[float], *, seated: float = 0.0, part: float = 0.0, at: str = ""
+    ) -> Sequence[float]:
         """Levels as they are really reached: blocks that do not sit, weights that are not what is written on them."""
-        chance = self._chance(f"placed {levels}")
+        chance = self._chance(f"placed {at}{levels}")  # a weight is the same one each time; a block sits anew
         return [
             level * (1 + part * chance.standard_normal()) + bool(level) * seated * chance.standard_normal()
             for level in levels
