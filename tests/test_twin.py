@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -16,9 +17,9 @@ import stickslip as ss
 from stickslip.answers.on_twins import _yields
 from stickslip.cli.program import main
 from stickslip.estimate import UNTRIED, kinds, stands
-from stickslip.twin.belief import EXCESS, HELD, SLOPE
+from stickslip.twin.belief import EXCESS, HELD, LATE, SLOPE, SPRING
 from stickslip.twin.search import _left, _linearised, _step, _towards, believe
-from stickslip.twin.trial import ASTRAY
+from stickslip.twin.trial import ASTRAY, _Misfit
 
 RATIO = "static over sliding friction"
 PULL = 800 * 4e-3  # N: what shakes these rigs
@@ -270,6 +271,53 @@ def test_an_x_that_comes_late_is_told_and_is_no_static_friction() -> None:
     assert "x 1.4 ms late" in tried.trial.doubt.words
     assert not stands(tried.loops.level.status)
     assert not any(stands(e.status) for e in tried.breakaway.estimates)
+
+
+@pytest.mark.parametrize("samples", [3, -3])
+def test_a_twin_whose_x_is_late_is_as_wrong_as_a_record_whose_x_is_late(samples: int) -> None:
+    # the twin wrote all of its channels late, so that none was late to another
+    belief = asked(STOPS)[1].trial.belief
+    record = belief.record
+    twin = belief.at(**{LATE: samples / record.fs}).twin(np.random.default_rng(1))
+    assert len(twin) == len(record)
+    assert np.std(twin["z"] - record["z"]) < 3e-3 * STOPS.amplitude
+    late = record.with_channel("x", np.roll(record["x"], samples), unit="m")
+    inner = slice(len(record) // 10, -len(record) // 10)  # between the ends, where the sensor or the roll holds
+    level, wrong = (
+        ss.friction_loops(ss.friction_force(r.rows(inner.start, inner.stop), **STOPS.stated)).level.value
+        for r in (twin, late)
+    )
+    assert abs(wrong / STOPS.kinetic - 1) > 0.05
+    assert level == pytest.approx(wrong, rel=0.01)
+
+
+def test_what_a_late_x_does_to_a_quick_answer_is_taken_off() -> None:
+    record = stepped.record(SLIDES, np.random.default_rng(31))
+    late = record.with_channel("x", np.roll(record["x"], 4), unit="m")
+    quick = ss.analyze(late, **SLIDES.stated)
+    tried = ss.tried(quick, twins=8)
+    assert "x 2.6 ms late" in tried.trial.doubt.words
+    true = record.truth["energy per cycle"]
+    assert quick.loops.energy_per_cycle.value < 0.6 * true
+    assert tried.loops.energy_per_cycle.value == pytest.approx(true, rel=0.03)
+
+
+def test_a_slip_is_named_once_and_by_the_nearest_rig() -> None:
+    belief = asked(STOPS)[1].trial.belief
+    off = [(LATE, -2e-4), (SPRING, 2e-3), (SPRING, 1e-3)]
+    slips = replace(belief.at(**{LATE: -1e-4}), rivals=tuple(belief.at(**{name: value}) for name, value in off))
+    assert _Misfit.of(slips, 1.0).slip == "x 0.1 ms early or a spring 0.1 % larger than stated"
+
+
+def test_what_is_taken_off_has_the_sign_that_is_said() -> None:
+    _, tried = asked(STOPS)
+    quick = asked(STOPS)[0].sticks.share
+    share = tried.sticks.share
+    said = next(check for check in share.checks if check.startswith("corrected by"))
+    correction, bias = (float(number) for number in re.findall(r"[+-][\d.e-]*\d", said))
+    assert correction == pytest.approx(share.value - quick.value, rel=0.01)
+    assert said == f"corrected by {correction:+.3g}: its mean error on the twins is {bias:+.3g}"
+    assert bias == -correction
 
 
 def test_a_constant_that_is_off_is_told_where_no_law_explains_x() -> None:

@@ -232,12 +232,16 @@ class Belief:
         return self.at(**dict.fromkeys(self.unsure, 0.0))
 
     @property
+    def slipped(self) -> str:
+        """Which of the constants, or the clock of x, it takes to be off by more than was stated; empty where none."""
+        return next((name for name in SLIPS if name in self.values and name not in self.unsure), "")
+
+    @property
     def slip(self) -> str:
-        """What it takes to be off by more than was stated, in words; empty where there is nothing."""
-        name = next((name for name in SLIPS if name in self.values and name not in self.unsure), "")
+        """The same in words, with by how much."""
+        name = self.slipped
         if name == LATE:
-            late = 1e3 * self.values[LATE]
-            return f"x {abs(late):.2g} ms {'late' if late > 0 else 'early'}"
+            return f"x {1e3 * abs(self.late):.2g} ms {'late' if self.late > 0 else 'early'}"
         off = 100 * math.expm1(self.values[name]) if name else 0.0
         return f"a {name} {abs(off):.2g} % {'larger' if off > 0 else 'smaller'} than stated" if name else ""
 
@@ -300,8 +304,9 @@ class Belief:
         sensor, run = self.sensor, self._run()
         if sensor.mount or math.isfinite(sensor.discharge):
             quiet = replace(sensor, noise=Noise(), digitiser=Digitiser(limit=sensor.digitiser.limit), gain=self.gain)
-            return np.asarray(Rig((quiet,)).measure(run, fs=self.record.fs, rng=0)["x"])
-        times = np.clip(np.arange(len(self.record)) / self.record.fs - sensor.lag, 0.0, run.duration)
+            return np.asarray(self._written((quiet,), run, 0)["x"])
+        first = max(0.0, -self.late) - sensor.lag
+        times = np.clip(first + np.arange(len(self.record)) / self.record.fs, 0.0, run.duration)
         limit = sensor.digitiser.limit
         return np.asarray(np.clip(self.gain * run.sample(times, ("x",))[0][0], -limit, limit))
 
@@ -314,6 +319,11 @@ class Belief:
     def sensor(self) -> Sensor:
         """The displacement's."""
         return next(sensor for sensor in self.rig.sensors if sensor.channel == "x")
+
+    @property
+    def late(self) -> float:
+        """Time by which x is late to the other channels [s]; negative where it is early."""
+        return self.values.get(LATE, 0.0)
 
     @property
     def gain(self) -> float:
@@ -352,12 +362,17 @@ class Belief:
         return begun
 
     def _run(self) -> Trajectory:
-        """The motion."""
-        last = (len(self.record) - 1) / self.record.fs
+        """The motion, from the first instant that x or another channel shows to the last."""
+        last, late = (len(self.record) - 1) / self.record.fs, self.late
         off = [self.values[name] for name in DRIVE if name in self.values]
-        late = self.values.get(LATE, 0.0)  # x's clock is the run's: what moves it came before
-        moved = self.oscillator.having(drive=self.drive(-late, last - late, off))
-        return simulate(moved, duration=last, start=self.start, budget=EVENTS, rtol=FOLLOWED)
+        moved = self.oscillator.having(drive=self.drive(min(0.0, -late), last + max(0.0, -late), off))
+        return simulate(moved, duration=last + abs(late), start=self.start, budget=EVENTS, rtol=FOLLOWED)
+
+    def _written(self, sensors: Iterable[Sensor], run: Trajectory, rng: int | np.random.Generator) -> Record:
+        """What sensors write of the motion, x as late to the others as it is believed to be."""
+        late = self.late
+        behind = (replace(s, lag=s.lag + max(0.0, late if s.channel == "x" else -late)) for s in sensors)
+        return Rig(tuple(behind)).measure(run, fs=self.record.fs, rng=rng, start=abs(late))
 
     def work(self, duration: float) -> float:
         """Work of the friction in so long a time [J]."""
@@ -384,8 +399,8 @@ class Belief:
         gains["x"] = self.gain
         if (moves := driving(self.record)) is not None:  # what it wrote, it writes again
             gains[moves] = 1 / (1 + self.values.get(DRIVE[0], 0.0))
-        rig = Rig(tuple(replace(s, gain=gains.get(s.channel, 1.0)) for s in self.rig.sensors))
-        written = rig.measure(self._run(), fs=self.record.fs, rng=rng)
+        sensors = (replace(s, gain=gains.get(s.channel, 1.0)) for s in self.rig.sensors)
+        written = self._written(sensors, self._run(), rng)
         for name in written:
             known = channels[name]
             details = {"delay": known.delay, "mount": known.mount, "inertia": known.inertia}

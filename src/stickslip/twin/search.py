@@ -206,11 +206,8 @@ def _with_slips(belief: Belief, simple: Belief, mapped: Map) -> Belief:
     """
     asked = [_off(belief, name) for name in SLIPS if _asks_for(belief, name)]
     slips = list(mapped(partial(_over, record=belief.record), asked))
-    if {
-        EXCESS,
-        GIVE,
-        RATE,
-    } & belief.values.keys():  # x late by 1 % of a cycle has looked like 8 times the static friction
+    # x late by 1 % of a cycle has looked like 8 times the static friction
+    if {EXCESS, GIVE, RATE} & belief.values.keys():
         begun = [_off(simple.as_stated(), name) for name in SLIPS]
         slips += [law for law in mapped(partial(_led_beside, beside=belief), begun) if law is not None]
     nearest = min([belief, *slips], key=_left)

@@ -228,8 +228,10 @@ class _Misfit:
     @classmethod
     def of(cls, belief: Belief, strays: float) -> _Misfit:
         """That of a belief's record, with what else as well as its slip would be one."""
-        slips = dict.fromkeys(rig.slip for rig in (belief, *belief.rivals) if belief.slip and rig.slip)
-        return cls(strays, belief.strain, belief.left, " or ".join(slips))
+        nearest: dict[str, str] = {}  # of each kind
+        for rig in (belief, *sorted(belief.rivals, key=lambda rival: rival.left)) if belief.slip else ():
+            nearest.setdefault(rig.slipped, rig.slip)
+        return cls(strays, belief.strain, belief.left, " or ".join(filter(None, nearest.values())))
 
     @property
     def doubt(self) -> Doubt | None:
@@ -337,8 +339,8 @@ def _tried(quick: Estimate, pairs: list[tuple[Estimate | None, float]], misfit: 
     doubts = [doubt for doubt in doubts_of(quick.status) if doubt.kind != FEW]
     if misfit.doubt or both:  # the twins share what is not so, or was not stated
         interval = _hull(value, interval, quick)
-    bias = f"{-errors.mean():+.3g} {quick.unit}".removesuffix(" 1")
-    checks = (*quick.checks, f"corrected by {bias}, the mean error of this answer on the twins")
+    taken, bias = (f"{0.0 + part:+.3g} {quick.unit}".removesuffix(" 1") for part in (-errors.mean(), errors.mean()))
+    checks = (*quick.checks, f"corrected by {taken}: its mean error on the twins is {bias}")  # 0.0 + -0.0 is no -0
     return _estimate(quick, value, interval, f"{quick.method}; tried on {len(errors)} twins", doubts, misfit, checks)
 
 
