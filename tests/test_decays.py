@@ -132,7 +132,9 @@ def test_what_can_not_be_is_one_sentence_and_a_code(release, words, code, said):
     answer = run(*words)
     assert answer.exit_code == code, answer.output
     assert said in answer.output
-    assert len(answer.output.strip().splitlines()) == 1
+    sentence, *mended = answer.output.strip().split("\nTo mend it:\n")
+    assert len(sentence.splitlines()) == 1
+    assert all(command.startswith("stickslip init") for command in mended)
     assert not (release.parent / "release-stickslip").exists()
 
 
