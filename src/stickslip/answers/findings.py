@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from typing import TYPE_CHECKING, Any, Self, TypeVar
 
+from stickslip.answers.mistakes import hopeless
 from stickslip.errors import EstimateError, ModelError, StickslipError
 from stickslip.estimate import UNTRIED, Doubt, Estimate, Result, Status, doubts_of, kinds, stands
 from stickslip.printing import html_table
@@ -168,7 +169,7 @@ class Findings(Answers):
         """The numbers that lead, without those that a result tells by other ways, too, and without any force where what
         it rests on was stated wrongly."""
         left_out = [estimate for result in self.results.values() for estimate in getattr(result, "beside", ())]
-        if self.contradiction:
+        if self.contradiction or hopeless(self.results.get("consistency")):
             forces = _numbers(self.results.get(key) for key in BY_FORCE)
             left_out += [estimate for estimate in forces if estimate.name != DRIVEN]
         return tuple(estimate for estimate in self.estimates if estimate not in left_out)
