@@ -67,7 +67,7 @@ class _Commands(click.Group):
             ctx.exit(1)
 
     def _remedy(self, ctx: click.Context, error: StickslipError) -> list[str]:
-        """The command that mends an error: it asks for columns, or is this one without an option; empty if none does."""
+        """The command that mends an error: it asks for columns, or is this one less an option; empty if none does."""
         arguments = ctx.meta.get(ARGUMENTS, [])
         if error.kind == UNNAMED:
             name, command, rest = self.resolve_command(ctx, list(arguments))
@@ -88,8 +88,10 @@ def _naming(parameters: Mapping[str, Any]) -> list[str]:
     files, stated = parameters.get("files", ()), parameters.get("config")
     if stated is None and Path(RIG_FILE).is_file():
         stated = Path(RIG_FILE)
-    if stated is None or not files:
-        return ["init", *files] if files else []
+    if not files:
+        return []
+    if stated is None:
+        return ["init", *files]
     output = Path(f"{stated.stem}-columns.toml")
     named = bool(ss.rig.read_rig(stated).channels)
     return [] if named or output.exists() else ["init", *files, "--config", str(stated), "--output", str(output)]
