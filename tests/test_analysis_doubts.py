@@ -10,6 +10,7 @@ import pytest
 
 import stickslip as ss
 from rigs import LAG, RIG, measured, told
+from stickslip.answers.preparation import _doubt
 from stickslip.estimate import UNTRIED, kinds, stands
 
 
@@ -88,6 +89,14 @@ def test_a_mount_that_is_not_stated_is_told_beside_the_friction() -> None:
         assert "not stated" in found.level.status
         assert "which the interval leaves out" in found.level.status
         assert "none shows" not in words(found)
+
+
+def test_a_mount_found_is_said_of_its_own_sensor() -> None:
+    """It read "how a (found in this record) and load are mounted"."""
+    given = of("x", "z", "a", "load")
+    doubt = _doubt(given.with_details("a", mount=(125.0, 0.1)), given, ss.rig.rig_settings(RIG), aligned=False)
+    assert doubt is not None
+    assert doubt.words.startswith("how a (its mount found in this record) and load are mounted is not stated")
 
 
 def test_sensors_that_are_not_there_or_left_out_are_not_missed() -> None:
