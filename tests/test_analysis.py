@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 
 import stickslip as ss
-from stickslip.answers.findings import Comparison, Findings, record_name
+from stickslip.answers.findings import BY_FORCE, Comparison, Findings, record_name
 from stickslip.answers.many import compare
 from stickslip.answers.preparation import mend
-from stickslip.answers.questions import analyze
+from stickslip.answers.questions import QUESTIONS, analyze
 from stickslip.errors import EstimateError, ModelError
 from stickslip.rig.settings import RigSettings
 
@@ -263,3 +263,9 @@ def test_mending_is_asked_for_and_logged() -> None:
     assert mend(record, repairs=[]) is record
     with pytest.raises(ModelError, match="clok"):
         mend(record, repairs=["clok"])
+
+
+def test_what_rests_on_the_friction_force_is_doubted_with_it() -> None:
+    """A question that is added must not be sure of a force whose constants contradict the record."""
+    by_force = {question.key for question in QUESTIONS if ("friction",) in question.needs and not question.derived}
+    assert by_force == set(BY_FORCE)

@@ -10,6 +10,8 @@ import pytest
 
 import stickslip as ss
 from rigs import LAG, RIG, measured, told
+from stickslip.answers.preparation import _doubt
+from stickslip.estimate import UNTRIED, kinds, stands
 
 
 @cache
@@ -89,12 +91,21 @@ def test_a_mount_that_is_not_stated_is_told_beside_the_friction() -> None:
         assert "none shows" not in words(found)
 
 
+def test_a_mount_found_is_said_of_its_own_sensor() -> None:
+    """It read "how a (found in this record) and load are mounted"."""
+    given = of("x", "z", "a", "load")
+    doubt = _doubt(given.with_details("a", mount=(125.0, 0.1)), given, ss.rig.rig_settings(RIG), aligned=False)
+    assert doubt is not None
+    assert doubt.words.startswith("how a (its mount found in this record) and load are mounted is not stated")
+
+
 def test_sensors_that_are_not_there_or_left_out_are_not_missed() -> None:
     for names in (("x", "z"), ("x", "z", "load")):
         found = ss.analyze(of(*names, stated=True), **RIG)
         assert "mounted" not in words(found)
         assert found.level is not None
-        assert found.level.status == "ok"
+        assert kinds(found.level.status) == {UNTRIED}
+        assert stands(found.level.status)
 
 
 def test_a_mass_that_contradicts_the_record_is_told_in_the_headline() -> None:

@@ -100,6 +100,25 @@ def test_the_pitch_of_a_squeak_is_told(channels: tuple[str, ...]) -> None:
     assert abs(rows[-1].value - loudest) < 0.03 * loudest  # it wanders so far with the speed
 
 
+@pytest.mark.parametrize("squeaking", [slice(3 * 8000, None), slice(0, 3 * 8000)], ids=["then loud", "then quiet"])
+def test_a_quiet_room_is_no_broken_microphone(squeaking: slice) -> None:
+    sound = 0.002 * np.random.default_rng(0).standard_normal(6 * 8000)
+    sound[squeaking] += 0.3 * np.sin(2 * np.pi * 800 * np.arange(3 * 8000) / 8000)
+    device = Replay(ss.Record.of({"sound": sound}, fs=8000, units={"sound": "Pa"}), fast=True)
+    _, cycles = watched(device, 6.0)
+    assert len(cycles) == 11
+    assert not [flaw for cycle in cycles for flaw in cycle.flaws]
+
+
+@pytest.mark.parametrize("left", ["nothing", "a count"])
+def test_a_microphone_that_is_pulled_is_flat(left: str) -> None:
+    chance = np.random.default_rng(1)
+    sound = np.round(0.3 * chance.standard_normal(6 * 8000), 3)  # Pa, in counts of 1 mPa
+    sound[3 * 8000 :] = 0.001 * chance.integers(0, 2, 3 * 8000) if left == "a count" else 0.0
+    _, cycles = watched(Replay(ss.Record.of({"sound": sound}, fs=8000, units={"sound": "Pa"}), fast=True), 6.0)
+    assert [[flaw.kind for flaw in cycle.flaws] for cycle in cycles] == [[]] * 6 + [["flat"]] * 5
+
+
 def test_a_loop_is_that_of_the_motion() -> None:
     _, cycles = watched(Sim(rig=ss.Rig.perfect(), fast=True), 3.0)
     last = cycles[-1]

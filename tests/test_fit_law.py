@@ -185,3 +185,12 @@ def test_what_is_not_fitted_or_named_twice_is_refused(asked: dict[str, Any], sai
             ss.Oscillator(law=ss.laws.Coulomb(1.0), drive=ss.drives.HarmonicForce(3.0, frequency=4.0), **RIG),
             **asked,
         )
+
+
+def test_levels_that_a_free_zero_hides_from_each_other_are_not_told() -> None:
+    """x and the load have an offset each: forward less back is in neither, and no start may stand for the answer."""
+    law = ss.laws.Geared(1.2, 0.8)
+    fit = ss.fit_law(measured(law, 8.7), ss.Oscillator(law=ss.laws.Geared(1.0, 1.0), **RIG), free=["forward", "back"])
+    for name, true in (("forward", 1.2), ("back", 0.8)):
+        assert fit.parameters[name].includes(true)
+        assert "can not be told" in fit.parameters[name].status

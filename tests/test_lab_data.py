@@ -26,6 +26,7 @@ from starlette.applications import Starlette
 from starlette.testclient import TestClient
 
 import stickslip as ss
+from robot_logs import write_db3
 from stickslip.lab import data
 from stickslip.lab.jobs import Limits
 
@@ -162,6 +163,12 @@ def test_a_file_of_each_format_is_described_as_the_library_reads_it(
     for each in told["channels"]:
         assert each["low"] == pytest.approx(record[each["name"]].min(), rel=1e-6)
         assert each["high"] == pytest.approx(record[each["name"]].max(), rel=1e-6)
+
+
+def test_a_bag_that_is_known_by_its_ending_is_read(client: Client, tmp_path: Path) -> None:
+    write_db3(tmp_path / "walk.db3")
+    told = answered(client, "describe", send(client, tmp_path / "walk.db3"))["records"][0]
+    assert told["rows"] == len(ss.read_record(tmp_path / "walk.db3"))
 
 
 def test_the_answer_is_the_librarys_to_the_last_printed_digit(client: Client, tmp_path: Path) -> None:

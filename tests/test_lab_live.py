@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator
 from contextlib import ExitStack
+from multiprocessing import active_children
 from pathlib import Path
 from typing import Any
 
@@ -88,6 +89,27 @@ def test_twenty_watch_and_one_records(client: TestClient, tmp_path: Path) -> Non
     record = ss.read_record(path)
     assert len(record) > 100
     assert [step.outcome for step in record.history if step.action == "mark"] == ["the <b>third</b> cycle"]
+
+
+def test_a_recording_outlives_the_process_that_finds_the_numbers(client: TestClient, tmp_path: Path) -> None:
+    before = set(active_children())
+    with client.websocket_connect(LIVE, headers=HEADERS) as page:
+        send(page, "open", device="rig")
+        send(page, "record")
+        assert until(page, "numbers")[0]["rows"]
+        for process in set(active_children()) - before:
+            process.kill()
+        killed = until(page, "block")[0]["recorded"]  # s
+        assert "another one begins" in until(page, "numbers", rows=[])[0]["untold"][0]
+        while not until(page, "numbers")[0]["rows"]:
+            pass
+        send(page, "stop")
+        while "samples" not in until(page, "block")[0]["said"]:
+            pass
+    (path,) = tmp_path.iterdir()
+    record = ss.read_record(path)
+    assert len(record) > (killed + 1.0) * record.fs
+    assert not [fault for fault in record.check() if fault.kind == "gap"]
 
 
 def test_what_a_page_may_not_ask_is_told_to_it(client: TestClient) -> None:

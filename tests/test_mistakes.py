@@ -142,6 +142,42 @@ def test_columns_that_nobody_named_are_asked_for(question: str) -> None:
     assert right(ask("analyze", path).stdout)
 
 
+def unnamed(path: Path) -> Path:
+    path.write_text(written("t [s],x [m],z [m]").read_text().replace("x [m],z [m]", "Weg Schlitten [m],Weg Tisch [m]"))
+    return path
+
+
+def test_columns_are_asked_of_the_files_of_the_command_alone() -> None:
+    """A file called like the command, and the file of the rig, were taken for records."""
+    Path("analyze").write_text("notes")
+    unnamed(Path("run.csv"))
+    assert command_in(CliRunner().invoke(main, ["analyze", "run.csv", *RIG])) == ["stickslip", "init", "run.csv"]
+    assert command_in(CliRunner().invoke(main, ["analyze", "r*.csv", *RIG])) == ["stickslip", "init", "r*.csv"]
+
+
+@pytest.mark.parametrize("config", ["my.toml", "rig.toml"])
+def test_columns_go_beside_what_a_file_states_of_the_rig(config: str) -> None:
+    Path(config).write_text(
+        'mass = "2 ± 0.01 kg"\nstiffness = 3000\ndamping = 1\ndamper = "ground"\ncontact = "ground"\n'
+    )
+    unnamed(Path("run.csv"))
+    asked = ["analyze", "run.csv", *(["--config", config] if config == "my.toml" else [])]
+    command = command_in(CliRunner().invoke(main, asked))
+    init = CliRunner().invoke(main, command[1:], input=5 * "\n")
+    assert init.exit_code == 0, init.output
+    assert "Mass that moves" not in init.output, "it is stated"
+    told = next(line for line in init.stdout.splitlines() if line.startswith("Next: "))
+    assert right(ask(*shlex.split(told.removeprefix("Next: stickslip "))).stdout)
+    assert ss.rig.read_rig(command[-1]).mass.sd == pytest.approx(0.01)
+    assert "To mend it:" not in CliRunner().invoke(main, asked).stderr, "that file is there now"
+
+
+def test_a_rig_that_names_other_columns_is_not_mended_by_asking() -> None:
+    Path("rig.toml").write_text('[channels]\nlift = "`Weg Tisch` [m]"\n')
+    unnamed(Path("run.csv"))
+    assert "To mend it:" not in CliRunner().invoke(main, ["analyze", "run.csv", *RIG]).stderr
+
+
 def test_page_and_python_each_name_their_own_options(tmp_path: Path) -> None:
     path = written("t,x [m],z [m],a [m/s^2]")
     ask("analyze", path, *RIG, "--output", tmp_path / "out")

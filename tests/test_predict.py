@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ import pytest
 from click.testing import CliRunner, Result
 
 import stickslip as ss
+from stickslip.bench import SimulatedBench
 from stickslip.cli.program import main
 
 RIG = {"mass": 2.42, "stiffness": 2310.0, "damping": 0.12}
@@ -113,6 +115,45 @@ def test_columns_of_the_fit_are_those_of_the_next_record() -> None:
     assert result.exit_code == 0, result.output
     assert "columns by slow-fit/law/rig.toml" in result.stderr
     assert "follows 99." in result.stdout
+    Path("mass.toml").write_text("mass = 2.42\n")  # states no column
+    assert "follows 99." in predict("slow-fit", "fast.csv", "--no-plain", "--config", "mass.toml").stdout
+    Path("mass.toml").rename("rig.toml")
+    assert "follows 99." in predict("slow-fit", "fast.csv", "--no-plain").stdout
+    write("named.csv", measured(STICKING.having(frequency=4.0)))  # "x" and "z" tell themselves
+    table = predict("slow-fit", "fast.csv", "named.csv", "--no-plain", "--json")
+    assert table.exit_code == 0, table.output
+    assert [part["name"] for part in json.loads(table.stdout)["records"]] == ["fast.csv", "named.csv"]
+
+
+def test_the_rate_of_the_fitted_file_is_not_that_of_the_next() -> None:
+    record = measured(STICKING)
+    for name, part in (("slow.csv", record), ("fast.csv", measured(STICKING.having(frequency=4.0)).rows(0, 2000))):
+        np.savetxt(
+            name, 1e3 * np.column_stack([part["x"], part["z"]]), delimiter=",", header="x [mm],z [mm]", comments=""
+        )
+    record = ss.read_record("slow.csv", channels={"x": "x [mm]", "z": "z [mm]"}, fs=1000)
+    found = ss.fit_law(record, STICKING.having(kinetic=1.0), free=["kinetic"], nuisance=["damping"], intervals=False)
+    ss.publish(found, folder="slow-fit", record=record)
+    refused = predict("slow-fit", "fast.csv", "--no-plain")
+    assert refused.exit_code == 1
+    assert "neither time nor sampling rate" in refused.stderr
+    assert "follows 99." in predict("slow-fit", "fast.csv", "--no-plain", "--fs", "1000").stdout
+
+
+def test_a_page_begins_with_cycles_of_a_tone_and_with_all_of_what_noise_shakes() -> None:
+    """Counts of a base at rest were taken for its drive: the page began with 4.4 ms of 20 s."""
+    driven = ss.Rig.perfect("x", "z").measure(ss.simulate(STICKING, duration=10), fs=200, rng=1, start=1.0)
+    predictions = ss.answers.predict(driven, STICKING, plain=False)
+    view = ss.summary(predictions).scope.view
+    assert view[1] - view[0] == pytest.approx(6 / 2.5, rel=1e-3)
+    counts = np.round(np.random.default_rng(0).normal(0, 3e-6, len(driven)) / 2.5e-6) * 2.5e-6
+    resting = driven.with_channel("z", counts, unit="m", source="array")
+    of_noise = replace(predictions, parts=(replace(predictions.parts[0], record=resting),))
+    assert ss.summary(of_noise).scope.view is None
+    decay = SimulatedBench().record("free")
+    counts = np.round(np.random.default_rng(0).normal(0, 3e-6, len(decay)) / 2.5e-6) * 2.5e-6
+    shaken = ss.analyze_decay(decay.with_channel("z", counts, unit="m", source="array"))
+    assert ss.summary(shaken).scope.view is None
 
 
 def test_several_records_are_rows_and_what_can_not_be_asked_is_left_out() -> None:

@@ -174,6 +174,8 @@ def test_a_comparison_leads_to_each_record(tmp_path: Path) -> None:
     [
         (Estimate.normal("a", 0.012345, sd=0.0002, unit="m", method=""), "12.3 mm", "12.0 to 12.7 mm"),
         (Estimate.normal("stuck share of the time", 0.521, sd=0.02, unit="1", method=""), "52 %", "48 to 56 %"),
+        (Estimate.normal("stuck share", 0.039489, sd=3e-6, unit="1", method=""), "3.95 %", "within its last digit"),
+        (Estimate.normal("stuck share", 0.960511, sd=3e-6, unit="1", method=""), "96.05 %", "within its last digit"),
         (Estimate.normal("a", 2.5, sd=1e-9, unit="Hz", method=""), "2.5000 Hz", "within its last digit"),
         (Estimate.normal("a", 2.0, sd=0.0, unit="1", method=""), "2", "no scatter"),
         (Estimate.normal("a", 0.0125, sd=0.0, unit="m", method=""), "12.5 mm", "no scatter"),

@@ -241,3 +241,19 @@ def test_a_change_of_rate_keeps_its_stamps(dataset: Callable[[str], Path]) -> No
     assert record["x"][0] == pytest.approx(8503.602e-6, rel=1e-15)
     assert record["normal_stress"][0] == pytest.approx(19.969273e6, rel=1e-15)
     assert record["mu"][0] == 0.607016
+
+
+@pytest.mark.parametrize("line", ["Sample rate,500", "Run,7", "Date,2026-11-26", "Name,plate"])
+def test_a_line_of_two_cells_above_two_columns_is_no_header_of_pairs(tmp_path: Path, line: str) -> None:
+    rows = "".join(f"{n / 100},{n % 7}\n" for n in range(50))
+    (tmp_path / "run.csv").write_text(f"{line}\ntime [s],x [mm]\n{rows}")
+    record = ss.read_record(tmp_path / "run.csv")
+    assert list(record) == ["x"]
+    assert record["x"].max() == pytest.approx(6e-3)
+    assert record.fs == pytest.approx(100)
+
+
+def test_titles_without_rows_are_told_in_a_sentence(tmp_path: Path) -> None:
+    (tmp_path / "run.csv").write_text("time [s],x [mm]\n")
+    with pytest.raises(ss.StickslipError):
+        ss.read_record(tmp_path / "run.csv")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 MISSTATED = "delimiter"  # stated otherwise than the file has it
 TOO_SHORT = "too short"  # of a record
+ABSENT = "no such column"  # of a file: one asked for by name or number
 UNNAMED = "no column named"  # of a record whose columns may be recognised
 NO_RATE = "no sampling rate"  # the kind of error where nothing states one
 INTERRUPTED = 130  # exit code of a program that SIGINT ended: 128 + 2

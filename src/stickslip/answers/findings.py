@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from typing import TYPE_CHECKING, Any, Self, TypeVar
 
+from stickslip.answers.mistakes import hopeless
 from stickslip.errors import EstimateError, ModelError, StickslipError
 from stickslip.estimate import UNTRIED, Doubt, Estimate, Result, Status, doubts_of, kinds, stands
 from stickslip.printing import html_table
@@ -25,12 +26,23 @@ WHOLES = {
 }
 BY_FORCE = ("loops", "breakaway", "stiffness", "contact_damping", "transition", "coupled", "cause", "presliding")
 DRIVEN = "forcing frequency"  # no matter of friction
-NOT_TRIED = Doubt(
+SEEMING = Doubt(
     "not tried on twins: rigs that never stick, that slide at one level or on a rigid contact may seem "
     "to do so as well",
     UNTRIED,
 )
-ONSETS = ("sticks", "breakaway", "presliding")  # when it sticks, and what it does until it slips
+# The interval of loops alone held in 13 of 19 clean draws of eight kinds, in 3 of 7 that were 0.5 % off, and dampers
+# alone had a level in each (benchmarks/twins.py, seeds 260101 to 260105): the number stands, and is not sure.
+LEVELS = Doubt(
+    "not tried on twins: a damper alone may seem dry friction as well, and the interval leaves out errors of constants "
+    "and sensors",
+    UNTRIED,
+    lesser=True,
+)
+# By question, what is to be said of its answer until it is tried: how large friction is, when it sticks, and what it
+# does until it slips.
+NOT_TRIED = {"loops": LEVELS, "sticks": SEEMING, "breakaway": SEEMING, "presliding": SEEMING}
+ONSETS = ("sticks", "breakaway", "presliding")
 BY_DECREMENTS = ", by decrements"  # behind the name of a number that another method gave already
 
 
@@ -157,7 +169,7 @@ class Findings(Answers):
         """The numbers that lead, without those that a result tells by other ways, too, and without any force where what
         it rests on was stated wrongly."""
         left_out = [estimate for result in self.results.values() for estimate in getattr(result, "beside", ())]
-        if self.contradiction:
+        if self.contradiction or hopeless(self.results.get("consistency")):
             forces = _numbers(self.results.get(key) for key in BY_FORCE)
             left_out += [estimate for estimate in forces if estimate.name != DRIVEN]
         return tuple(estimate for estimate in self.estimates if estimate not in left_out)

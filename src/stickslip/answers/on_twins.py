@@ -8,7 +8,7 @@ from dataclasses import replace
 from functools import partial
 from typing import Any, TypeVar
 
-from stickslip.answers.findings import BY_FORCE, ONSETS, Findings, flagged, without
+from stickslip.answers.findings import BY_FORCE, NOT_TRIED, Findings, flagged, without
 from stickslip.balance.force import friction_force
 from stickslip.cycle.before_slip import Presliding, presliding
 from stickslip.cycle.loops import Loops, friction_loops
@@ -77,7 +77,7 @@ def tried(
     >>> sure.breakaway.ratio.known  # what such a record says of static friction its twins without any say too
     False
     """
-    findings = findings.having(**{key: without(findings.results.get(key), UNTRIED) for key in ONSETS})
+    findings = findings.having(**{key: without(findings.results.get(key), UNTRIED) for key in NOT_TRIED})
     answers = {estimate.name: estimate for estimate in findings.estimates}
     with workers(processes, __name__) as mapped:  # they are ready when the rig is found
         belief = believe(findings.record, mapped=mapped)

@@ -270,7 +270,7 @@ def _doubt(record: Record, given: Record, rig: RigSettings, *, aligned: bool) ->
     if "friction" in record and record.channels["friction"].source not in ("friction_force", "load"):
         return None
     sensors = [
-        f"{name}{FOUND if record.channels[name].mount is not None else ''}"
+        name if record.channels[name].mount is None else f"{name} (its mount found in this record)"
         for name in ("a", "load")
         if is_measured(record, name) and given.channels[name].mount is None
     ]

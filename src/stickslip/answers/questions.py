@@ -174,7 +174,7 @@ def _answer(question: Question, whole: Record, fused: Callable[[], Record], slid
 
 
 def _regression(record: Record, *, symmetric: bool = True) -> Regression:
-    """Where no spring holds the mass: its force, which goes with the acceleration, would be told as inertia."""
+    """The regression, but of a mass on a spring, whose force goes with the acceleration as inertia does."""
     spring = 0.0 if record.rig is None else record.rig.stiffness or 0.0
     if spring > 0 and "x" in record:
         raise EstimateError(
@@ -329,8 +329,8 @@ def _reasons(
 
 
 def untried(answers: dict[str, Any]) -> dict[str, Any]:
-    """The answers, with a doubt at those that rigs of another kind give too."""
-    return {**answers, **{key: with_doubt(answers.get(key), NOT_TRIED) for key in ONSETS}}
+    """The answers, with a doubt at those that may be otherwise on twins."""
+    return answers | {key: with_doubt(answers.get(key), doubt) for key, doubt in NOT_TRIED.items()}
 
 
 def _base_unseen(record: Record) -> bool:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -28,7 +27,7 @@ from stickslip.estimate import Estimate, Result
 from stickslip.files.expression import split_spec
 from stickslip.record.record import Record, Step
 from stickslip.rig.rig import Rig
-from stickslip.rig.settings import CommissionSettings, RigSettings, rig_settings
+from stickslip.rig.settings import CommissionSettings, RigSettings, rig_settings, rig_toml
 from stickslip.settings import nearest
 from stickslip.units import parse_unit
 
@@ -475,7 +474,7 @@ class Known:
         settings = self.settings()
         rig_settings(settings, source="what commissioning found")
         notes = ["# Written by stickslip commission: values with their standard uncertainty.", *self._notes()]
-        return "\n".join([*notes, "", *_lines(settings)]) + "\n"
+        return "\n".join([*notes, "", *rig_toml(settings)]) + "\n"
 
     def _notes(self) -> list[str]:
         stick = self.of("stick", OntoStick)
@@ -512,33 +511,3 @@ def _pm(estimate: Estimate) -> str:
 
 def _short(value: float) -> float:
     return float(f"{value:.5g}")
-
-
-def _lines(values: Mapping[str, Any], path: str = "") -> list[str]:
-    """A table of TOML: plain keys first, then its tables."""
-    plain = {key: value for key, value in values.items() if not isinstance(value, Mapping) and value is not None}
-    lines = [f"{_key(key)} = {_value(value)}" for key, value in plain.items()]
-    for key, value in values.items():
-        if isinstance(value, Mapping) and value:
-            name = f"{path}.{_key(key)}" if path else _key(key)
-            inner = _lines(value, name)
-            lines += ["", f"[{name}]", *inner] if any(not isinstance(v, Mapping) for v in value.values()) else inner
-    return lines
-
-
-def _key(key: str) -> str:
-    return (
-        key
-        if key.replace("_", "").replace("-", "").isalnum() and key.isascii()
-        else json.dumps(key, ensure_ascii=False)
-    )
-
-
-def _value(value: Any) -> str:
-    if isinstance(value, (list, tuple)):
-        return f"[{', '.join(map(_value, value))}]"
-    if isinstance(value, bool):
-        return str(value).lower()
-    if isinstance(value, (int, float)):
-        return repr(value)
-    return json.dumps(str(value), ensure_ascii=False)

@@ -1,4 +1,4 @@
-"""The whole experiment of the thesis on a simulated bench: commissioned, measured, analysed, and told in one report."""
+"""The whole experiment of the thesis, and the simulated bench on which it is done and told in one report."""
 
 from __future__ import annotations
 

@@ -114,7 +114,7 @@ def init(files: tuple[str, ...], yes: bool, output: Path, force: bool, **options
     _show(groups[0], record, guesses)
     if not yes:
         guesses = [_confirmed(guess) for guess in guesses]
-    settings = _settings(options, stated, guesses, {} if yes else _constants(options, record, guesses))
+    settings = _settings(options, stated, guesses, {} if yes else _constants(stated, record, guesses))
     rig = ss.rig.rig_settings(settings, source="the answers")
     try:
         output.write_text("\n".join(_toml(settings, groups[0])) + "\n", encoding="utf-8")
@@ -180,19 +180,19 @@ def _a_channel(text: str) -> str:
     return text
 
 
-def _constants(options: Mapping[str, Any], record: Record, guesses: Sequence[Guess]) -> dict[str, str]:
-    """Mass, spring, damper and what the mass slides on, where no option states them; nothing of what is not known."""
+def _constants(stated: RigSettings, record: Record, guesses: Sequence[Guess]) -> dict[str, str]:
+    """Mass, spring, damper and what the mass slides on, where they are not stated; nothing of what is not known."""
     say()
     constants: dict[str, str] = {}
     for name, question in CONSTANTS.items():
-        if options[name] is None:
+        if name not in stated.model_fields_set:
             answer = click.prompt(
                 f"{question}; Enter if not known", default="", show_default=False, value_proc=_a(name)
             )
             constants |= {name: answer} if answer else {}
     if any(guess.channel == "z" for guess in guesses):
         for name, question in (("contact", "What does the mass slide on"), ("damper", "What does the damper end on")):
-            if options[name] is None:
+            if name not in stated.model_fields_set:
                 constants[name] = click.prompt(question, type=click.Choice(["ground", "base"]), default="ground")
     return constants
 

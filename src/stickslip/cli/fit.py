@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,10 +15,12 @@ from stickslip.cli.options import constants_options, reading_options, result_opt
 from stickslip.cli.records import RIG_FILE, answer_together, default_folder, groups_of, read, rig_of
 from stickslip.cli.show import publish, show
 from stickslip.cli.terminal import complain, progress
+from stickslip.errors import ABSENT
 
 if TYPE_CHECKING:
     from stickslip import Record
     from stickslip.answers import Predictions
+    from stickslip.rig import RigSettings
 
 
 CURVES = (
@@ -60,8 +64,8 @@ def fit(
 
     FILES are records of one rig, best at several excitations: displacement or velocity of the mass, the base's motion
     z, and what else was measured (acceleration, load cell). Files that belong to one record are joined with +, as in
-    x.mat+z.mat. Each law is simulated exactly and fitted to all records at once; told is which laws the records leave
-    possible, how sure that is, and the best law's parameters.
+    x.mat+z.mat. Each law is simulated exactly and fitted to all records at once; told is which laws are kept, being
+    not rejected, how sure that is, and the best law's parameters.
 
     Results go into a folder: report.html to open in a browser, results.json, and the figures.
 
@@ -102,13 +106,24 @@ def _oscillator(file: Path | None) -> object:
     return None if file is None else ss.systems.read_system(file).system
 
 
-def _read_as_fitted(law: Path, channels: tuple[str, ...]) -> Path | None:
-    """How the record was read that the law was fitted to; None where this folder or the command states it."""
+def _fitted_reading(law: Path, rig: RigSettings) -> dict[str, Any]:
+    """How the record was read that the law was fitted to; nothing where the rig names columns itself."""
     file = (law / "law" if law.is_dir() else law.parent) / RIG_FILE
-    if channels or Path(RIG_FILE).is_file() or not file.is_file():
-        return None
-    complain(f"columns by {file}")
-    return file
+    if rig.channels or not file.is_file():
+        return {}
+    complain(f"columns by {file}, of files that have them")
+    stated = rig.reading()
+    return {name: value for name, value in ss.rig.read_rig(file).reading().items() if value and not stated[name]}
+
+
+def _read(files: Sequence[Path], rig: RigSettings, names: Sequence[str], *, fitted: Mapping[str, Any]) -> Record:
+    """The record by the columns of the fit, by its own where it has none of that name."""
+    try:
+        return read(files, rig.model_copy(update=fitted), names)
+    except ss.errors.RecordError as error:
+        if not fitted or error.kind != ABSENT:
+            raise
+    return read(files, rig, names)
 
 
 @click.command()
@@ -129,10 +144,10 @@ def predict(
     """Simulate a fitted law along other records, and say how much of them it follows.
 
     LAW is the folder that stickslip fit wrote, its law/law.toml, or a file of a system as stickslip simulate reads it.
-    FILES are records that the law was not fitted to, read by the columns of the one that it was unless stated: the
-    base's motion z or the applied force drives the simulation as it was recorded, and the sensors read it as --config
-    states them. Nothing is fitted to a record but how its motion begins and each sensor's zero. Several records are a
-    table, one row a file.
+    FILES are records that the law was not fitted to. Unless columns are stated they are read by those of the record
+    that it was, where a file has them. The base's motion z or the applied force drives the simulation as it was
+    recorded, and the sensors read it as --config states them. Nothing is fitted to a record but how its motion begins
+    and each sensor's zero. Several records are a table, one row a file.
 
     Told is of each channel 100 (1 - |y - yhat| / |y - mean y|) %, the fit of system identification.
 
@@ -142,7 +157,8 @@ def predict(
     stickslip fit slow.csv --mass 2.42 --stiffness 2310 --damping 0.12
     stickslip predict slow-fit fast.csv
     """
-    rig = rig_of(**{**options, "config": options["config"] or _read_as_fitted(law, options["channels"])})
+    rig = rig_of(**options)
+    reader = partial(_read, fitted=_fitted_reading(law, rig))
     oscillator = ss.answers.read_fitted(law, rig=rig)
     groups = groups_of(*files)
     folder = output or (None if as_json else default_folder(groups, "predicted"))
@@ -153,5 +169,6 @@ def predict(
     def ask(record: Record) -> Predictions:
         return ss.answers.predict(record, oscillator, rig=rig, plain=plain)
 
-    shown = {"as_json": as_json, "everything": everything}
-    answer_together(groups, rig, ask, together=together, folder=folder, **shown)
+    answer_together(
+        groups, rig, ask, together=together, folder=folder, as_json=as_json, everything=everything, reader=reader
+    )

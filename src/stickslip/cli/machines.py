@@ -74,8 +74,7 @@ def joint(
     if propose is not None:
         log = ss.answers.axis_record(next(ss.answers.episodes(read(groups[0], rig))), axis=axis)
         ss.write_record(ss.cycle.telling_motion(log), propose)
-    shown = {"as_json": as_json, "everything": everything}
-    answer_together(groups, rig, ask, together=together, folder=folder, **shown)
+    answer_together(groups, rig, ask, together=together, folder=folder, as_json=as_json, everything=everything)
 
 
 @click.command()

@@ -144,7 +144,8 @@ def answer_all(
         lambda record: ASK[question](record, rig, **query),
         together=lambda findings: compare(findings) if len(findings) > 1 else findings[0],
         folder=folder if output or not shown["as_json"] else None,
-        **shown,
+        as_json=shown["as_json"],
+        everything=shown["everything"],
     )
 
 

@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import importlib
+import shlex
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 import click
 
 import stickslip as ss
-from stickslip.cli.terminal import compiling, complain, mended, say, spoken
-from stickslip.errors import INTERRUPTED, INTERRUPTION
+from stickslip.cli.records import RIG_FILE
+from stickslip.cli.terminal import compiling, complain, say, spoken
+from stickslip.errors import INTERRUPTED, INTERRUPTION, MISSTATED, TOO_SHORT, UNNAMED, StickslipError
 
 COMMANDS = {  # by the file that they stand in
     "analyze": ("analyze", "demo", "impact"),
@@ -23,6 +27,8 @@ COMMANDS = {  # by the file that they stand in
     "vibrations": ("decay", "squeak", "wavelet"),
 }
 ARGUMENTS = "stickslip.arguments"  # the key under which the context keeps what was typed
+# Of each kind of error the options without which the command may succeed.
+CAUSES = {MISSTATED: ("--delimiter", "--decimal"), TOO_SHORT: ("--rows",)}
 
 
 class _Commands(click.Group):
@@ -50,8 +56,9 @@ class _Commands(click.Group):
             ctx.exit(_misused(error, error.ctx.command_path if error.ctx else within))
         except ss.StickslipError as error:
             complain(spoken(error))
-            for line in mended(ctx.meta.get(ARGUMENTS, ()), error):
-                say(line, err=True)
+            if remedy := self._remedy(ctx, error):
+                say("To mend it:", err=True)
+                say(shlex.join(["stickslip", *remedy]), err=True)
             ctx.exit(error.exit_code)
         except OSError as error:  # a name that the system does not take, a disk that is full
             if error.filename is None:
@@ -59,10 +66,45 @@ class _Commands(click.Group):
             complain(f"'{error.filename}' can not be used; {error.strerror}; name another file or folder.")
             ctx.exit(1)
 
+    def _remedy(self, ctx: click.Context, error: StickslipError) -> list[str]:
+        """The command that mends an error: it asks for columns, or is this one less an option; empty if none does."""
+        arguments = ctx.meta.get(ARGUMENTS, [])
+        if error.kind == UNNAMED:
+            name, command, rest = self.resolve_command(ctx, list(arguments))
+            return (
+                _naming(command.make_context(name, rest, parent=ctx, resilient_parsing=True).params) if command else []
+            )
+        kept = list(_without(arguments, CAUSES.get(error.kind, ())))
+        return kept if len(kept) < len(arguments) else []
+
 
 def _misused(error: click.UsageError, command: str) -> int:
     complain(f"{error.format_message().rstrip('.')}; see {command} --help.")
     return error.exit_code
+
+
+def _naming(parameters: Mapping[str, Any]) -> list[str]:
+    """The command that asks what the columns of a command's files are, and keeps what a file states of their rig."""
+    files, stated = parameters.get("files", ()), parameters.get("config")
+    if stated is None and Path(RIG_FILE).is_file():
+        stated = Path(RIG_FILE)
+    if not files:
+        return []
+    if stated is None:
+        return ["init", *files]
+    output = Path(f"{stated.stem}-columns.toml")
+    named = bool(ss.rig.read_rig(stated).channels)
+    return [] if named or output.exists() else ["init", *files, "--config", str(stated), "--output", str(output)]
+
+
+def _without(arguments: Sequence[str], options: Sequence[str]) -> Iterator[str]:
+    """The words but these options and their values."""
+    rest = iter(arguments)
+    for word in rest:
+        if word in options:
+            next(rest, None)
+        elif word.partition("=")[0] not in options:
+            yield word
 
 
 @click.group(cls=_Commands, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110})

@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from stickslip.rig import RigSettings
 
 Answer = TypeVar("Answer")
+Reader = Callable[[Sequence[Path], "RigSettings", Sequence[str]], "Record"]
 
 LONG = 1 << 26  # bytes on the disk
 RIG_FILE = "rig.toml"  # of the folder one is in: read where no other is named
@@ -255,6 +256,7 @@ def answers(
     tell: Callable[[str, float], None],
     *,
     of_parts: Callable[[Iterator[Record], Callable[[str], None]], Answer] | None = None,
+    reader: Reader = read,
 ) -> tuple[list[Answer], list[ss.StickslipError]]:
     """What each record answers, and why those that are left out do not; the last word where none does.
 
@@ -270,7 +272,7 @@ def answers(
                 say = functools.partial(_say, tell, f"analysing {name}", 2 * number)
                 results.append(of_parts(read_parts(group, rig, PART, names), say))
                 continue
-            record = read(group, rig, names)
+            record = reader(group, rig, names)
             tell(f"checking and analysing {name}", 2 * number + 1)
             results.append(ask(record))
     if results:
@@ -290,16 +292,18 @@ def answer_together(
     *,
     together: Callable[[list[Answer]], Any],
     folder: Path | None,
-    **shown: bool,
+    as_json: bool,
+    everything: bool,
+    reader: Reader = read,
 ) -> None:
     """Ask every record, put the answers together, leave them in a folder, and show them."""
     with progress(2 * len(groups) + 1) as tell:
-        found, refused = answers(groups, rig, ask, tell)
+        found, refused = answers(groups, rig, ask, tell, reader=reader)
         results = with_left_out(together(found), refused)
         tell("drawing and writing", 2 * len(groups))
         written = publish(results, folder)
     name_left_out(refused)
-    show(results, written, **shown)
+    show(results, written, as_json=as_json, everything=everything)
 
 
 def _say(tell: Callable[[str, float], None], what: str, done: float, state: str) -> None:

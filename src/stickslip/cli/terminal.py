@@ -10,18 +10,15 @@ import itertools
 import json
 import logging
 import re
-import shlex
 import shutil
 import sys
 import textwrap
 import threading
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 import click
 
-from stickslip.errors import MISSTATED, TOO_SHORT, UNNAMED, StickslipError
 from stickslip.printing import printable
 
 WIDEST = 110  # columns: longer lines are hard to read
@@ -160,8 +157,6 @@ _SPOKEN = (
         r"--\1",
     ),
 )
-# Of each kind of error the options without which the command may succeed.
-CAUSES = {MISSTATED: ("--delimiter", "--decimal"), TOO_SHORT: ("--rows",)}
 
 
 def spoken(sentence: object) -> str:
@@ -176,26 +171,3 @@ def spoken(sentence: object) -> str:
     for said, option in _SPOKEN:
         text = re.sub(said, option, text)
     return text
-
-
-def mended(arguments: Sequence[str], error: StickslipError) -> Iterator[str]:
-    """Two lines with the command that mends an error: one that asks for columns, or this one without an option."""
-    files = [word for word in arguments if Path(word).is_file()]
-    if error.kind == UNNAMED and files:
-        yield "To mend it:"
-        yield shlex.join(["stickslip", "init", *files])
-        return
-    kept = list(_without(arguments, CAUSES.get(error.kind, ())))
-    if len(kept) < len(arguments):
-        yield "To mend it:"
-        yield shlex.join(["stickslip", *kept])
-
-
-def _without(arguments: Sequence[str], options: Sequence[str]) -> Iterator[str]:
-    """The words but these options and their values."""
-    rest = iter(arguments)
-    for word in rest:
-        if word in options:
-            next(rest, None)
-        elif word.partition("=")[0] not in options:
-            yield word

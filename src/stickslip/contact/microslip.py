@@ -277,7 +277,8 @@ def _edges(window: Window, glide: Piece, pole: complex) -> tuple[float, float]:
     for step in STEPS:
         away = np.arange(-reach, reach + step * cycle / 2, step * cycle)
         pairs = itertools.product(begin + away, end + away)
-        inside = [(first, last) for first, last in pairs if low + 2 <= first < last <= high - 2]
+        # rows are fractional here: a micro-slip of less than a sample would fit what noise does between two
+        inside = [(first, last) for first, last in pairs if low + 2 <= first and first + 1 <= last <= high - 2]
         tried = [(_left(rows, values, first, last, pole), first, last) for first, last in inside]
         if tried:
             _, begin, end = min(tried)

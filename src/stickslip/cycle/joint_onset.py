@@ -1,4 +1,4 @@
-"""How much torque does a joint bear before it moves?"""
+"""How much torque does a joint bear before it moves; and which motion would tell all of its friction?"""
 
 from __future__ import annotations
 

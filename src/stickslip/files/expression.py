@@ -12,7 +12,7 @@ import warnings
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 
-from stickslip.errors import RecordError
+from stickslip.errors import ABSENT, RecordError
 from stickslip.record.channels import VOCABULARY
 from stickslip.units import MISMATCH, PLUS_MINUS, Unit, parse_unit, parse_value
 
@@ -167,6 +167,7 @@ def unknown(kind: str, name: str, known: Iterable[str]) -> RecordError:
         f"there is no {kind} '{name}'",
         f"the file has {shown or 'none'}",
         f"did you mean '{near[0]}'" if near else "choose one of them, by name or by number as in '#2'",
+        kind=ABSENT,
     )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import importlib
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
@@ -220,7 +221,7 @@ def _source(path: Path, options: Options) -> Source:
     if not size:
         raise FormatError(f"'{path.name}' is empty", "a record has rows of numbers", "copy or record the file again")
     for name in FORMATS:
-        room = importlib.import_module(f"stickslip.files.{name}")
+        room = _room(name)
         if room.recognise(path, head):
             with quietly(path):
                 table = room.read(path, options)
@@ -235,6 +236,12 @@ def _source(path: Path, options: Options) -> Source:
 
 def _room(name: str) -> ModuleType:
     return importlib.import_module(f"stickslip.files.{name}")
+
+
+@functools.cache
+def suffixes() -> frozenset[str]:
+    """The endings that files of the known formats have."""
+    return frozenset(suffix for name in FORMATS for suffix in _room(name).SUFFIXES)
 
 
 def _require_equal_length(columns: Columns, wanted: Sequence[Wanted], times: Mapping[int, TimeColumn]) -> None:

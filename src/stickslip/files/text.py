@@ -65,6 +65,8 @@ def ending(path: Path, layout: Layout) -> tuple[int, str]:
         file.seek(first)
         tail = file.read()
     lines = lines_of(tail, layout.encoding, whole=True)
+    if not lines:
+        return size, ""
     if first > layout.offset:
         lines = lines[1:]  # it may begin within its line
     judgement = judged(lines, layout.delimiter, layout.decimal, layout.comment)
@@ -521,7 +523,7 @@ def _header(lines: Sequence[str], delimiter: str, width: int) -> tuple[list[str]
             rows.append(row)
     if not rows:
         return [""] * width, [None] * width
-    if width % 2 == 0 and len(rows) > 1 and all(row[0] and len(set(row[0::2])) == 1 for row in rows):
+    if _is_paired(rows, width):
         return _paired(rows)
     return _stacked(rows[-2] if len(rows) > 1 else [""] * width, rows[-1])
 
@@ -536,6 +538,13 @@ def _header_cells(line: str, delimiter: str, width: int) -> list[str] | None:
     if len(row) == width - 1 and width > 2:  # rows of numbers that end in a delimiter
         row = [*row, ""]
     return row if len(row) == width and sum(bool(cell) for cell in row) > width // 3 else None
+
+
+def _is_paired(rows: Sequence[list[str]], width: int) -> bool:
+    """Whether each line says one key over all pairs; of a single pair, that a unit is among the keys."""
+    if width % 2 or len(rows) < 2 or not all(row[0] and len(set(row[0::2])) == 1 for row in rows):
+        return False
+    return width > 2 or any("unit" in row[0].lower() for row in rows)
 
 
 def _paired(rows: Sequence[list[str]]) -> tuple[list[str], list[str | None]]:

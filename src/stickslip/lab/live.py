@@ -7,7 +7,7 @@ import math
 import queue
 import threading
 import time
-from collections.abc import AsyncIterator, Callable, Mapping
+from collections.abc import AsyncIterator, Callable, Iterable, Mapping
 from concurrent.futures import Future
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import asynccontextmanager, suppress
@@ -267,17 +267,21 @@ class Session:
         record = self.monitor.window()
         if record is not None:
             self.due = time.monotonic() + EVERY
-            self.numbers = self.processes.submit(bench.answers, record, self.constants)
-            self.numbers.add_done_callback(self._answered)
+            try:
+                self.numbers = self.processes.submit(bench.answers, record, self.constants)
+            except BrokenProcessPool:  # the reading goes on, and a recording with it; the next cycle asks the new one
+                self.processes = pool(1, "stickslip.bench")
+                self._show([], ["The process that finds the numbers was ended; another one begins."])
+            else:
+                self.numbers.add_done_callback(self._answered)
 
     def _answered(self, numbers: Future[Any]) -> None:
-        """Show them."""
-        if numbers.cancelled():
-            return
-        try:
-            rows, untold = numbers.result()
-        except BrokenProcessPool:
-            rows, untold = [], ["The process that finds the numbers was ended; close the device and open it again."]
+        """They came, or their process was ended: then the next cycle begins another."""
+        if not numbers.cancelled() and not isinstance(numbers.exception(), BrokenProcessPool):
+            self._show(*numbers.result())
+
+    def _show(self, rows: Iterable[Iterable[Any]], untold: list[str]) -> None:
+        """Numbers on every page, and why some are not there."""
         plain = [[value if isinstance(value, str) or math.isfinite(value) else None for value in row] for row in rows]
         self.tell(frame({"kind": "numbers", "rows": plain, "untold": untold}))
 

@@ -11,18 +11,13 @@ from pathlib import Path
 
 from starlette.exceptions import HTTPException
 
+from stickslip.files.read import suffixes
+
 LARGEST = 2 << 30  # bytes of one file
 ALTOGETHER = 8 << 30  # bytes of all that are kept at a time
 AT_ONCE = 1 << 20  # bytes written in one go, away from the event loop
 UNUSED = 3600.0  # seconds after which a file that nobody asks about is removed
 LONGEST_LABEL = 120
-
-# What a file is called here: its own ending only chooses among these, for the readers go by what is in it.
-ENDINGS = {
-    "csv": ".csv", "txt": ".txt", "tsv": ".tsv", "tdms": ".tdms", "mat": ".mat", "uff": ".uff", "unv": ".uff",
-    "wav": ".wav", "flac": ".flac", "ogg": ".ogg", "h5": ".h5", "hdf5": ".h5", "parquet": ".parquet", "lvm": ".lvm",
-    "json": ".json",
-}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -101,7 +96,9 @@ class Uploads:
             self.remove(key)
 
     def _place(self, label: str) -> tuple[str, Path]:
-        key, ending = secrets.token_hex(16), ENDINGS.get(label.rpartition(".")[2].strip().lower(), ".dat")
+        # its own ending only chooses among those of known formats, for the readers go by what is in it
+        key, ending = secrets.token_hex(16), f".{label.rpartition('.')[2].strip().lower()}"
+        ending = ending if ending in suffixes() else ".dat"
         return key, self.folder / f"{key}{ending}"
 
     def _keep(self, upload: Upload) -> Upload:

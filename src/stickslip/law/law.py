@@ -48,6 +48,7 @@ WORK = 24.0  # calls of progress after which most of a fit is taken to be done
 UNSURE = 0.25  # of a coordinate: a wider deviation is looked at by the likelihood itself
 REACH = (0.7, 1.6, 3.2, 7.0)  # steps of the coordinate that the look takes, to three decades away
 FAINT = 1e-12  # of the sharpest direction: below it a direction is not seen at all
+PARTAKES = 0.01  # in a direction that is not seen: rounding leaves 1e-7 of it in the others
 HALVINGS = 3
 CLEAR = 0.05  # of what chi squared may rise by: a step that lowers it by less decides no end
 CLOSE = 10  # passes of a descent that starts near its end, damper, spring and gains among what is turned
@@ -407,7 +408,8 @@ def surety(problem: Problem, point: Point, tell: Callable[[], None]) -> Surety:
     On a rough surface neighbours are also those that pass the same place.
 
     Each row's influence on the parameters is ``G^-1 A' r``, G = A'A, A the derivatives less what the starts take over;
-    the parameters vary as its sum does. A parameter that is hardly seen gets the ends of its likelihood instead.
+    the parameters vary as its sum does. A parameter that is hardly seen gets the ends of its likelihood instead; one
+    that others can undo without a residual (two levels whose difference is a sensor's zero) has none.
     """
     size = len(problem.knobs)
     slopes = problem.slopes(point) if size else None
@@ -416,18 +418,22 @@ def surety(problem: Problem, point: Point, tell: Callable[[], None]) -> Surety:
         return Surety(wide, np.ones(size), np.column_stack([-wide, wide]), np.eye(size))
     seen = sum((np.sum(s.shared**2, axis=0) for s in slopes), np.zeros(size)) > 0
     sd, freedom, widths, correlations = np.full(size, math.inf), np.ones(size), np.ones(size), np.eye(size)
+    undone = np.zeros(size, dtype=bool)
     if seen.any():
         few = [Slopes(s.shared[:, seen], s.own) for s in slopes]
-        covariance, sd[seen], freedom[seen] = _sandwich(problem, point, few)
+        covariance, sd[seen], freedom[seen], undone[seen] = _sandwich(problem, point, few)
         widths[seen] = np.sqrt(np.diag(covariance))
         correlations[np.ix_(seen, seen)] = covariance / np.outer(widths[seen], widths[seen])
     quantile = np.array([student(max(1.0, f)) for f in freedom])
     ends = point.u[:, None] + np.outer(quantile * sd, [-1.0, 1.0])
+    ends[undone] = -math.inf, math.inf
     strays = float(np.median((sd[seen] / widths[seen]) ** 2)) if seen.any() else 1.0
     excess = max(1.0, point.chi2 / sum(map(len, point.residuals)), strays)
     # over static friction the likelihood is a stair, whose slopes tell nothing of its width
     faint = [
-        k for k, knob in enumerate(problem.knobs) if knob.kind == "above" or (sd[k] > UNSURE and knob.kind == "log")
+        k
+        for k, knob in enumerate(problem.knobs)
+        if knob.kind == "above" or (sd[k] > UNSURE and knob.kind == "log" and not undone[k])
     ]
     if faint:
         part = thinned_out(problem)
@@ -440,11 +446,15 @@ def surety(problem: Problem, point: Point, tell: Callable[[], None]) -> Surety:
     return Surety(sd, freedom, ends, correlations)
 
 
-def _sandwich(problem: Problem, point: Point, slopes: Sequence[Slopes]) -> tuple[Array, Array, Array]:
+def _sandwich(
+    problem: Problem, point: Point, slopes: Sequence[Slopes]
+) -> tuple[Array, Array, Array, NDArray[np.bool_]]:
     left = without_starts(slopes)
     normal = sum((a.T @ a for a in left), np.zeros((left[0].shape[1],) * 2))
     scale = np.sqrt(np.maximum(np.diag(normal), 1e-300))
     values, vectors = np.linalg.eigh(normal / np.outer(scale, scale))
+    # what leaves no residual has no scores either, whose sum would call it certain
+    undone = np.sqrt(np.sum(vectors[:, values < FAINT] ** 2, axis=1)) > PARTAKES
     values = np.maximum(values, FAINT)
     bread = (vectors / values) @ vectors.T / np.outer(scale, scale)
     variance, square = np.zeros(len(scale)), np.zeros(len(scale))
@@ -464,7 +474,7 @@ def _sandwich(problem: Problem, point: Point, slopes: Sequence[Slopes]) -> tuple
         again = np.sum(np.square(list(places.values())), axis=0) * len(places) / (len(places) - 1)
         freedom = np.where(again > variance, np.minimum(freedom, len(places) - 1), freedom)
         variance = np.maximum(variance, again)
-    return bread, np.sqrt(np.maximum(variance, 1e-300)), freedom
+    return bread, np.sqrt(np.maximum(variance, 1e-300)), freedom, undone
 
 
 def _over_time(sensors: Sequence[object], scores: Array) -> Array:

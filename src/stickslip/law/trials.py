@@ -495,7 +495,7 @@ def _fall(friction: Array, hold: int) -> tuple[float, slice]:
     """By what the friction is less after a release than the line that it followed until then, and where it is told; the
     release is searched.
 
-    `held` is the row from which on it surely slides.
+    `hold` is the row from which on it surely slides.
     """
     best, fall = np.inf, (0.0, slice(hold + CORNER, hold + AFTER))
     for release in range(hold // 2, hold + 1):

@@ -122,8 +122,10 @@ def compare_laws(
     records = [record] if isinstance(record, Record) else list(record)
     if not records:
         raise EstimateError("no record", "laws are compared by one record at least", "give one")
-    if not 0 <= calibration < 1:
-        raise ModelError(f"calibration = {calibration}", "it is a part of 1, as 0.01 for 1 %", "correct calibration=")
+    if not 0 < calibration < 1:
+        raise ModelError(
+            f"calibration = {calibration}", "it is a part of 1 above zero, as 0.01 for 1 %", "correct calibration="
+        )
     kinds = _kinds(laws)
     shown = [Shown.of(one, channels_of(one, None), oscillator) for one in records]
     for motion in shown:

@@ -278,22 +278,37 @@ def rig_toml(settings: Mapping[str, Any]) -> Iterator[str]:
     mass = "2.42 kg"
     <BLANKLINE>
     [channels]
-    "x" = "plate [mm]"
+    x = "plate [mm]"
     """
-    tables = {key: value for key, value in settings.items() if isinstance(value, Mapping)}
-    yield from (f"{key} = {_toml_value(value)}" for key, value in settings.items() if key not in tables)
-    for key, table in tables.items():
-        plain = {name: value for name, value in table.items() if not isinstance(value, Mapping)}
-        if plain:
-            entries = (f"{json.dumps(name)} = {_toml_value(value)}" for name, value in plain.items())
-            yield from ("", f"[{key}]", *entries)
-        for name in table.keys() - plain.keys():
-            inner = (f"{word} = {_toml_value(value)}" for word, value in table[name].items() if value is not None)
-            yield from ("", f"[{key}.{json.dumps(name)}]", *inner)
+    yield from _toml_lines(settings, "")
+
+
+def _toml_lines(values: Mapping[str, Any], path: str) -> Iterator[str]:
+    """A table, plain keys first, then the tables in it."""
+    for key, value in values.items():
+        if not isinstance(value, Mapping) and value is not None:
+            yield f"{_toml_key(key)} = {_toml_value(value)}"
+    for key, value in values.items():
+        if isinstance(value, Mapping) and value:
+            name = f"{path}.{_toml_key(key)}" if path else _toml_key(key)
+            if any(not isinstance(inner, Mapping) for inner in value.values()):
+                yield from ("", f"[{name}]")
+            yield from _toml_lines(value, name)
+
+
+def _toml_key(key: str) -> str:
+    bare = key.replace("_", "").replace("-", "").isalnum() and key.isascii()
+    return key if bare else json.dumps(key, ensure_ascii=False)
 
 
 def _toml_value(value: Any) -> str:
-    return json.dumps(list(value) if isinstance(value, tuple) else value, ensure_ascii=False)
+    if isinstance(value, (list, tuple)):
+        return f"[{', '.join(map(_toml_value, value))}]"
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, (int, float)):
+        return repr(value)
+    return json.dumps(str(value), ensure_ascii=False)
 
 
 def rig_settings(values: Mapping[str, Any], *, source: str = "the settings", lines: Sequence[str] = ()) -> RigSettings:

@@ -196,7 +196,7 @@ class _Builder:
         return known
 
     def _faces(self, stuck: Sequence[int], order: int) -> Rows:
-        """The counter-face's motion under the contacts that hold: (B, held, N)."""
+        """The counter-face's motion under the contacts that hold: (B, stuck, N)."""
         carried = np.array([self.contacts[c].carried for c in stuck]).reshape(-1, 1)
         return np.asarray(carried * self.face[order][:, None])
 

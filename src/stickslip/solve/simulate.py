@@ -1,4 +1,4 @@
-"""Run a system through its events."""
+"""Run a system through its events, and find when a quantity of a run crosses a level."""
 
 from __future__ import annotations
 

@@ -17,6 +17,8 @@ from stickslip.drives.kinds import Drive, HarmonicBase, Ramp, Release
 from stickslip.errors import ModelError
 from stickslip.estimate import UNKNOWN, doubts_of
 from stickslip.figures.law import law_plates
+from stickslip.figures.style import Array
+from stickslip.law.drive import driving
 from stickslip.law.fit_curve import CurveFit
 from stickslip.law.law import LawFit
 from stickslip.law.verdict import LawComparison
@@ -38,6 +40,8 @@ FILES = {
     "simulink": "friction.m",
 }  # fmt: skip
 COLUMNS = "rig.toml"  # beside the law: columns and units of the record that it was fitted to
+MOST = 0.5  # of the variance: what carries more is what drives the rig, not a line in the noise of a resting base
+CYCLES = 6.0  # that are shown first of a fit: the lines of more run into one another
 STEADY = 0.05  # of its spread that a base may stray from a straight line: a tone over its half period strays by 0.2
 ALONE = "# a law alone: to simulate it, add [system] with its mass and stiffness, and [drive]"
 DEFINITION = (
@@ -105,7 +109,18 @@ def _scope(result: Fit, records: Sequence[Record]) -> Scope | None:
         return None
     traces = fit.traces[0]
     name = next(iter(traces.measured))
-    return of_fit(records[0], {name: (traces.time[name], traces.fitted[name])}, ["fit"], type(fit.law).__name__)
+    fitted = {name: (traces.time[name], traces.fitted[name])}
+    return of_fit(records[0], fitted, ["fit"], type(fit.law).__name__, _middle(records[0]))
+
+
+def _middle(record: Record) -> tuple[float, float] | None:
+    """From when to when some cycles of the middle last; None where no tone drives the rig, or not for so many."""
+    channel = driving(record)
+    if channel is None or not np.isfinite(record[channel]).all():
+        return None
+    _, frequency, _, share = _tone(record[channel], record.fs)
+    length, middle = CYCLES / frequency, record.start + record.duration / 2
+    return (middle - length / 2, middle + length / 2) if share > MOST and 2 * length < record.duration else None
 
 
 def _ratio(misfit: float) -> str:
@@ -162,6 +177,7 @@ def write_law(draft: Path, result: LawComparison | LawFit | CurveFit, records: S
             text = _whole(text, result, records[0]) if records else f"{ALONE}\n{text}"
         (draft / "law" / file).write_text(text.rstrip("\n") + "\n", encoding="utf-8")
     reading = reading_of(records[0]) if records else {}
+    reading.pop("fs", None)  # of that file alone: the next one has its own clock, or is asked for it
     if reading:
         (draft / "law" / COLUMNS).write_text("\n".join(rig_toml(reading)) + "\n", encoding="utf-8")
 
@@ -196,14 +212,22 @@ def _drive(record: Record, given: Drive) -> Drive:
         speed, begin = np.polyfit(time, z, 1)
         if np.std(z - begin - speed * time) < STEADY * np.std(z) and getattr(given, "contact", "ground") == "ground":
             return Ramp(float(speed))
-        frequency = forcing_frequency(z, record.fs).value
-        turns = 2 * np.pi * frequency * time
-        a, b, _ = np.linalg.lstsq(np.column_stack([np.cos(turns), np.sin(turns), np.ones(len(z))]), z, rcond=None)[0]
-        contact = getattr(given, "contact", "ground")
-        return HarmonicBase(float(np.hypot(a, b)), frequency=frequency, phase=float(np.arctan2(-b, a)), contact=contact)
+        amplitude, frequency, phase, _ = _tone(z, record.fs)
+        return HarmonicBase(amplitude, frequency=frequency, phase=phase, contact=getattr(given, "contact", "ground"))
     still = isinstance(given, HarmonicBase) and given.amplitude == 0
     known = all(isinstance(value, int | float | str) for value in vars(given).values())
     return given if known and not still else Release()
+
+
+def _tone(values: Array, fs: float) -> tuple[float, float, float, float]:
+    """Amplitude, frequency [Hz] and phase of the strongest line, and its share of the variance."""
+    frequency = forcing_frequency(values, fs).value
+    turns = 2 * np.pi * frequency * np.arange(len(values)) / fs
+    waves = np.column_stack([np.cos(turns), np.sin(turns), np.ones(len(values))])
+    solution = np.linalg.lstsq(waves, values, rcond=None)[0]
+    a, b, _ = solution
+    share = 1 - float(np.var(values - waves @ solution) / np.var(values))
+    return float(np.hypot(a, b)), frequency, float(np.arctan2(-b, a)), share
 
 
 def _plain(name: str, values: Mapping[str, Any]) -> str:
@@ -278,7 +302,7 @@ def _scope_of(part: Prediction, law: str) -> Scope | None:
     """Each channel with what the law's sensor would have read over it, and what is left; none of a broken clock."""
     traces = part.fit.traces[0]
     fitted = {name: (traces.time[name], traces.fitted[name]) for name in part.follows}
-    return of_fit(part.record, fitted, ["analyze"], f"{law}, as it was given")
+    return of_fit(part.record, fitted, ["analyze"], f"{law}, as it was given", _middle(part.record))
 
 
 def _law(predictions: Predictions) -> str:

@@ -78,7 +78,10 @@ def report(result: Any, path: str | Path, **context: Any) -> Path:
 
 
 def sections(story: Story, *, png: bool = False, figures: bool = True) -> list[Story]:
-    """The sections of the page, with their figures drawn, as PNG too where asked for; or as soon as can be."""
+    """The sections of the page, their figures drawn, as PNG too where asked for.
+
+    Without `figures` a section has the one that leads, and none where the page draws the record itself.
+    """
     return [part.drawn(png=png) if figures else _quick(part) for part in (story, *story.parts)]
 
 

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from stickslip.answers.findings import Findings
-from stickslip.balance.motion import forcing_frequency, is_measured
+from stickslip.balance.motion import is_measured
 from stickslip.consistent.checks import Slip
 from stickslip.errors import StickslipError
 from stickslip.figures.contact import across
@@ -32,7 +32,6 @@ MOST_PANELS = 4
 PANELS = ("x", "theta", "v", "a", "load", "force", "friction", "normal", "sound")
 EXPLAINED = "inertia, viscous and dry friction"  # the model of a regression
 LEFT = "left"  # the line of what a model leaves
-CYCLES = 6.0  # that are shown first of a fit: the lines of more run into one another
 BESIDE = {"x": "z"}  # drawn in the same panel
 HERE = "{here}"  # before the name of a file that lies beside the page, which knows its folder
 ROWS = "--rows {first}:{last}"  # of a command, with the rows left open
@@ -207,9 +206,13 @@ def _moved(findings: Findings, twin: Record | None) -> Panel:
 
 
 def of_fit(
-    record: Record, fitted: Mapping[str, tuple[Array, Array]], question: Sequence[str], model: str
+    record: Record,
+    fitted: Mapping[str, tuple[Array, Array]],
+    question: Sequence[str],
+    model: str,
+    view: tuple[float, float] | None = None,
 ) -> Scope | None:
-    """Some cycles of channels, each with what was fitted to it and what is left; none of a broken clock."""
+    """Channels, each with what was fitted to it and what is left, from `view` on; none of a broken clock."""
     if record.stamps is not None:
         return None
     panels = []
@@ -221,19 +224,7 @@ def of_fit(
             Panel(f"{name}, measured less model", unit, {LEFT: record[name] - over}),
         ]
     command, first = command_of(record, *question)
-    return Scope(record.start, record.fs, panels, model, command=command, first=first, view=_middle(record))
-
-
-def _middle(record: Record) -> tuple[float, float] | None:
-    """From when to when some cycles of the middle last; None where nothing shook the record, or not for so many."""
-    drive = next(
-        (record[name] for name in ("z", "force") if name in record and 0 < np.ptp(record[name]) < np.inf), None
-    )
-    if drive is None:
-        return None
-    length = CYCLES / forcing_frequency(drive, record.fs).value
-    middle = record.start + record.duration / 2
-    return (middle - length / 2, middle + length / 2) if 2 * length < record.duration else None
+    return Scope(record.start, record.fs, panels, model, command=command, first=first, view=view)
 
 
 def of_run(record: Record, period: float, view: tuple[float, float], constants: Mapping[str, Any], file: str) -> Scope:

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
 WITHIN_DIGIT = "within its last digit"  # an interval narrower than the digits shown
 FIGURES = 5  # significant figures at most: what is surer than that still reads well
+SHARE_FIGURES = 3  # of a share, or of what it lacks of the whole: no scatter of cycles says so well when a stick begins
 
 
 def number(value: float, sd: float, unit: str) -> str:
@@ -162,12 +163,12 @@ def _rounded(value: float, digits: int) -> str:
     return f"{round(value, digits) + 0.0:.{digits}f}"
 
 
-def _digits(sd: float, value: float) -> int:
+def _digits(sd: float, value: float, figures: int = FIGURES) -> int:
     if max(abs(value), sd) < NOTHING:
         return 0
     if sd == 0:  # a constant that was given, a count that never varied
         return max(0, len(f"{value:.4g}".partition(".")[2]))
-    most = FIGURES - 1 - math.floor(math.log10(abs(value))) if value and math.isfinite(value) else FIGURES
+    most = figures - 1 - math.floor(math.log10(abs(value))) if value and math.isfinite(value) else figures
     return max(0, min(decimals(sd, value), most))
 
 
@@ -175,5 +176,6 @@ def _scale(estimate: Estimate) -> tuple[float, str, int]:
     """Factor, unit and decimals in which an estimate reads well."""
     share = "share" in estimate.name and estimate.unit == "1"
     factor, text = (100.0, "%") if share else prefixed(np.array([estimate.value, *estimate.interval]), estimate.unit)
-    digits = _digits(factor * estimate.spread, factor * estimate.value)
+    value, spread = factor * estimate.value, factor * estimate.spread
+    digits = _digits(spread, min(value, 100.0 - value), SHARE_FIGURES) if share else _digits(spread, value)
     return factor, "" if text == "1" else f" {text}", digits
