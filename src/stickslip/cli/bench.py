@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import importlib.util
 import re
-import sys
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -18,7 +17,7 @@ import stickslip.bench as bench
 from stickslip.cli.options import all_option, pair, usable
 from stickslip.cli.records import groups_of, read
 from stickslip.cli.show import print_json, show
-from stickslip.cli.terminal import aligned, progress, say, say_json, wrapped
+from stickslip.cli.terminal import aligned, progress, redrawn, say, say_json, wrapped
 from stickslip.errors import INTERRUPTED
 
 if TYPE_CHECKING:
@@ -165,21 +164,17 @@ def _asked_at_rig(device: Device, step: BenchStep, kept: Path | None, rig: RigSe
 @contextlib.contextmanager
 def _picture(seconds: float) -> Iterator[Callable[[Device, bench.Block], None] | None]:
     """What draws the blocks of a recording on the error stream as they come; nothing where nobody watches."""
-    if not sys.stderr.isatty():
-        yield None
-        return
-    from rich.console import Console
-    from rich.live import Live
-    from rich.text import Text
-
     drawn, due = bench.Picture(seconds), 0.0
-    with Live(console=Console(stderr=True), auto_refresh=False, transient=True) as live:
+    with redrawn() as draw:
+        if draw is None:
+            yield None
+            return
 
         def watch(device: Device, block: bench.Block) -> None:
             nonlocal due
             drawn.add(device, block)
             if time.monotonic() >= due:
-                live.update(Text("\n".join(drawn.lines(device)), overflow="crop", no_wrap=True), refresh=True)
+                draw(drawn.lines(device))
                 due = time.monotonic() + 0.1
 
         yield watch

@@ -127,6 +127,20 @@ def progress(steps: int) -> Iterator[Callable[..., None]]:
         bar.stop()
 
 
+@contextlib.contextmanager
+def redrawn() -> Iterator[Callable[[Sequence[str]], None] | None]:
+    """What draws lines in place of those before, on the error stream; None where nobody watches."""
+    if not sys.stderr.isatty():
+        yield None
+        return
+    from rich.console import Console
+    from rich.live import Live
+    from rich.text import Text
+
+    with Live(console=Console(stderr=True), auto_refresh=False, transient=True) as live:
+        yield lambda lines: live.update(Text("\n".join(lines), overflow="crop", no_wrap=True), refresh=True)
+
+
 REPAIRS = {
     "repair_clock": "clock",
     "fill_gaps": "gaps",

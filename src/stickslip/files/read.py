@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 import importlib
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
@@ -236,12 +235,6 @@ def _source(path: Path, options: Options) -> Source:
 
 def _room(name: str) -> ModuleType:
     return importlib.import_module(f"stickslip.files.{name}")
-
-
-@functools.cache
-def suffixes() -> frozenset[str]:
-    """The endings that files of the known formats have."""
-    return frozenset(suffix for name in FORMATS for suffix in _room(name).SUFFIXES)
 
 
 def _require_equal_length(columns: Columns, wanted: Sequence[Wanted], times: Mapping[int, TimeColumn]) -> None:

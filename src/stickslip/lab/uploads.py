@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import re
 import secrets
 import time
 from collections.abc import AsyncIterator, Callable
@@ -10,8 +11,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from starlette.exceptions import HTTPException
-
-from stickslip.files.read import suffixes
 
 LARGEST = 2 << 30  # bytes of one file
 ALTOGETHER = 8 << 30  # bytes of all that are kept at a time
@@ -96,9 +95,9 @@ class Uploads:
             self.remove(key)
 
     def _place(self, label: str) -> tuple[str, Path]:
-        # its own ending only chooses among those of known formats, for the readers go by what is in it
+        # its own ending only helps the readers, who go by what is in it
         key, ending = secrets.token_hex(16), f".{label.rpartition('.')[2].strip().lower()}"
-        ending = ending if ending in suffixes() else ".dat"
+        ending = ending if re.fullmatch(r"\.[a-z0-9]{1,8}", ending) else ".dat"
         return key, self.folder / f"{key}{ending}"
 
     def _keep(self, upload: Upload) -> Upload:
