@@ -249,7 +249,7 @@ def _sentences(
                 f"{_either(limits)} would have to be so stiff that {'they are' if limits[1:] else 'it is'} rigid"
             )
         rivalry = "; ".join(clauses) or "no law of another family was tried"
-        fits = f"{kept[0]} fits best: the" if len(kept) == 1 else "The"
+        fits = f"{kept[0][:1].upper()}{kept[0][1:]} fits best: the" if len(kept) == 1 else "The"
         lead = f"The best of those tried {remainder}. Among them the" if remainder.share > LEFT else fits
         yield f"{lead} friction is {family_of(best.name).said}: {rivalry}."
     if best.family == "rigid" and len(families) == 1 and excess_ is not None:

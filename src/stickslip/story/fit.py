@@ -110,7 +110,9 @@ def _scope(result: Fit, records: Sequence[Record]) -> Scope | None:
     traces = fit.traces[0]
     name = next(iter(traces.measured))
     fitted = {name: (traces.time[name], traces.fitted[name])}
-    return of_fit(records[0], fitted, ["fit"], type(fit.law).__name__, _middle(records[0]))
+    values = _values(fit.law)
+    law = f"{type(fit.law).__name__}{f' ({values})' if values else ''}"
+    return of_fit(records[0], fitted, ["fit"], law, _middle(records[0]))
 
 
 def _middle(record: Record) -> tuple[float, float] | None:
