@@ -151,13 +151,12 @@ def of_stability(stability: Stability) -> Story:
         (f"{mode.frequency:.5g} Hz", f"{mode.growth:.4g} 1/s", f"{mode.damping_ratio:.3g}") for mode in stability.modes
     ]
     tone = f"at {stability.frequency:.5g} Hz"
-    if stability.stable:
-        answer = (
-            f"Steady sliding is stable: the slowest vibration, {tone}, dies away by {abs(stability.growth):.4g} 1/s."
-        )
+    if not stability.stable:
+        answer = f"Steady sliding is unstable by {stability.mechanism}: a vibration {tone} {stability.course}."
+    elif stability.growth < 0:
+        answer = f"Steady sliding is stable: the slowest vibration, {tone}, {stability.course}."
     else:
-        growth = f"{stability.growth:.4g} 1/s"
-        answer = f"Steady sliding is unstable by {stability.mechanism}: a vibration {tone} grows by {growth}."
+        answer = f"Steady sliding is at the border of stability: a vibration {tone} {stability.course}."
     keys = ("stable", "mechanism", "growth", "without_coupling", "without_slope", "place", "loads", "status")
     modes = [{key: getattr(mode, key) for key in ("frequency", "growth", "damping_ratio")} for mode in stability.modes]
     return Story(
