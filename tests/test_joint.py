@@ -1,6 +1,7 @@
 """Joints of an integrator of our own, and a real axis: friction, load, gravity, breakaway, and what can not be told."""
 
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -295,6 +296,32 @@ def test_a_unit_that_nobody_stated_is_flagged():
     assert "nobody stated a unit" in found.joint.level.status
     assert not stands(found.joint.level.status)
     assert kinds(found.joint.level.status) == {""}
+
+
+@pytest.mark.parametrize(
+    ("scale", "size", "remedy"),
+    [
+        (180 / np.pi, 0.0, "=deg"),
+        (180 / np.pi, 360 / 4096, "=deg"),
+        (4 / np.pi, 360 / 4096, "=deg"),
+        (4096 / (2 * np.pi), 1.0, "/ 4096 [turn]"),
+    ],
+    ids=["degrees", "degrees of an encoder", "few of them", "counts"],
+)
+def test_an_angle_without_a_unit_that_is_not_in_rad_is_named(scale, size, remedy):
+    q, v, a = motion()
+    position = scale * q if not size else np.round(scale * q / size) * size
+    with pytest.raises(RecordError, match=re.escape(remedy)):
+        analyze_joint(ss.Record.of({"position": position, "effort": torque(q, v, a)}, fs=200.0))
+    stated = ss.Record.of({"position": 4 * q, "effort": torque(q, v, a)}, fs=200.0, units={"position": "rad"})
+    assert list(axis_record(stated)) == ["theta", "force"]
+
+
+def test_an_encoder_in_rad_is_no_mistake():
+    q, v, a = motion()
+    size = 2 * np.pi / 4096
+    log = ss.Record.of({"position": np.round(q / size) * size, "effort": torque(q, v, a)}, fs=200.0)
+    assert analyze_joint(log).joint.forward.value == pytest.approx(0.07, rel=0.02)
 
 
 def test_a_log_of_lerobot(tmp_path):

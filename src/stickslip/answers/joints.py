@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from stickslip.answers.findings import Comparison, Findings, Inquiry, flagged, record_name, require_several, with_doubt
+from stickslip.answers.mistakes import require_angle
 from stickslip.cycle.joint import JointFriction, regress_joint
 from stickslip.cycle.joint_fit import regress_joint_logs
 from stickslip.cycle.joint_onset import joint_breakaway
@@ -251,7 +252,7 @@ def axis_record(record: Record, *, axis: str | None = None) -> Record:
     Raises
     ------
     RecordError
-        No position is found, or several axes and none named.
+        No position is found, several axes and none named, or an angle without a unit that is not in rad.
 
     Examples
     --------
@@ -261,6 +262,7 @@ def axis_record(record: Record, *, axis: str | None = None) -> Record:
     ['theta', 'reference']
     """
     if axis is None and ("theta" in record or "x" in record):
+        require_angle(record)
         return record
     columns = list(_columns(record))
     axes = list(dict.fromkeys(column.axis for column in columns if column.kind == "theta"))
@@ -279,7 +281,9 @@ def axis_record(record: Record, *, axis: str | None = None) -> Record:
             "the friction of one axis is asked for at a time",
             nearest(axis or "", axes) if axis else f"name one: --axis {axes[0]}",
         )
-    return _renamed(record, [column for column in columns if column.axis == chosen[0]], chosen[0])
+    log = _renamed(record, [column for column in columns if column.axis == chosen[0]], chosen[0])
+    require_angle(log)
+    return log
 
 
 def _called(record: Record, name: str) -> str:

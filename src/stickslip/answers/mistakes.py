@@ -5,15 +5,22 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 
+import numpy as np
+
 from stickslip.consistent.checks import MILLISECONDS, Slip
 from stickslip.consistent.contradictions import Consistency
 from stickslip.cycle.loops import Loops
+from stickslip.errors import RecordError
 from stickslip.record.record import Record
 from stickslip.rig.settings import RigSettings
+from stickslip.signals.noise import quantisation_step
 
 LATEST = 0.1  # of a record's length: a sensor that is said to be later, and tells of no cycle, is late by milliseconds
 SHORTEST_DELAY = 0.05  # s: a true delay of more than a cycle is shorter than this, where the motion is fast
 HALF_TURN = math.pi  # rad: what swings farther, and is called an angle in rad, is one in degrees
+WHOLE_TURN = 2 * math.pi  # rad: what turns farther without a unit is as likely in degrees, or in counts of an encoder
+BITS = range(8, 25)  # of an encoder, whose counts are this power of two's part of a turn
+ALIKE = 1e-4  # by which a step may miss a count's: counts of 360 degrees and of 2 pi rad are 10 % apart at the nearest
 BALANCED = ("balance", "energy")  # checks that a wrong mass, spring or sensor fails
 FAR = 2.0  # times by which two sides that should be one differ, from which no force is given
 NEAR = 0.1  # by which a ratio of frequencies may miss the one that a slip makes
@@ -105,3 +112,36 @@ def _of_frequency(frequency: float, mass: float | None, stiffness: float | None)
     ):
         if abs(ratio / expected - 1) < NEAR:
             yield slip
+
+
+def require_angle(record: Record) -> None:
+    """Refuse an angle without a unit that is none in rad: by an encoder's count, or as it turns too far.
+
+    Raises
+    ------
+    RecordError
+        The unit has to be stated: which one, and how.
+
+    Examples
+    --------
+    >>> swung = Record.of({"theta": np.round(60 * np.sin(np.arange(500) / 50) / 0.087890625) * 0.087890625}, fs=100)
+    >>> require_angle(swung)  # its unit is that of Record.of: rad
+    """
+    for name in ("theta", "reference"):
+        if name not in record or not record.channels[name].assumed:
+            continue
+        column, step = record.channels[name].column or name, quantisation_step(record[name])
+        low, high = float(np.min(record[name])), float(np.max(record[name]))
+        if high - low <= WHOLE_TURN and not any(abs(step * 2**bits / 360 - 1) < ALIKE for bits in BITS):
+            continue
+        kind, remedy = "degrees", f'--units "{column}=deg", or =rad where it is'
+        if step == 1:
+            kind, remedy = (
+                "counts of an encoder",
+                f'--channels "{name}={column} / 4096 [turn]", by its counts in a turn',
+            )
+        raise RecordError(
+            f"{column} runs from {low:.4g} to {high:.4g}{f', in steps of {step:.4g}' if step else ''}, without a unit",
+            f"an angle in rad hardly does: it is in {kind}",
+            f"state its unit: {remedy}",
+        )
