@@ -124,11 +124,8 @@ all_option = click.option(
 )
 
 
-def result_options(folder: str, *, short: bool = True) -> Decorator:
-    """The options that say where the results go; `folder` is where they go unless it is said.
-
-    With `short` the terminal has the answer, and all of it is an option.
-    """
+def result_options(folder: str) -> Decorator:
+    """The options that say where the results go, `folder` unless it is said, and how much of them is printed."""
     output = click.option(
         "--output",
         type=click.Path(path_type=Path),
@@ -142,7 +139,7 @@ def result_options(folder: str, *, short: bool = True) -> Decorator:
         is_flag=True,
         help="Print the results as JSON and nothing else; a folder is written only with --output.",
     )
-    return together(output, as_json, *([all_option] if short else []))
+    return together(output, as_json, all_option)
 
 
 changes_option = click.option(

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import itertools
+from collections.abc import Iterable, Iterator, Mapping
+from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
@@ -16,8 +18,8 @@ _ROW = ("place", "quantity", "verdict", "why")
 
 @click.command()
 @click.argument("chapters", nargs=-1, metavar="[CHAPTER]...")
-@result_options("thesis-stickslip", short=False)
-def thesis(chapters: tuple[str, ...], output: Path | None, as_json: bool) -> None:
+@result_options("thesis-stickslip")
+def thesis(chapters: tuple[str, ...], output: Path | None, as_json: bool, everything: bool) -> None:
     """Reproduce the thesis: every printed number beside ours with a verdict, every figure beside its caption.
 
     All chapters, or those named: numbers and figures are computed from the printed parameters, and one page is
@@ -43,35 +45,41 @@ def thesis(chapters: tuple[str, ...], output: Path | None, as_json: bool) -> Non
     if as_json:
         say_json(results)
     else:
-        _show(results, done, folder)
+        _show(results, done, folder, everything=everything)
     if not pages.holds(results):
         raise SystemExit(1)
 
 
-def _show(results: dict[str, Any], done: tuple[Any, ...], folder: Path | None) -> None:
-    rows = []
-    others = (entry for entry in results["numbers"] if entry["verdict"] != "same")
-    for key, group in itertools.groupby(others, key=lambda entry: [entry[name] for name in _ROW]):
-        entries = list(group)
-        label = f", {entries[0]['entry']}" * bool(entries[0]["entry"]) + f" and {len(entries) - 1} more" * (
-            len(entries) > 1
-        )
-        ours = entries[0]["ours"]
-        rows.append(
-            [f"{key[0]}: {key[1]}{label}", entries[0]["printed"], "-" if ours is None else f"{ours:.4g}", *key[2:]]
-        )
-    if rows:
-        say("\n".join(aligned(("number", "printed", "ours", "verdict", "why"), rows)))
-    counts = [[chapter.name, *(str(chapter.counts[verdict]) for verdict in results["verdicts"])] for chapter in done]
-    say("\n".join(aligned(("chapter", *results["verdicts"]), counts)))
-    total = ", ".join(f"{count} {verdict}" for verdict, count in results["verdicts"].items() if count)
-    say("\n".join(wrapped(f"{sum(results['verdicts'].values())} printed numbers: {total}.")))
+def _show(results: dict[str, Any], done: tuple[Any, ...], folder: Path | None, *, everything: bool) -> None:
+    verdicts = {verdict: count for verdict, count in results["verdicts"].items() if count}
+    say("\n".join(wrapped(f"{sum(verdicts.values())} printed numbers: {_counted(verdicts)}.")))
+    unseen = [entry for entry in results["seen"] if not entry["seen"]]
     if results["seen"]:
-        ticked = sum(one["seen"] for one in results["seen"])
-        say(f"Of {len(results['seen'])} things that the text says one should see, {ticked} are seen.")
-        unseen = [
-            f"not seen: {one['says']} ({one['section']}): {one['why']}" for one in results["seen"] if not one["seen"]
-        ]
-        say("\n".join(line for text in unseen for line in wrapped(text)))
+        count = len(results["seen"])
+        say(f"Of {count} things that the text says one should see, {count - len(unseen)} are seen.")
+    say("")
+    counts = [[chapter.name, str(sum(chapter.counts.values())), _counted(chapter.counts)] for chapter in done]
+    say("\n".join(aligned(("chapter", "numbers", "verdicts"), counts)))
+    for entry in unseen:
+        say("\n".join(wrapped(f"Not seen: {entry['says']} ({entry['section']}): {entry['why']}")))
+    others = [entry for entry in results["numbers"] if entry["verdict"] != "same"]
+    if everything and others:
+        say("")
+        say("\n".join(aligned(("number", "printed", "ours", "verdict", "why"), list(_rows(others)))))
+    elif others:
+        say(f"More with --all: the {len(others)} numbers that are not the same, each with why.")
     if folder is not None:
         say(f"Report: {folder / 'thesis.html'}")
+
+
+def _counted(verdicts: Mapping[str, int]) -> str:
+    return ", ".join(f"{count} {verdict}" for verdict, count in verdicts.items() if count)
+
+
+def _rows(numbers: Iterable[Mapping[str, Any]]) -> Iterator[list[str]]:
+    """A row for those of one place that have one verdict for one reason."""
+    for (place, quantity, verdict, why), group in itertools.groupby(numbers, key=itemgetter(*_ROW)):
+        first, *more = group
+        entry, others = f", {first['entry']}" * bool(first["entry"]), f" and {len(more)} more" * bool(more)
+        ours = "-" if first["ours"] is None else f"{first['ours']:.4g}"
+        yield [f"{place}: {quantity}{entry}{others}", first["printed"], ours, verdict, why]
