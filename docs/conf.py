@@ -58,5 +58,6 @@ html_theme_options = {
     "footer_start": ["copyright"],
     "footer_end": [],
 }
-html_sidebars = dict.fromkeys(("index", "start", "tutorial"), ())  # pages without sections beside them
+# pages without sections beside them
+html_sidebars = dict.fromkeys(("index", "start", "tutorial", "commands", "real"), ())
 html_show_sourcelink = False

@@ -129,6 +129,18 @@ def test_a_record_of_a_million_samples_makes_a_light_page() -> None:
     assert 15 * (last - first) <= 270_000  # lines
 
 
+def test_the_fitted_decay_lies_on_the_record_that_it_was_fitted_to() -> None:
+    """It is fitted to means over blocks of many samples, and drawn at the samples."""
+    released = ss.Oscillator(mass=1.0, stiffness=10.0, damping=0.2, law=ss.laws.Coulomb(0.2))
+    record = ss.simulate(released, duration=40.0, start={"x": 1.0}).record(fs=500.0)
+    scope = ss.summary(ss.analyze_decay(record, stiffness=10.0)).scope
+    assert scope is not None
+    merits = [panel["merit"] for panel in scope.packed()["panels"] if "merit" in panel]
+    assert merits[0] > 99.99
+    left = scope.panels[1].lines["left"]
+    assert np.nanmax(np.abs(left)) < 1e-4, "of a motion of 1 m"
+
+
 def test_what_the_page_draws_is_the_record_to_its_last_digit() -> None:
     import base64
 

@@ -18,6 +18,7 @@ import stickslip as ss
 from stickslip.cli.program import main
 from stickslip.consistent.checks import Amplitudes, mixups
 
+EXAMPLE = Path(__file__).parents[1] / "examples" / "rig.csv"
 RIG = ("--mass", "2", "--stiffness", "3000", "--damping", "1")
 HEADER = "t [s],x [m],z [m],a [m/s^2],load [N]"
 
@@ -348,3 +349,19 @@ def test_a_mass_that_friction_carries_on_a_shaken_table_is_stated_rightly() -> N
     )
     record = ss.Rig.perfect("x", "z").measure(ss.simulate(slider, duration=6.0), fs=1000, rng=1, start=3.0)
     assert ss.analyze(record, mass=1.0, stiffness=4.0, contact="base").contradiction == ""
+
+
+@pytest.mark.parametrize(
+    ("channels", "stiffness", "mended"),
+    [
+        (["x=plate [mm]", "z=base [mm]", "a=acc * -1 [g]"], "2310", "a=-1 * (acc * -1) [g]"),
+        (["x=plate [mm]", "z=base [mm]"], "2.31", "--stiffness 2310"),
+        (["z=plate [mm]", "x=base [mm]", "a=acc [g]"], "2310", "x=plate [mm]"),
+    ],
+)
+def test_a_fit_names_the_mistake_and_the_command_that_mends_it(channels, stiffness, mended, tmp_path) -> None:
+    named = [word for channel in channels for word in ("--channels", channel)]
+    rig = ["--mass", "2.42", "--stiffness", stiffness, "--damping", "0.12", "--laws", "Coulomb"]
+    ran = CliRunner().invoke(main, ["fit", str(EXAMPLE), *named, *rig, "--output", str(tmp_path / "fit")])
+    assert "probably" in ran.output.lower()
+    assert mended in ran.output.replace("\n", " ")

@@ -106,6 +106,14 @@ def test_each_mechanism_is_told_by_switching_it_off() -> None:
     assert both.without_coupling < 0
 
 
+def test_what_nothing_damps_neither_grows_nor_dies_away() -> None:
+    """At MC-1 both frequencies meet, and the rounding of a double root is about 1e-10."""
+    meeting = ss.stability(ss.scenarios.get("MC-1").system)
+    assert meeting.stable
+    assert "neither grows nor dies away" in repr(meeting)
+    assert "border of stability: a vibration at 0.72934 Hz neither" in ss.summary(meeting).headline[0]
+
+
 @pytest.mark.parametrize(
     ("damping", "stiffness"),
     [

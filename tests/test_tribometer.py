@@ -95,6 +95,16 @@ def test_wear_in_is_told_and_left_behind() -> None:
     assert "still wearing in" in still.plateau.status
 
 
+def test_a_wear_in_knows_what_its_load_is_known_to() -> None:
+    test = strokes(120, 0.3 + 0.1 * np.exp(-np.arange(120) / 12))
+    exact, unsure = (friction_coefficients(test, normal=load).wear_in for load in ("10 N", "10 ± 0.1 N"))
+    for number in ("final", "change"):
+        known, widened = getattr(exact, number), getattr(unsure, number)
+        assert widened.sd == pytest.approx(np.hypot(known.sd, 0.01 * known.value))
+    assert unsure.final.includes(0.3)
+    assert unsure.cycles.sd == exact.cycles.sd
+
+
 @pytest.mark.parametrize(("draws"), [60, pytest.param(2000, marks=pytest.mark.soak)])
 def test_an_even_coefficient_is_not_told_to_wear_in(draws) -> None:
     """Neighbours alike by up to 0.9: of 750 none came near."""

@@ -1,10 +1,11 @@
 """Draw the pictures of the README and of the pages, with the project's own figures.
 
-python tools/make_pictures.py          writes docs/images/loops.png, decay.png, stability.png, limit_cycles.png, HOWTO
+python tools/make_pictures.py
 """
 
 from __future__ import annotations
 
+import re
 import runpy
 from pathlib import Path
 
@@ -28,6 +29,16 @@ HOWTO = {  # of pages, by the gallery's example that draws it
     "sticks": "plot_03_microslips", "rig": "plot_05_sensors", "simulate": "plot_02_laws",
     "wavelets": "plot_07_wavelets", "sweep": "plot_08_map", "attractors": "plot_09_bifurcation",
 }  # fmt: skip
+PAGES = ("fit", "joints", "tribometer")  # whose first example's answer is the picture
+
+
+def pages() -> None:
+    """The pictures of pages whose first example, as it is printed, ends in `found`."""
+    for page in PAGES:
+        names: dict[str, object] = {}
+        example = re.findall(r"```python\n(.*?)```", (IMAGES.parent / f"{page}.md").read_text(), re.DOTALL)[0]
+        exec(example, names)
+        saved(ss.plot(names["found"]).figure, f"{page}.png")
 
 
 def howto() -> None:
@@ -111,4 +122,5 @@ if __name__ == "__main__":
     decay()
     squeak()
     howto()
+    pages()
     records()

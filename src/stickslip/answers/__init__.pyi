@@ -22,6 +22,7 @@ from stickslip.answers.many import Row as Row
 from stickslip.answers.many import require_engine as require_engine
 from stickslip.answers.many import spread as spread
 from stickslip.answers.preparation import mend as mend
+from stickslip.answers.questions import stated_wrongly as stated_wrongly
 from stickslip.answers.squeaks import Condition as Condition
 from stickslip.answers.squeaks import compare_squeaks as compare_squeaks
 from stickslip.answers.tribometers import analyze_tribometer as analyze_tribometer

@@ -99,14 +99,51 @@ def analyze(
     """
     require_record(record)
     given = {"mass": mass, "stiffness": stiffness, "damping": damping, "damper": damper, "contact": contact}
-    rig = _settings(rig, {key: value for key, value in given.items() if value is not None})
+    return _findings(record, _settings(rig, {key: value for key, value in given.items() if value is not None}), method)
+
+
+def stated_wrongly(records: Iterable[Record], *, rig: RigSettings) -> Findings | None:
+    """Which record is the first in which one slip of the hand shows, in a column, a unit or a constant?
+
+    Parameters
+    ----------
+    records : iterable of Record
+        As they were read.
+    rig : RigSettings
+        The rig's constants.
+
+    Returns
+    -------
+    Findings or None
+        Of that record, with its ``slips``, the likeliest first; None where nothing speaks for one.
+
+    Examples
+    --------
+    >>> import stickslip as ss
+    >>> soft = ss.rig.rig_settings({"mass": 2.42, "stiffness": 2.31})
+    >>> stated_wrongly([ss.datasets.demo()], rig=soft).slips[0].words
+    'the stiffness is in N/mm, not in N/m'
+    """
+    questions = [question for question in QUESTIONS if question.key in ("loops", "consistency")]
+    for record in records:
+        try:
+            findings = _findings(record, rig, "auto", questions)
+        except EstimateError:  # it answers neither: nothing of it can be held against what was stated
+            continue
+        if findings.results["slips"]:
+            return findings
+    return None
+
+
+def _findings(record: Record, rig: RigSettings, method: str, questions: Sequence[Question] | None = None) -> Findings:
+    """What the record answers, of all questions or of some."""
     inquiry, name, faults = Inquiry(), record_name(record), tuple(record.check())
     made = ready(record, rig, method, inquiry)
     whole = made.record
     slid = slid_on(whole, rig.contact if "contact" in rig.model_fields_set else None)
     answers: dict[str, Any] = {}
     fused = cache(partial(_fused, whole))  # one record for all questions: the contact is fitted to it once
-    for question in QUESTIONS:
+    for question in QUESTIONS if questions is None else questions:
         led = not question.follows or answers.get(question.follows) is not None
         if led and answers.get(question.unless) is None and question.fits(whole):
             answers[question.key] = inquiry.ask(question.name, partial(_answer, question, whole, fused, slid))

@@ -15,11 +15,11 @@ from stickslip.cli.options import constants_options, reading_options, result_opt
 from stickslip.cli.records import RIG_FILE, answer_together, default_folder, groups_of, read, rig_of
 from stickslip.cli.show import publish, show
 from stickslip.cli.terminal import complain, progress
-from stickslip.errors import ABSENT
+from stickslip.errors import ABSENT, EstimateError
 
 if TYPE_CHECKING:
     from stickslip import Record
-    from stickslip.answers import Predictions
+    from stickslip.answers import Findings, Predictions
     from stickslip.rig import RigSettings
 
 
@@ -58,7 +58,7 @@ CURVES = (
 def fit(
     files: tuple[str, ...], output: Path | None, as_json: bool, everything: bool, laws: str | None, calibration: float,
     curve: str | None, system: Path | None,
-    **options: Any,
+    **rig_options: Any,
 ) -> None:  # fmt: skip
     """Find which friction law it is, with its parameters.
 
@@ -73,23 +73,41 @@ def fit(
     stickslip fit run_2.5Hz.csv run_8.7Hz.csv --mass 2.42 --stiffness 2310 --laws "Coulomb,compliant,LuGre"
     stickslip fit sweep.csv --channels "v=speed [mm/s]" --channels "friction=F [N]" --curve stribeck
     """
-    rig = rig_of(**options)
+    rig = rig_of(**rig_options)
     groups = groups_of(*files)
     _require_one_question(groups, curve, has_law=laws is not None or system is not None)
     folder = output or (None if as_json else default_folder(groups, "fit"))
     names = laws.split(",") if laws is not None else None
+    given = {"--laws": laws, "--system": system}
+    options = [word for name, value in given.items() if value is not None for word in (name, str(value))]
     count = f"{len(names) if names else 'six'} laws"
     with progress(3) as tell:
         tell("reading", 0)
         records = [read(group, rig) for group in groups]
         tell("fitting", 1)
-        result, records = ss.answers.fit_records(
-            records, rig=rig, curve=curve, laws=names, system=_oscillator(system), calibration=calibration,
-            progress=lambda share: tell(f"fitting and comparing {count}, {share:.0%}", 1 + share),
-        )  # fmt: skip
+        mistaken = None if curve is not None else ss.answers.stated_wrongly(records, rig=rig)
+        try:
+            result, records = ss.answers.fit_records(
+                records, rig=rig, curve=curve, laws=names, system=_oscillator(system), calibration=calibration,
+                progress=lambda share: tell(f"fitting and comparing {count}, {share:.0%}", 1 + share),
+            )  # fmt: skip
+        except ss.StickslipError as error:
+            raise _caused(error, mistaken) from error
+        context = {} if mistaken is None else {"mistaken": mistaken, "options": options}
         tell("drawing and writing", 2)
-        written = publish(result, folder, record=records)
-    show(result, written, as_json=as_json, everything=everything, record=records)
+        written = publish(result, folder, record=records, **context)
+    show(result, written, as_json=as_json, everything=everything, record=records, **context)
+
+
+def _caused(error: ss.StickslipError, mistaken: Findings | None) -> ss.StickslipError:
+    """The error, or the slip of the hand that shows in the records and is its likely cause."""
+    if mistaken is None:
+        return error
+    value = f"{mistaken.name}: probably {mistaken.contradiction}"
+    mended = ss.summary(mistaken).remedy
+    return EstimateError(
+        value, "no law is fitted until that is mended", f"begin with {mended}" if mended else "mend it"
+    )
 
 
 def _require_one_question(groups: list[list[Path]], curve: str | None, *, has_law: bool) -> None:

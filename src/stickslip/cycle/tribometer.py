@@ -42,7 +42,7 @@ class WearIn(Result):
     Attributes
     ----------
     final, change : Estimate
-        The coefficient that it settles at, and by how much it begins above it.
+        The coefficient that it settles at, and by how much it lies above it in the first whole cycle of the record.
     cycles : Estimate
         Cycles in which the change falls to 37 %.
     fitted : ndarray, shape (m,)
@@ -111,7 +111,8 @@ def friction_coefficients(
 
     Of each cycle, with the load N of that cycle:
 
-    * plateau: the median of f while the contact slides, every sample weighed by its way, over N;
+    * plateau: the median of f while the contact slides, every sample weighed by its way, over N (where friction turns
+      round over a tenth of the stroke, it lies .14 standard deviations of the noise below the level);
     * by stroke: :math:`(\bar f_\text{forward} - \bar f_\text{back}) / 2N`, means of whole strokes, so that an offset of
       the force is not in it, and a rounded corner at the reversal is;
     * by cycle: :math:`\overline{|f|} / N` of all samples, where an offset stays (ASTM G133 asks for a mean like this);
@@ -170,6 +171,8 @@ def friction_coefficients(
     steady = _steady(wear_in, len(loads))
     status = Status(*_doubts(wear_in, steady, len(loads)), *([cycles.status] if cycles.status != "ok" else []))
     relative = math.hypot(record.channels["friction"].gain_sd, load.sd / load.value)
+    if wear_in is not None:
+        wear_in = replace(wear_in, final=_widened(wear_in.final, relative), change=_widened(wear_in.change, relative))
     coefficients = {
         name: _beside(mean_of_cycles(_called(name), of_cycles[name][steady:], unit="1", method=how), relative, status)
         for name, how in DEFINITIONS.items()
@@ -233,12 +236,16 @@ def _forces(friction: Array, motion: Motion, cycles: Cycles, label: NDArray[np.i
 
 def _beside(coefficient: Estimate, relative: float, status: str) -> Estimate:
     """The coefficient with what load and gain are known to, and with what is to be said of all of them."""
+    widened = replace(_widened(coefficient, relative), status=Status(coefficient.status, status))
+    return widened.within(0.0, otherwise=DRIVES)
+
+
+def _widened(coefficient: Estimate, relative: float) -> Estimate:
+    """With a `relative` deviation of load and gain in its interval."""
     more = NORMAL_95 * relative * abs(coefficient.value)
     below, above = (math.hypot(end - coefficient.value, more) for end in coefficient.interval)
     interval = coefficient.value - below, coefficient.value + above
-    sd = math.hypot(coefficient.sd, relative * coefficient.value)
-    widened = replace(coefficient, interval=interval, sd=sd, status=Status(coefficient.status, status))
-    return widened.within(0.0, otherwise=DRIVES)
+    return replace(coefficient, interval=interval, sd=math.hypot(coefficient.sd, relative * coefficient.value))
 
 
 def fit_wear_in(values: Array) -> WearIn | None:

@@ -39,7 +39,7 @@ if TYPE_CHECKING:
 # What draws each kind of result, the file of this room and the function. One that takes no `ax` fills a whole figure.
 DRAWN = {
     "Record": "drawing.of_record", "Findings": "drawing.of_findings", "Comparison": "drawing.of_comparison",
-    "Loops": "drawing.of_loops", "JointFriction": "joint.plot_joint",
+    "Loops": "drawing.of_loops", "JointFriction": "joint.plot_joint", "Coefficients": "contact.plot_coefficients",
     "DecayFit": "drawing.of_decay", "Decrement": "decay.plot_differences",
     "ForceComparison": "traces.plot_force_comparison", "Consistency": "friction.plot_consistency",
     "TransitionSpeed": "contact.plot_transition_speed", "Trial": "traces.plot_twin", "Squeaks": "squeak.plot_squeaks",

@@ -99,9 +99,15 @@ class Stability:
         """Frequency of the mode that grows fastest, or dies away slowest [Hz]."""
         return self.modes[0].frequency
 
+    @property
+    def course(self) -> str:
+        """What that mode does; at the border two modes meet, and their growth is the root of a rounding."""
+        if self.stable and self.growth >= 0:
+            return "neither grows nor dies away"
+        return f"{'grows' if self.growth > 0 else 'dies away'} by {abs(self.growth):.4g} 1/s"
+
     def __repr__(self) -> str:
-        change = "grows" if self.growth > 0 else "dies away"
-        head = f"Stability: {self.mechanism}, {self.frequency:.4g} Hz {change} by {abs(self.growth):.4g} 1/s"
+        head = f"Stability: {self.mechanism}, {self.frequency:.4g} Hz {self.course}"
         rows = [f"{mode.frequency:.5g} Hz, damping ratio {mode.damping_ratio:.3g}" for mode in self.modes]
         return "\n  ".join([head if self.status == "ok" else f"{head} [{self.status}]", *rows])
 

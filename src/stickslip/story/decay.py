@@ -18,6 +18,7 @@ from stickslip.decay.fit_decay import LEFT_OVER
 from stickslip.decay.release import CAUGHT
 from stickslip.estimate import Estimate, kinds
 from stickslip.figures.decay import plates_of, plates_together
+from stickslip.record.record import Array, Record
 from stickslip.story.scope import Scope, completed, corrected, of_fit
 from stickslip.story.story import Line, Story, Table, tried
 from stickslip.story.words import WITHIN_DIGIT, cautions, doubts, interval_of, number, value_of
@@ -26,6 +27,7 @@ MOST = 0.5  # of the power of what is left over
 OTHER = 0.1  # of the oscillation's frequency: farther from its multiples swings something else
 LEAVES_MORE = 1.5  # times the residual: a difference worth a sentence
 FAR = 0.2  # rad: a pendulum's swing that a straight spring does not follow
+SMOOTH = 4  # blocks that a cubic needs
 METHODS = {"all": "whole waveform, and decrements", "waveform": "whole waveform", "thesis": "decrements"}
 
 
@@ -62,8 +64,25 @@ def _scope(findings: Findings) -> Scope | None:
     question = ["decay", "--channel", fit.channel]
     if findings.settings["restoring"] != "linear":
         question += ["--restoring", findings.settings["restoring"]]
-    time, fitted = np.concatenate(fit.time), np.concatenate(fit.fitted)
+    swings = [_at_samples(findings.record, *release) for release in zip(fit.time, fit.fitted, strict=True)]
+    time, fitted = (np.concatenate(parts) for parts in zip(*swings, strict=True))
     return of_fit(findings.record, {fit.channel: (time, fitted)}, question, fit.model)
+
+
+def _at_samples(record: Record, centres: Array, means: Array) -> tuple[Array, Array]:
+    """The samples of a record within a release, and a smooth motion there of which the means over blocks are known.
+
+    Where a motion curves, its mean over a block of `n` samples, `h` long, lies off its value at the centre by
+    (1 - 1/n^2) h^2 / 24 of its second derivative.
+    """
+    time = record.time[(record.time >= centres[0]) & (record.time <= centres[-1])]
+    if len(centres) < SMOOTH:
+        return time, np.interp(time, centres, means)
+    from scipy.interpolate import CubicSpline
+
+    n = round((centres[1] - centres[0]) * record.fs)
+    bend = np.pad(np.diff(means, 2), 1, mode="edge")
+    return time, CubicSpline(centres, means - (1 - 1 / n**2) / 24 * bend)(time)
 
 
 def _by_other_ways(estimates: list[Estimate]) -> Iterator[Table]:

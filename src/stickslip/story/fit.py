@@ -10,7 +10,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from stickslip.answers.findings import record_name
+from stickslip.answers.findings import Findings, record_name
 from stickslip.answers.fits import Prediction, Predictions
 from stickslip.balance.motion import forcing_frequency
 from stickslip.drives.kinds import Drive, HarmonicBase, Ramp, Release
@@ -27,7 +27,7 @@ from stickslip.laws.formula import quoted
 from stickslip.parameters import unit
 from stickslip.record.record import Record
 from stickslip.rig.settings import rig_toml
-from stickslip.story.scope import Scope, of_fit, reading_of
+from stickslip.story.scope import Scope, corrected, of_fit, reading_of
 from stickslip.story.story import Line, Story, Table
 from stickslip.story.words import Caution, doubts, interval_of, leading, number, value_of
 
@@ -61,8 +61,10 @@ def of_law(fit: LawFit, *, record: Records = ()) -> Story:
     return _story(fit, record, list(_law_told(fit)), notes=list(fit.checks), data=fit.to_dict)
 
 
-def of_laws(comparison: LawComparison, *, record: Records = ()) -> Story:
-    """Several laws compared."""
+def of_laws(
+    comparison: LawComparison, *, record: Records = (), mistaken: Findings | None = None, options: Sequence[str] = ()
+) -> Story:
+    """Several laws compared; first a slip of the hand that shows, and the command with its `options` that mends it."""
     laws = sorted(comparison.candidates, key=lambda candidate: candidate.standing.misfit)
     rows = [
         (law.name, _ratio(law.standing.misfit), "yes" if law.standing.kept else "no", _values(law.oscillator.law))
@@ -75,8 +77,12 @@ def of_laws(comparison: LawComparison, *, record: Records = ()) -> Story:
     )
     ranked = Table("Laws by misfit", ("law", "misfit", "kept", "parameters"), rows, note)
     why = Table("Why each law is kept or not", ("law", "verdict"), verdicts, folded=True)
+    headline, remedy = [comparison.verdict], ""
+    if mistaken is not None:
+        headline = [f"Probably {mistaken.contradiction}: until that is mended no law holds.", *headline]
+        remedy = corrected(mistaken, mistaken.slips[0], "fit", options)
     return _story(
-        comparison, record, [comparison.verdict], notes=comparison.fit.checks,
+        comparison, record, headline, notes=comparison.fit.checks, remedy=remedy,
         tables=[ranked, why], history=comparison.history, data=comparison.to_dict,
     )  # fmt: skip
 

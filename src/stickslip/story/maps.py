@@ -19,7 +19,7 @@ from stickslip.solve.tables import System
 from stickslip.squeak.stability import Stability
 from stickslip.story.findings import plain
 from stickslip.story.story import Line, Story, Table
-from stickslip.story.words import value_of
+from stickslip.story.words import number, value_of
 
 LOST = ("not run", "failed")  # outcomes that leave holes in a map
 
@@ -32,12 +32,13 @@ def of_map(atlas: Any, *, system: System | None = None) -> Story:
     measures = _measures(atlas)
     title = f"{' x '.join(map(str, atlas.sizes.values()))} points, {atlas.attrs.get('status', 'complete')}"
     rows = [
-        [name, *("-" if part[key] is None else f"{part[key]:.6g}" for key in ("least", "most")),
-         str(part["known"]), part["unit"]] for name, part in measures.items()
-    ]  # fmt: skip
+        (atlas[name].attrs.get("long_name", name), _shown(part, "least"), _shown(part, "most"), str(part["known"]))
+        for name, part in measures.items()
+        if name != "status"
+    ]
     return Story(
         "Map", _headline(atlas), _cautions(atlas), settings=_settings(atlas.attrs),
-        tables=[Table(title, ("measure", "least", "most", "points", "unit"), rows)],
+        tables=[Table(title, ("measure", "least", "most", "points"), rows)],
         draw=lambda: _plates(atlas, system), data=lambda: {**atlas.attrs, "variables": measures},
     )  # fmt: skip
 
@@ -51,6 +52,13 @@ def _measures(atlas: Any) -> dict[str, dict[str, Any]]:
         least, most = (float(values.min()), float(values.max())) if known else (None, None)
         ranges[str(name)] = {"least": least, "most": most, "known": known, "unit": column.attrs.get("units", "1")}
     return ranges
+
+
+def _shown(part: Mapping[str, Any], key: str) -> str:
+    """A number of a measure, to a thousandth, in a readable unit."""
+    if part[key] is None:
+        return "-"
+    return number(part[key], 0.0 if part["unit"] == "1" else abs(part[key]) / 1000, part["unit"])
 
 
 def _plates(atlas: Any, system: System | None) -> tuple[Plate, ...]:
@@ -72,7 +80,12 @@ def _headline(atlas: Any) -> list[str]:
     """How many motions over what, and what became of them."""
     became = ", ".join(f"{count} {word}" for word, count in _counts(atlas).items() if count)
     over = " and ".join(_over(atlas, str(dim)) for dim in atlas.dims)
-    return [f"{atlas['status'].size} motions over {over}: {became}."]
+    answer = f"{atlas['status'].size} motions over {over}: {became}"
+    if "normal_stops" in atlas and "abnormal_stops" in atlas:
+        stops = atlas["normal_stops"] + atlas["abnormal_stops"]
+        often = f", up to {float(stops.max()):.3g} times a period" if stops.max() > 0 else ""
+        answer += f"; the mass stops in {int((stops > 0).sum())} of them{often}"
+    return [f"{answer}."]
 
 
 def _cautions(atlas: Any) -> list[str]:
@@ -151,13 +164,12 @@ def of_stability(stability: Stability) -> Story:
         (f"{mode.frequency:.5g} Hz", f"{mode.growth:.4g} 1/s", f"{mode.damping_ratio:.3g}") for mode in stability.modes
     ]
     tone = f"at {stability.frequency:.5g} Hz"
-    if stability.stable:
-        answer = (
-            f"Steady sliding is stable: the slowest vibration, {tone}, dies away by {abs(stability.growth):.4g} 1/s."
-        )
+    if not stability.stable:
+        answer = f"Steady sliding is unstable by {stability.mechanism}: a vibration {tone} {stability.course}."
+    elif stability.growth < 0:
+        answer = f"Steady sliding is stable: the slowest vibration, {tone}, {stability.course}."
     else:
-        growth = f"{stability.growth:.4g} 1/s"
-        answer = f"Steady sliding is unstable by {stability.mechanism}: a vibration {tone} grows by {growth}."
+        answer = f"Steady sliding is at the border of stability: a vibration {tone} {stability.course}."
     keys = ("stable", "mechanism", "growth", "without_coupling", "without_slope", "place", "loads", "status")
     modes = [{key: getattr(mode, key) for key in ("frequency", "growth", "damping_ratio")} for mode in stability.modes]
     return Story(
