@@ -1,8 +1,8 @@
 """How often do the intervals of a joint's friction hold, on joints of an integrator of our own (`tests/joints.py`)?
 
 Seven servos' published parameters as centres, encoders of 8 to 16 bit, 50 Hz to 1 kHz, gravity, currents with noise;
-with the torque measured to 1 %, or by the controller's kp alone, known to 1 %, its kd unknown. Counted are the numbers
-that stand without a grave doubt.
+with the torque measured to 1 %, or by the controller's kp alone, known to 1 %, its kd unknown; with play between motor
+and link, which both have an encoder. Counted are the numbers that stand without a grave doubt.
 
     python benchmarks/joints.py --draws 100 --first 1000
 """
@@ -10,6 +10,7 @@ that stand without a grave doubt.
 from __future__ import annotations
 
 import argparse
+import contextlib
 import sys
 import time
 from pathlib import Path
@@ -20,7 +21,10 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 import joints
 import stickslip as ss
 
-TOLD = ("level", "forward", "back", "load", "viscous", "inertia", "damping")
+TOLD = ("level", "forward", "back", "load", "viscous", "inertia", "damping", "backlash")
+
+PLAYING = ("play", "play without gravity")
+KINDS = ("torque", "controller", "torque alone", *PLAYING)
 
 
 def truths(joint: joints.Joint, time: np.ndarray) -> dict[str, float]:
@@ -30,34 +34,44 @@ def truths(joint: joints.Joint, time: np.ndarray) -> dict[str, float]:
         **{name: true[name] for name in ("forward", "back", "load", "viscous", "inertia")},
         "damping": true["kd"] - true["kp"] * joints.PERIOD / 2,
         "level": joint.level(time),
+        "backlash": true.get("play", 0.0),
     }  # fmt: skip
 
 
-def asked(joint: joints.Joint, *, torque: bool, reference: bool) -> ss.cycle.JointFriction:
-    """What is said of one joint."""
+Found = tuple[ss.cycle.JointFriction, ss.cycle.JointBacklash | None]
+
+
+def asked(joint: joints.Joint, kind: str) -> Found:
+    """What is said of one joint, and of its play."""
     record = joint.record
-    if torque and not reference:
+    if kind == "torque alone":
         alone = {name: record[name] for name in ("theta", "force")}
         record = ss.Record.of(alone, fs=record.fs, units={"force": "N m"}).with_details("force", gain_sd=joints.GAIN)
-    return ss.cycle.regress_joint(record, **({} if torque else {"kp": joint.kp}))
+    found = ss.cycle.regress_joint(record, **({"kp": joint.kp} if kind == "controller" else {}))
+    if kind in PLAYING:
+        with contextlib.suppress(ss.errors.EstimateError):
+            return found, ss.cycle.joint_backlash(record, joint=found)
+    return found, None
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--draws", type=int, default=100, help="joints of each kind")
     parser.add_argument("--first", type=int, default=1000, help="seed of the first")
-    parser.add_argument("--kinds", default="torque,controller,torque alone", help="which, with commas")
+    parser.add_argument("--kinds", default=",".join(KINDS), help="which, with commas")
     parser.add_argument("--misses", action="store_true", help="print each interval that does not hold")
     options = parser.parse_args()
     for kind in options.kinds.split(","):
         held: dict[str, list[float]] = {name: [] for name in TOLD}
         wide: dict[str, list[float]] = {name: [] for name in TOLD}
-        refused, spent = 0, []
+        refused, spent, claims = 0, list[float](), list[tuple[bool, bool]]()
         for seed in range(options.first, options.first + options.draws):
-            joint = joints.drawn(seed, torque=kind != "controller")
+            joint = joints.drawn(
+                seed, torque=kind != "controller", play=kind in PLAYING, loaded=kind != "play without gravity"
+            )
             begun = time.process_time()
             try:
-                found = asked(joint, torque=kind != "controller", reference=kind == "torque")
+                found, teeth = asked(joint, kind)
             except ss.StickslipError as error:
                 refused += 1
                 if options.misses:
@@ -65,19 +79,25 @@ def main() -> None:
                 continue
             spent.append(time.process_time() - begun)
             true = truths(joint, found.time)
+            if teeth is not None:
+                claims.append((true["backlash"] > 0, teeth.claimed))
             for name in TOLD:
-                estimate = getattr(found, name)
+                estimate = getattr(teeth if name == "backlash" else found, name, None)
                 if estimate is None or not estimate.known or not ss.estimate.stands(estimate.status):
                     continue
                 held[name].append(estimate.includes(true[name]))
-                wide[name].append((estimate.interval[1] - estimate.interval[0]) / 2 / true[name])
-                if options.misses and not held[name][-1] and name in ("level", "load"):
+                if true[name]:
+                    wide[name].append((estimate.interval[1] - estimate.interval[0]) / 2 / true[name])
+                if options.misses and not held[name][-1] and name in ("level", "load", "backlash"):
                     print(f"{seed} {joint.servo} {joint.record.fs:.0f} Hz: {true[name]:.4g}, {estimate}")
         print(f"{kind}: {options.draws - refused} of {options.draws} answered, {np.mean(spent):.2f} s each")
         for name in TOLD:
             if held[name]:
-                told = f"{np.mean(held[name]):6.1%} of {len(held[name])}"
-                print(f"  {name:9} held {told}, half width {np.median(wide[name]):.1%}")
+                half = f", half width {np.median(wide[name]):.1%}" if wide[name] else ""
+                print(f"  {name:9} held {np.mean(held[name]):6.1%} of {len(held[name])}{half}")
+        for there in (True, False) if claims else ():
+            rightly = [claimed for play, claimed in claims if play == there]
+            print(f"  play claimed of {sum(rightly)} of {len(rightly)} joints with{'' if there else 'out'} any")
 
 
 if __name__ == "__main__":

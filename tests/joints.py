@@ -25,6 +25,7 @@ SERVOS = {
     "eRob80:100": (0.989, 4.832, 0.148, 7.395),
 }  # fmt: skip
 
+PLAY = np.radians([0.05, 1.5])  # of gears, from those of robots to those of toys
 PERIOD = 1e-3  # s, for which the controller holds its output
 
 
@@ -40,7 +41,8 @@ class Joint:
         inertia, forward, back (Coulomb friction), load (part of gravity's torque), viscous, sine, cosine (gravity),
         kp, kd, static (over the sliding friction).
     record : Record
-        theta, reference, and where it is measured force [N m], whose gain is off by what is stated.
+        theta, reference, and where it is measured force [N m], whose gain is off by what is stated; motor, its angle
+        before the gear, where the teeth have play.
     kp : (float, float)
         As its owner states it, with the standard deviation of that.
     """
@@ -80,6 +82,52 @@ def march(p, reference, slope, steps, count, control):  # type: ignore[no-untype
     return angle, torque
 
 
+@numba.njit
+def march_slack(p, slack, reference, slope, steps, count, control):  # type: ignore[no-untyped-def]
+    """Angles of motor and link, and motor torque, of a joint whose teeth have play: two masses, each rubbing.
+
+    `slack` has the play [rad], and the link's share of inertia and of friction; the friction of the load is the
+    link's. In each step the three impulses, of friction on either side and between the teeth (which do not bounce),
+    are found in turn until they agree (Gauss and Seidel).
+    """
+    inertia, forward, back, share, viscous, sine, cosine, kp, kd, static, excess_speed = p
+    play, heavy, rubs = slack
+    samples = (reference.shape[0] - 1) // steps
+    dt = 1.0 / (control * steps)
+    jm, jl = inertia * (1 - heavy), inertia * heavy
+    angle, link, torque = np.zeros(samples), np.zeros(samples), np.zeros(samples)
+    q, x, v, w, motor = reference[0], reference[0], 0.0, 0.0, 0.0
+    on_motor, on_link, teeth = 0.0, 0.0, 0.0
+    for i in range(samples * steps):
+        if i % count == 0:
+            motor = kp * (reference[i] - q) + kd * (slope[i] - v)
+        if i % steps == count // 2:
+            angle[i // steps], link[i // steps], torque[i // steps] = q, x, motor
+        load = sine * np.sin(x) + cosine * np.cos(x)
+        level = (forward if w > 0 or (w == 0 and motor > load) else back) * rubs + share * abs(load)
+        most_link = dt * level * (1 + (static - 1) * np.exp(-((w / excess_speed) ** 2)))
+        level = (forward if v > 0 or (v == 0 and motor > load) else back) * (1 - rubs)
+        most_motor = dt * level * (1 + (static - 1) * np.exp(-((v / excess_speed) ** 2)))
+        free_v = v + dt * (motor - viscous * (1 - rubs) * v) / jm
+        free_w = w + dt * (-load - viscous * rubs * w) / jl
+        apart = q - x
+        for _ in range(200):
+            before_motor, before_link, before_teeth = on_motor, on_link, teeth
+            # between the teeth: the motor leads by at most half of the play either way
+            ahead = (free_v + on_motor / jm) - (free_w + on_link / jl)
+            both = 1 / jm + 1 / jl
+            push, pull = (ahead + (apart - play / 2) / dt) / both, (ahead + (apart + play / 2) / dt) / both
+            teeth = push if push > 0 else pull if pull < 0 else 0.0
+            on_motor = min(max(-jm * (free_v - teeth / jm), -most_motor), most_motor)
+            on_link = min(max(-jl * (free_w + teeth / jl), -most_link), most_link)
+            change = abs(on_motor - before_motor) + abs(on_link - before_link) + abs(teeth - before_teeth)
+            if change <= 1e-9 * (most_motor + most_link):
+                break
+        v, w = free_v + (on_motor - teeth) / jm, free_w + (on_link + teeth) / jl
+        q, x = q + dt * v, x + dt * w
+    return angle, link, torque
+
+
 def _reference(kind: str, time: np.ndarray, chance: np.random.Generator) -> np.ndarray:
     """What the joint is told [rad]: sines about a place, or stairs of minimum jerk with rests between."""
     about, size = chance.uniform(-1.0, 1.0), chance.uniform(0.4, 1.2)
@@ -100,8 +148,11 @@ def _reference(kind: str, time: np.ndarray, chance: np.random.Generator) -> np.n
     return moved
 
 
-def drawn(seed: int, *, torque: bool, seconds: float = 30.0, loaded: bool = True) -> Joint:
-    """A joint by chance, about one of the seven servos; with the motor's torque logged, or positions alone."""
+def drawn(seed: int, *, torque: bool, seconds: float = 30.0, loaded: bool = True, play: bool = False) -> Joint:
+    """A joint by chance, about one of the seven servos; with the motor's torque logged, or positions alone.
+
+    With `play` its teeth have some (a third of them none), and both the motor and the link have an encoder.
+    """
     chance = np.random.default_rng([seed, torque, loaded])
     servo = str(chance.choice(list(SERVOS)))
     armature, coulomb, share, viscous = SERVOS[servo] * np.exp(chance.uniform(-0.4, 0.4, 4))
@@ -120,13 +171,23 @@ def drawn(seed: int, *, torque: bool, seconds: float = 30.0, loaded: bool = True
     fine = np.arange(int(seconds * fs) * steps + 1) / (fs * steps)
     reference = _reference(str(chance.choice(["sines", "stairs"])), fine, chance)
     count = max(1, round(fs * steps * PERIOD))
-    angle, motor = march(np.array(list(truth.values())), reference, np.gradient(reference, fine), steps, count, fs)
+    p, way = np.array(list(truth.values())), np.gradient(reference, fine)
+    written = {"reference": reference[count // 2 : -1 : steps]}
+    if play:
+        size = np.exp(chance.uniform(*np.log(PLAY))) * chance.choice([0.0, 1.0, 1.0])
+        slack = np.array([size, *chance.uniform(0.3, 0.7, 2)])
+        truth["play"], truth["ratio"] = slack[0], chance.uniform(20, 300)
+        turned, angle, motor = march_slack(p, slack, reference, way, steps, count, fs)
+        size = 2 * np.pi / 2 ** int(chance.integers(10, 15))
+        written["motor"] = np.round(truth["ratio"] * turned / size) * size
+    else:
+        angle, motor = march(p, reference, way, steps, count, fs)
     size = 2 * np.pi / 2 ** int(chance.integers(8, 17))
-    written = {"theta": np.round(angle / size) * size, "reference": reference[count // 2 : -1 : steps]}
+    written["theta"] = np.round(angle / size) * size
     if torque:
         noise = np.abs(motor).max() * 10 ** chance.uniform(-2.5, -1.5)
         written["force"] = (1 + GAIN * chance.standard_normal()) * motor + noise * chance.standard_normal(len(motor))
-    units = {"reference": "rad", "force": "N m"}
+    units = {"reference": "rad", "force": "N m", "motor": "rad"}
     record = ss.Record.of(written, fs=fs, units={name: units[name] for name in units if name in written})
     if torque:
         record = record.with_details("force", gain_sd=GAIN)

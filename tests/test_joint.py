@@ -2,6 +2,7 @@
 
 import json
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +13,7 @@ import joints
 import stickslip as ss
 from stickslip.answers import analyze_joint, axis_record
 from stickslip.cli.program import main
-from stickslip.cycle import joint_breakaway, regress_joint
+from stickslip.cycle import joint_backlash, joint_breakaway, regress_joint
 from stickslip.errors import EstimateError, ModelError, RecordError
 from stickslip.estimate import kinds, stands
 from stickslip.figures.joint import plot_joint
@@ -142,6 +143,58 @@ def test_breakaway_of_a_joint_that_creeps_away():
 def test_breakaway_is_not_told_of_a_fast_joint():
     with pytest.raises(EstimateError, match="rests tell"):
         joint_breakaway(log(), joint=regress_joint(log()))
+
+
+def with_play(size, seed=0, gravity=0.0):
+    """A joint of an integrator of our own, 12 bit on either side, 60 turns of the motor in one of the link."""
+    t = np.arange(20 * 500 * 40 + 1) / 20_000
+    reference = 0.6 * np.sin(2 * np.pi * 0.3 * t) + 0.3 * np.sin(2 * np.pi * 0.9 * t)
+    p = np.array([0.03, 0.05, 0.06, 0.1, 0.03, gravity, 0.0, 30.0, 1.0, 1.2, 0.02])
+    slack, way = np.array([size, 0.5, 0.6]), np.gradient(reference, t)
+    turned, angle, motor = joints.march_slack(p, slack, reference, way, 40, 20, 500.0)
+    count, noise = 2 * np.pi / 2**12, 0.01 * np.random.default_rng(seed).standard_normal(len(motor))
+    written = {
+        "joint_position": np.round(angle / count) * count,
+        "motor_position": np.round(60 * turned / count) * count,
+    }
+    units = {"joint_position": "rad", "motor_position": "rad", "effort": "N m"}
+    return ss.Record.of({**written, "effort": motor + noise}, fs=500.0, units=units)
+
+
+def test_without_play_two_masses_are_one():
+    t = np.arange(5 * 500 * 40 + 1) / 20_000
+    reference = 0.6 * np.sin(2 * np.pi * 0.9 * t)
+    p = np.array([0.03, 0.05, 0.06, 0.1, 0.03, 0.3, 0.1, 30.0, 1.0, 1.0, 0.02])
+    one = joints.march(p, reference, np.gradient(reference, t), 40, 20, 500.0)
+    two = joints.march_slack(p, np.array([0.0, 0.5, 0.6]), reference, np.gradient(reference, t), 40, 20, 500.0)
+    for alone, geared in zip(one, (two[0], two[2]), strict=True):
+        assert geared == pytest.approx(alone, abs=1e-9)
+
+
+@pytest.mark.parametrize("size", [0.0, 0.002, 0.01])
+def test_play_between_two_encoders_is_told_or_what_would_be_felt(size):
+    backlash = analyze_joint(with_play(size)).backlash
+    assert backlash.backlash.includes(size)
+    assert backlash.claimed == (size > 0)
+    assert backlash.felt < 0.001
+    assert backlash.ratio == pytest.approx(60, rel=1e-3)
+
+
+def test_teeth_that_gravity_keeps_on_one_side_tell_no_play():
+    log = axis_record(with_play(0.01, gravity=0.0))
+    joint = regress_joint(log)
+    heavy = replace(joint, cosine=replace(joint.cosine, value=5.0, interval=(4.9, 5.1), sd=0.05))
+    with pytest.raises(EstimateError, match="surely pushed"):
+        joint_backlash(log, joint=heavy)
+
+
+def test_the_motors_encoder_alone_is_the_position():
+    log = with_play(0.0)
+    record = ss.Record.of({name: log[name] for name in ("motor_position", "effort")}, fs=500.0)
+    with pytest.raises(RecordError, match="runs from -39"):  # of many turns: no angle in rad, unless that is stated
+        axis_record(record)
+    stated = ss.Record.of(dict(record.samples), fs=500.0, units={"motor_position": "rad"})
+    assert list(axis_record(stated)) == ["theta", "force"]
 
 
 def emps(dataset, **channels):

@@ -12,7 +12,8 @@ from typing import Any
 import numpy as np
 
 from stickslip.answers.findings import Comparison, Findings, Inquiry, flagged, record_name, require_several, with_doubt
-from stickslip.answers.mistakes import require_angle
+from stickslip.answers.mistakes import called, require_angle
+from stickslip.cycle.backlash import joint_backlash
 from stickslip.cycle.joint import JointFriction, regress_joint
 from stickslip.cycle.joint_fit import regress_joint_logs
 from stickslip.cycle.joint_onset import joint_breakaway
@@ -28,10 +29,14 @@ from stickslip.signals.interpolate import without_delays
 
 # A joint has no twins: swept through its turns without a rest it was told to stand still 1.0 to 2.3 % of the time.
 TURNS = Doubt("a joint that never rests may seem to stand still as well where it turns", UNTRIED)
+# Of 259 joints whose teeth have up to 1.5 degrees of it, intervals of the load part held 83 %, of others 87 to 94 %.
+PLAY = Doubt(
+    "where the teeth part the torque is not that of the link: intervals are a little narrow", "play", lesser=True
+)
 # What a column holds, by how ROS and ros2_control, LeRobot, MuJoCo, Dynamixel and drives of machines call it.
 NAMES = {
     "theta": (
-        "present position", "actual position", "measured position", "joint position", "motor position",
+        "present position", "actual position", "measured position", "joint position", "link position",
         "observation state", "qpos", "positions", "position", "pos", "angle", "theta", "actual q", "joint angle", "q",
     ),
     "reference": (
@@ -39,6 +44,7 @@ NAMES = {
         "position command", "position setpoint", "position reference", "action", "ctrl", "command", "cmd", "target",
         "setpoint", "reference", "goal", "desired", "target q", "q ref", "q des", "qref", "qdes", "ref",
     ),
+    "motor": ("motor position", "motor angle", "rotor position", "rotor angle"),
     "force": ("motor torque", "joint torque", "actuator force", "qfrc actuator", "effort", "torque", "tau", "force"),
     "current": ("present current", "motor current", "actual current", "joint current", "current"),
 }  # fmt: skip
@@ -50,7 +56,7 @@ WANTED = {
     "goal", "target", "desired", "command", "commands", "commanded", "cmd", "reference", "action", "output",
 }  # fmt: skip  # of a torque: not measured
 SOURCES = {"state", "states", "feedback"}  # who says it, not of which axis
-TURNING = {"theta": "rad", "reference": "rad", "force": "N m", "current": "A"}
+TURNING = {"theta": "rad", "reference": "rad", "motor": "rad", "force": "N m", "current": "A"}
 
 
 def analyze_joint(
@@ -67,7 +73,8 @@ def analyze_joint(
 
     In this order: which columns are the axis's; friction either way, its viscous part, what of it grows with the load,
     inertia and gravity (:func:`~stickslip.cycle.regress_joint`); the friction at breakaway over the sliding one, where
-    the log tells it to 5 %; stops. A question that can not be answered becomes a note.
+    the log tells it to 5 %; where motor and link have an encoder each the play between them
+    (:func:`~stickslip.cycle.joint_backlash`); stops. A question that can not be answered becomes a note.
 
     Parameters
     ----------
@@ -84,7 +91,7 @@ def analyze_joint(
     Returns
     -------
     Findings
-        Its results: ``joint``, ``breakaway`` and ``sticks``.
+        Its results: ``joint``, ``breakaway``, ``backlash`` and ``sticks``.
 
     Raises
     ------
@@ -114,9 +121,14 @@ def analyze_joint(
     joint = regress_joint(log, gravity=gravity, **given)
     whole = _with_friction(log, joint)
     breakaway = inquiry.ask("Breakaway", partial(joint_breakaway, whole, joint=joint), aside=True)
+    play = partial(joint_backlash, whole, joint=joint)
+    backlash = inquiry.ask("Backlash", play, aside=True) if "motor" in whole else None
     sticks = inquiry.ask("Sticks and slips", partial(find_sticks, whole, method="speed"), aside=True)
-    results = {"joint": joint, "breakaway": breakaway, "sticks": with_doubt(sticks, TURNS)}
-    unstated = [f"{key} is read as {channel.unit}" for key, channel in log.channels.items() if channel.assumed]
+    joint = with_doubt(joint, PLAY) if backlash is not None and backlash.claimed else joint
+    results = {"joint": joint, "breakaway": breakaway, "backlash": backlash}
+    results["sticks"] = with_doubt(sticks, TURNS)
+    assumed = {key: channel.unit for key, channel in log.channels.items() if channel.assumed and key != "motor"}
+    unstated = [f"{key} is read as {unit}" for key, unit in assumed.items()]
     if unstated:
         doubt = f"nobody stated a unit: {' and '.join(unstated)}"
         results = {key: flagged(result, doubt) for key, result in results.items()}
@@ -265,19 +277,21 @@ def axis_record(record: Record, *, axis: str | None = None) -> Record:
         require_angle(record)
         return record
     columns = list(_columns(record))
+    if all(column.kind != "theta" for column in columns):  # the motor's encoder is the only one
+        columns = [replace(one, kind="theta") if one.kind == "motor" else one for one in columns]
     axes = list(dict.fromkeys(column.axis for column in columns if column.kind == "theta"))
     if not axes:
         stated = "" if axis is None else f"axis = {axis!r}: "
         raise RecordError(
-            f"{stated}no column is called a position: {', '.join(_called(record, name) for name in record)}",
+            f"{stated}no column is called a position: {', '.join(called(record, name) for name in record)}",
             "a joint's log has its position, and a torque, a current or a reference",
             'name the columns: --channels "theta=COLUMN [rad]" --channels "force=COLUMN [N m]"',
         )
     chosen = [one for one in axes if axis is None or _fits(one, axis)]
     if len(chosen) != 1:
-        called = ", ".join(one or "(unnamed)" for one in axes)
+        names = ", ".join(one or "(unnamed)" for one in axes)
         raise RecordError(
-            f"the log has the axes {called}" if axis is None else f"axis = {axis!r} fits {len(chosen)} of {called}",
+            f"the log has the axes {names}" if axis is None else f"axis = {axis!r} fits {len(chosen)} of {names}",
             "the friction of one axis is asked for at a time",
             nearest(axis or "", axes) if axis else f"name one: --axis {axes[0]}",
         )
@@ -286,13 +300,9 @@ def axis_record(record: Record, *, axis: str | None = None) -> Record:
     return log
 
 
-def _called(record: Record, name: str) -> str:
-    return record.channels[name].column if record.channels[name].source != "array" else name
-
-
 def _columns(record: Record) -> Iterator[_Column]:
     for name in record:
-        parts = re.findall(r"[a-z]+|\d+", re.sub(r"[\[(][^\[(]*[\])]\s*$", "", _called(record, name).lower()))
+        parts = re.findall(r"[a-z]+|\d+", re.sub(r"[\[(][^\[(]*[\])]\s*$", "", called(record, name).lower()))
         if OTHERS & set(parts):
             continue
         kinds = [
@@ -325,7 +335,7 @@ def _renamed(record: Record, columns: list[_Column], axis: str) -> Record:
         fitting = [column for column in columns if column.kind == kind]
         if len(fitting) > 1:
             raise RecordError(
-                f"{' and '.join(_called(record, column.channel) for column in fitting)} both tell the {kind}",
+                f"{' and '.join(called(record, column.channel) for column in fitting)} both tell the {kind}",
                 "one column tells one quantity of an axis",
                 f'name the one meant: --channels "{kind}=COLUMN"',
             )
@@ -334,7 +344,7 @@ def _renamed(record: Record, columns: list[_Column], axis: str) -> Record:
             name = "x" if straight and kind == "theta" else kind
             usual = TURNING[kind].replace("rad", "m").replace("N m", "N") if straight else TURNING[kind]
             unit, unstated = (usual, True) if known.unit == "1" else (known.unit, known.assumed)
-            samples[name], titles[name] = record[column.channel], _called(record, column.channel)
+            samples[name], titles[name] = record[column.channel], called(record, column.channel)
             quantity = VOCABULARY[name].words
             channels[name] = replace(known, name=name, unit=unit, quantity=quantity, assumed=unstated)
     step = Step("axis_record", titles, f"axis {axis}" if axis else "one axis")

@@ -114,6 +114,12 @@ def _of_frequency(frequency: float, mass: float | None, stiffness: float | None)
             yield slip
 
 
+def called(record: Record, name: str) -> str:
+    """A channel by its column's name in the file; where it came from none by its own."""
+    column = record.channels[name].column
+    return name if column in ("", "array") else column
+
+
 def require_angle(record: Record) -> None:
     """Refuse an angle without a unit that is none in rad: by an encoder's count, or as it turns too far.
 
@@ -130,7 +136,7 @@ def require_angle(record: Record) -> None:
     for name in ("theta", "reference"):
         if name not in record or not record.channels[name].assumed:
             continue
-        column, step = record.channels[name].column or name, quantisation_step(record[name])
+        column, step = called(record, name), quantisation_step(record[name])
         low, high = float(np.min(record[name])), float(np.max(record[name]))
         if high - low <= WHOLE_TURN and not any(abs(step * 2**bits / 360 - 1) < ALIKE for bits in BITS):
             continue

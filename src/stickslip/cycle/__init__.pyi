@@ -1,3 +1,5 @@
+from stickslip.cycle.backlash import JointBacklash as JointBacklash
+from stickslip.cycle.backlash import joint_backlash as joint_backlash
 from stickslip.cycle.before_slip import Presliding as Presliding
 from stickslip.cycle.before_slip import presliding as presliding
 from stickslip.cycle.joint import JointFriction as JointFriction

@@ -32,6 +32,7 @@ VOCABULARY: dict[str, Quantity] = {
     "normal": Quantity("normal force", ("N",)),
     "theta": Quantity("angle", ("rad",)),
     "reference": Quantity("position that a controller is told to reach", ("rad", "m")),
+    "motor": Quantity("position of a motor before its gear (unit 1: in counts)", ("rad", "m", "1")),
     "current": Quantity("motor current", ("A",)),
     "sound": Quantity("sound pressure (unit 1: not calibrated)", ("Pa", "1")),
     "y": Quantity("displacement in the normal direction", ("m",)),

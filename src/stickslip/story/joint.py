@@ -31,7 +31,7 @@ def of_findings(findings: Findings) -> Story:
     return Story(
         findings.name, list(_headline(findings)), [*cautions(findings), *map(Caution, _untold(joint))],
         settings={key: str(value) for key, value in findings.settings.items()},
-        draw=lambda: plates_of(joint), data=lambda: _data(joint), write=partial(write_joint, joint=joint),
+        draw=lambda: plates_of(joint), data=lambda: _data(findings), write=partial(write_joint, joint=joint),
     )  # fmt: skip
 
 
@@ -93,6 +93,14 @@ def _headline(findings: Findings) -> Iterator[str]:
     if findings.breakaway is not None:
         ratio = findings.breakaway.ratio
         yield f"It breaks away at {value_of(ratio)} times its sliding friction (95 %: {interval_of(ratio)})."
+    if findings.backlash is not None:
+        backlash, felt = findings.backlash.backlash, findings.backlash.felt
+        least = number(felt, felt / 10, backlash.unit)
+        yield (
+            f"Between motor and link there are {value_of(backlash)} of play (95 %: {interval_of(backlash)})."
+            if findings.backlash.claimed
+            else f"No play between motor and link is felt; {least} would be."
+        )
     if findings.sticks is not None and findings.sticks.share.value > RARELY and stands(findings.sticks.share.status):
         yield f"It stands still up to {value_of(findings.sticks.share)} of the time."
 
@@ -114,8 +122,11 @@ def _untold(joint: JointFriction | JointLogs, who: str = "This log does") -> Ite
         yield f"{who} not tell {words}."
 
 
-def _data(joint: JointFriction) -> dict[str, Any]:
+def _data(findings: Findings) -> dict[str, Any]:
+    joint, backlash = findings.joint, findings.backlash
+    play = {} if backlash is None else {"backlash_felt": backlash.felt, "gear_ratio": backlash.ratio}
     return {
+        **play,
         "residual": joint.residual, "condition": joint.condition, "carried": joint.carried, "source": joint.source,
         "left_out": list(joint.left_out),
     }  # fmt: skip
