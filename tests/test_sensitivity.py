@@ -47,3 +47,84 @@ def test_a_motion_changes_as_its_neighbours_differ(name: str, drive: Any) -> Non
             same = before == after  # a jump that has crossed an instant has no slope
             slope = told.sample(times, output)[k]
             assert np.allclose(slope[same], ((high - low)[0] / 2e-4)[same], atol=1e-4 * np.abs(slope).max(), rtol=0)
+
+
+BELT, TONE = ss.drives.Belt(0.02), DRIVES[0]
+FALLING = ss.laws.Stribeck(0.95, 1.2, speed=0.01)
+CURVED = {
+    "Stribeck": (FALLING, TONE, ["kinetic", "law.speed", "stiffness", "drive.frequency"]),
+    "Stribeck swept": (FALLING, DRIVES[1], ["static", "mass"]),
+    "LuGre": (ss.laws.LuGre(0.95, 1.2, 0.01, 2e4, 20.0), BELT, ["static", "law.damping", "drive.speed"]),
+    "in series": (ss.laws.InSeries(FALLING, 2e4, 60.0), TONE, ["law.stiffness", "law.damping"]),
+}
+
+
+def _differenced(system: ss.Oscillator, name: str, times: Any, **run: Any) -> tuple[Any, Any, Any]:
+    """By runs of neighbours to the fourth order: dx/dp, dv/dp, and by how much events come later."""
+    path = find(system, name)[0]
+    value: Any = system
+    for part in path:
+        value = getattr(value, part)
+    step = 1e-4 * value
+    runs = [ss.simulate(system.having(**{name: value + k * step}), **run) for k in (-2, -1, 1, 2)]
+    told = [[one.sample(times, ("x",))[0][0] for one in runs], [one.sample(times, ("v",))[0][0] for one in runs]]
+    series = [np.array(rows) for rows in (*told, [one.starts[1:] for one in runs])]
+    return tuple((8 * (s[2] - s[1]) - (s[3] - s[0])) / (12 * step) for s in series)  # type: ignore[return-value]
+
+
+@pytest.mark.parametrize("name", CURVED)
+def test_a_curved_motion_changes_as_its_neighbours_differ(name: str) -> None:
+    """To what the differences of four runs are true to; between events, where a velocity has a slope."""
+    law, drive, free = CURVED[name]
+    system = ss.Oscillator(law=law, drive=drive, **RIG)
+    run = {"duration": 0.8, "start": {"x": 2e-4, "v": 0.03}}
+    by = ss.solve.sensitivities(ss.simulate(system, **run), *free)
+    times = np.linspace(0.0, 0.79, 400)
+    for k, parameter in enumerate(free):
+        place, _, later = _differenced(system, parameter, times, **run)
+        assert np.allclose(by.sample(times)[k], place, atol=1e-7 * np.abs(place).max(), rtol=0)
+        moved = by.events[k]
+        assert np.allclose(moved, later[: len(moved)], atol=1e-6 * np.abs(later).max(), rtol=0)
+
+
+@pytest.mark.parametrize("law", [ss.laws.Coulomb(0.95, static=1.2), FALLING])
+def test_a_start_that_was_not_given_moves_with_the_belt(law: Any) -> None:
+    """The mass begins at the belt's speed."""
+    system = ss.Oscillator(law=law, drive=BELT, **RIG)
+    by = ss.solve.sensitivities(ss.simulate(system, duration=1.0), "drive.speed")
+    times = np.linspace(0.0, 0.99, 50)
+    place, *_ = _differenced(system, "drive.speed", times, duration=1.0)
+    assert np.allclose(by.sample(times)[0], place, atol=1e-7 * np.abs(place).max(), rtol=0)
+
+
+def test_rate_and_state_moves_with_its_distance_as_its_neighbours_do() -> None:
+    """Reversing, with steps and leaps of both kinds; the age that it begins with is the distance's."""
+    law = ss.laws.RateState(10.0, 0.6, 0.01, 0.015, 1e-3, 1e-3)
+    system = ss.Oscillator(1.0, 1.0, law, ss.drives.HarmonicForce(8.0, 0.1), 0.05)
+    run = {"duration": 12.0, "start": {"x": 0.0, "v": 0.01}}
+    motion: Any = ss.simulate(system, **run)
+    assert len(motion.steps.polys) > 0
+    times = np.linspace(0.0, 11.9, 200)
+    for name in ("direct", "law.distance"):
+        place, *_ = _differenced(system, name, times, **run)
+        told = ss.solve.sensitivities(motion, name).sample(times)[0]
+        assert np.allclose(told, place, atol=1e-6 * np.abs(place).max(), rtol=0)
+
+
+def test_a_curve_without_a_fall_changes_as_coulomb_friction_does() -> None:
+    """One is carried by collocation, the other by closed forms."""
+    laws = [ss.laws.Stribeck(0.95, 0.95, speed=0.01), ss.laws.Coulomb(0.95)]
+    runs = [
+        ss.simulate(ss.Oscillator(law=law, drive=TONE, **RIG), duration=0.8, start={"x": 2e-4, "v": 0.03})
+        for law in laws
+    ]
+    free, times = ("stiffness", "mass", "damping", "drive.amplitude"), np.linspace(0.0, 0.79, 200)
+    curved, linear = (ss.solve.sensitivities(run, *free) for run in runs)
+    for one, other in ((curved.sample(times), linear.sample(times)), (curved.events, linear.events)):
+        assert np.allclose(one, other, atol=1e-7 * np.abs(other).max(axis=1, keepdims=True), rtol=0)
+
+
+def test_a_lag_is_refused_with_its_reason() -> None:
+    system = ss.Oscillator(law=ss.laws.TimeDelay(FALLING, 0.01), drive=TONE, **RIG)
+    with pytest.raises(ss.errors.ModelError, match="time lag"):
+        ss.solve.sensitivities(ss.simulate(system, duration=0.1), "stiffness")

@@ -16,20 +16,24 @@ from numpy.typing import ArrayLike
 
 from stickslip.compiled import OPTIONS, compiled
 from stickslip.errors import ModelError
+from stickslip.laws.time_delay import TimeDelay
 from stickslip.oscillator import Oscillator
 from stickslip.parameters import find, places
 from stickslip.solve.assembly import tables_of
 from stickslip.solve.cells import DEGREE
+from stickslip.solve.curved import CurvedTrajectory
 from stickslip.solve.kernel import multiply
 from stickslip.solve.settling import settled_alike
 from stickslip.solve.tables import Array, Tables, systems_of
 from stickslip.solve.trajectory import Trajectory
+from stickslip.solve.variation import Variation, opening_moved, variation
 
 TERMS = 40  # of a Taylor series over a cell at most
 OUTPUTS = ("x", "v", "a", "friction")
 # Of a parameter, for differences of tables to either side: what is left of the curve and rounding are alike. What is
 # zero may not be less, and is moved to one side, by less.
 STEP, FROM_ZERO = 1e-4, 1e-3
+RATES_STEP = 1e-5  # of a curved law's rates, which round less than tables do, and bend more
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,6 +89,7 @@ def sensitivity(
     starts: Mapping[str, float],
     scaled: Sequence[float],
     outputs: Sequence[str],
+    opening: bool = False,
 ) -> Sensitivity:
     """Derivatives of a run of linear modes: by parameters, by what scales its drive, and by its start.
 
@@ -102,6 +107,8 @@ def sensitivity(
         For each unit by which a recorded motion of the base may be larger: the share of it that one is.
     outputs : sequence of str
         What will be asked for, as :meth:`Trajectory.sample` names them.
+    opening : bool
+        Whether what of the start is as the system opens by itself moves with the parameters, too.
 
     Returns
     -------
@@ -116,6 +123,9 @@ def sensitivity(
         near = settled_alike(tables_of(systems_of(list(neighbours))), table)
         changes.take(near, run, step)
         begun[0, :first, signals] = (near.begin - run.states[0])[:, signals] / step
+        if opening:
+            openings = np.concatenate([table.opening[None], near.opening])
+            begun[0, :first] = opening_moved(openings, begun[0, :first].T, run.states[0], step).T
     knotted = np.array([table.names.index(name) for name in table.motion.knotted], dtype=np.int64)
     grown = np.concatenate([np.zeros(first), scaled, np.zeros(len(starts))])
     begun[0, first:last, signals] += np.outer(scaled, run.states[0, signals])
@@ -340,7 +350,7 @@ class Sensitivities:
         The parameters.
     events : ndarray, shape (parameters, events)
         By how much each of the run's events comes later [s] for each unit of a parameter.
-    motion : Sensitivity
+    motion : Sensitivity or Variation
         Derivatives by neighbours of the system, two a parameter.
     shares : ndarray, shape (2, parameters)
         With which each of the two counts.
@@ -348,7 +358,7 @@ class Sensitivities:
 
     names: tuple[str, ...]
     events: Array
-    motion: Sensitivity = field(repr=False)
+    motion: Sensitivity | Variation = field(repr=False)
     shares: Array = field(repr=False)
 
     def sample(self, times: ArrayLike, output: str = "x") -> Array:
@@ -380,12 +390,14 @@ def sensitivities(run: Trajectory, *names: str) -> Sensitivities:
     :math:`\dot s = A s + (\partial A / \partial p) y`. At an event :math:`q y = 0` the instant moves by
     :math:`\partial t / \partial p = -(q s + (\partial q / \partial p) y) / (q \dot y)`, and the derivative jumps by the
     saltation matrix (Leine and Nijmeijer, Dynamics and Bifurcations of Non-Smooth Mechanical Systems, 2004, ch. 7).
-    The motion itself is never differenced.
+    Under a curved law :math:`A` is the rates' derivative along the motion, and collocation takes the place of the
+    closed form. The motion itself is never differenced. What of its start is as the system opens by itself (at the
+    belt's speed, say) moves with the parameters; what was given stays.
 
     Parameters
     ----------
     run : Trajectory
-        Of an oscillator whose law has linear modes, from :func:`~stickslip.simulate`.
+        Of an oscillator, its law one without a time lag, from :func:`~stickslip.simulate`.
     *names : str
         Parameters of the system by name ("stiffness", "kinetic", "drive.amplitude").
 
@@ -396,7 +408,7 @@ def sensitivities(run: Trajectory, *names: str) -> Sensitivities:
     Raises
     ------
     ModelError
-        No parameter has that name, its value is no number, or the law has curved modes.
+        No parameter has that name, its value is no number, or the law has a time lag.
 
     Examples
     --------
@@ -408,21 +420,26 @@ def sensitivities(run: Trajectory, *names: str) -> Sensitivities:
     [[0.497498]]
     """
     system = run.system
-    if not isinstance(system, Oscillator) or not isinstance(run.table, Tables):
+    if not isinstance(system, Oscillator) or isinstance(system.law, TimeDelay):
         raise ModelError(
             f"derivatives of {type(system).__name__} with {type(getattr(system, 'law', system)).__name__}",
-            "they are carried through the modes of one mass whose law is linear between its events",
+            "they are carried through the modes of one mass under a law without time lag",
             "take differences of two runs",
         )
     values = np.array([_value(system, name) for name in names])
     scales = np.where(values == 0, FROM_ZERO, np.abs(values))
     sides = np.array([np.ones(len(names)), np.where(values == 0, 1.0, -1.0)])
+    step = RATES_STEP if isinstance(run, CurvedTrajectory) else STEP
     moved = [
-        system.having(**{name: value + step})
+        system.having(**{name: value + own})
         for side in sides
-        for name, value, step in zip(names, values, STEP * side * scales, strict=True)
+        for name, value, own in zip(names, values, step * side * scales, strict=True)
     ]
-    motion = sensitivity(run, moved, step=STEP, starts={}, scaled=(), outputs=OUTPUTS)
+    motion: Sensitivity | Variation = (
+        variation(run, moved, step=step)
+        if isinstance(run, CurvedTrajectory)
+        else sensitivity(run, moved, step=step, starts={}, scaled=(), outputs=OUTPUTS, opening=True)
+    )
     shares = sides / (2 * scales)
     begun = np.flatnonzero(run.exits[:-1] >= 0) + 1
     return Sensitivities(names, _joined(motion.later[begun].T, shares), motion, shares)
