@@ -108,13 +108,13 @@ def test_a_long_run_is_heard_of(name: str, monkeypatch: pytest.MonkeyPatch) -> N
 
 def test_a_greater_question_ends_with_its_run(monkeypatch: pytest.MonkeyPatch) -> None:
     """The steady state is not sought on from a run that was cut."""
-    course, calls = kernel.course, itertools.count()
+    march, calls = kernel.march, itertools.count()
 
     def stopped(*arguments: Any) -> Any:
         if next(calls) == 1:
             raise KeyboardInterrupt
-        return course(*arguments)
+        return march(*arguments)
 
-    monkeypatch.setattr(kernel, "course", stopped)
+    monkeypatch.setattr(kernel, "march", stopped)
     with pytest.raises(KeyboardInterrupt):
         ss.steady_state(RIGID)

@@ -15,7 +15,7 @@ import math
 from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import Any
 
 import numpy as np
@@ -209,6 +209,8 @@ class _Run:
     def chunk(self, stops: Stops, follow: March | None) -> int:
         """March for so many steps at the most, keep them, and say why it ended; refuse what gets nowhere."""
         steps, before = self.room, self.clock.copy()
+        if follow is None and len(stops.ends) == 1:  # what leads from stop to stop takes seconds to compile
+            follow = partial(march.march, self.model)
         outcome, written, leapt, self.mode, self.stop = (
             self._to_stop(stops, follow)
             if follow
@@ -231,7 +233,7 @@ class _Run:
         return outcome
 
     def _to_stop(self, stops: Stops, follow: March) -> tuple[int, int, int, int, int]:
-        """As :func:`stickslip.solve.march.course`, by another march, which ends at each stop."""
+        """As :func:`stickslip.solve.march.course`, by a march that ends at each stop."""
         until, stop = tuple(stops.ends[self.stop]), self.stop
         outcome, *rest = follow(self.clock, self.state, self.big, self.mode, until, self.room, self.work)
         if outcome == march.DONE and stop + 1 < len(stops.ends):

@@ -397,9 +397,17 @@ def _tried(kind, model, own, drive, mode, piece, past, left):
 
 @compiled(**FAST)
 def _otherwise(model, own, drive, mode, piece, past, left):
-    """As :func:`_tried` with the guesses that follow when the lap before tells nothing."""
-    end = _tried(LOOKED, model, own, drive, mode, piece, past, left)
-    return end if end.proved else _tried(LASTS, model, own, drive, mode, piece, past, left)
+    """As :func:`_tried` with the guesses that follow when the lap before tells nothing.
+
+    Their kinds are numbers here, not constants: numba would compile each anew, and this is seldom called.
+    """
+    none = complex(0.0, 0.0)
+    end = End(False, 0.0, -1, 1, none, none)
+    for kind in range(LOOKED, LASTS + 1):
+        end = _tried(kind, model, own, drive, mode, piece, past, left)
+        if end.proved:
+            break
+    return end
 
 
 @compiled(**FAST, forceinline=True)

@@ -285,12 +285,11 @@ class _March:
         """March until the room is full, patience ends, or the last stop is reached."""
         # numba makes the Clock that it hands back by calling Python, and dies of a Ctrl-C that comes just
         # then; the first call may compile for long, and is left to it
-        if self.heed is None and getattr(kernel.course, "overloads", True):
+        march = kernel.march if len(stops.ends) == 1 else kernel.course
+        if self.heed is None and getattr(march, "overloads", True):
             self.heed = self.holding.enter_context(held_back())
         before, room = self.clock, self.pieces.room()
-        outcome, count, self.mode, self.clock, self.stop = kernel.course(
-            self.model, before, self.state, self.mode, stops, self.stop, self.past, room, self.work, self.patience
-        )
+        outcome, count, self.mode, self.clock, self.stop = self._marched(stops, room)
         if self.heed is not None:
             self.heed()
         passed = until(before, self.clock, self.table.motion.period)
@@ -304,6 +303,15 @@ class _March:
         if self.tell:
             self.tell(self.pieces.passed / self.total)
         return int(outcome)
+
+    def _marched(self, stops: Stops, room: Pieces) -> tuple[int, int, int, Clock, int]:
+        """As :func:`stickslip.solve.kernel.course`; where there is one stop, without what leads from one to the next,
+        which takes seconds to compile."""
+        begun, rest = (self.model, self.clock, self.state, self.mode), (self.past, room, self.work, self.patience)
+        if len(stops.ends) > 1:
+            return kernel.course(*begun, stops, self.stop, *rest)  # type: ignore[no-any-return]
+        laps, time = stops.ends[0].tolist()
+        return (*kernel.march(*begun, Clock(laps, time, 0.0), *rest), 0)
 
 
 class _Log:
