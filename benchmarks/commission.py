@@ -1,4 +1,4 @@
-"""Commission simulated rigs whose truth is known: how often does each number hold it within its interval?
+"""Commission simulated rigs whose truth is known: how often does each interval hold it, and how far off is each number?
 
     python benchmarks/commission.py --rigs 100
 
@@ -60,13 +60,26 @@ def numbers(done: Commissioned) -> Iterator[tuple[str, ss.Estimate]]:
             yield step, each
 
 
+def row(pairs: list[tuple[ss.Estimate, float]]) -> dict[str, object]:
+    """How often the interval held the truth, the median error, and that of its share of a truth that is never zero."""
+    errors = np.array([abs(number.value - true) for number, true in pairs])
+    truths = np.abs([true for _, true in pairs])
+    return {
+        "inside": sum(bool(number.includes(true)) for number, true in pairs),
+        "of": len(pairs),
+        "error": float(np.median(errors)),
+        "unit": pairs[0][0].unit,
+        "share": float(np.median(errors / truths)) if truths.all() else None,
+    }
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--rigs", type=int, default=100)
     parser.add_argument("--first", type=int, default=1)
     parser.add_argument("--json", action="store_true")
     asked = parser.parse_args()
-    held, refused, missed, began = defaultdict(list), defaultdict(int), [], time.process_time()
+    drawn, refused, missed, began = defaultdict(list), defaultdict(int), [], time.process_time()
     for seed in range(asked.first, asked.first + asked.rigs):
         bench = random_rig(seed)
         truth = bench.truth
@@ -74,22 +87,24 @@ def main() -> None:
         for name, why in done.refused.items():
             refused[name] += 1
             print(f"rig {seed}: {name} refused: {why}", flush=True)
-        for step, each in numbers(done):
-            true = done.true_value(each.name, step)
+        for step, number in numbers(done):
+            true = done.true_value(number.name, step)
             if true is not None:
-                name = f"{step}: {each.name}"
-                held[name].append(each.includes(true))
-                if not held[name][-1]:
-                    missed.append((seed, name, round((each.value - true) / (each.spread or math.inf), 1)))
-    rows = {name: [sum(each), len(each)] for name, each in held.items()}
-    told = {"rows": rows, "all": [sum(r[0] for r in rows.values()), sum(r[1] for r in rows.values())],
-            "refused": dict(refused), "missed": missed, "seconds": time.process_time() - began}  # fmt: skip
+                name = f"{step}: {number.name}"
+                drawn[name].append((number, true))
+                if not number.includes(true):
+                    missed.append((seed, name, round((number.value - true) / (number.spread or math.inf), 1)))
+    rows = {name: row(pairs) for name, pairs in drawn.items()}
+    everything = [sum(one["inside"] for one in rows.values()), sum(one["of"] for one in rows.values())]
+    seconds = time.process_time() - began
     if asked.json:
-        print(json.dumps(told))
+        answer = {"rows": rows, "all": everything, "refused": dict(refused), "missed": missed, "seconds": seconds}
+        print(json.dumps(answer))
         return
-    for name, (inside, count) in rows.items():
-        print(f"{name:55s} {inside:4d} of {count}")
-    print(f"all: {told['all'][0]} of {told['all'][1]}; refused {told['refused']}; {told['seconds']:.0f} s of processor")
+    for name, one in rows.items():
+        share = "" if one["share"] is None else f" ({100 * one['share']:.2g} %)"
+        print(f"{name:55s} {one['inside']:4d} of {one['of']}, median error {one['error']:.2g} {one['unit']}{share}")
+    print(f"all: {everything[0]} of {everything[1]}; refused {dict(refused)}; {seconds:.0f} s of processor")
     print(missed)
 
 

@@ -51,6 +51,19 @@ def test_a_rig_that_swings_is_not_at_rest() -> None:
     assert "swings" in found.sensors["x"].status
 
 
+@pytest.mark.parametrize(("lost", "answered"), [(10, True), (300, False)])
+def test_a_few_lost_samples_leave_a_step_its_answer(lost: int, answered: bool) -> None:
+    """A device that drops a packet: what is bridged is a share of the record too small to be seen in its noise."""
+    values = 2e-6 + 1e-6 * np.random.default_rng(3).standard_normal(10_000)
+    values[np.linspace(100, 9_900, lost).astype(int)] = np.nan
+    done = bench.commission(lambda step: of("x", values), steps=[bench.step_named("rest")])
+    assert ("rest" in done.results) == answered
+    assert ("rest" in done.refused) != answered
+    if answered:
+        assert done.results["rest"].sensors["x"].noise.includes(1e-6)
+        assert done.results["rest"].sensors["x"].zero.includes(2e-6)
+
+
 # ---- levels
 
 

@@ -7,6 +7,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
+import numpy as np
+
 from stickslip.balance.impact import ImpactTest, impact_test
 from stickslip.balance.mounts import ACCELEROMETER, CELL, Resonance
 from stickslip.bench.calibration import Calibration, SpringByWeights, calibrate, spring_by_weights
@@ -29,9 +31,12 @@ from stickslip.record.record import Record, Step
 from stickslip.rig.rig import Rig
 from stickslip.rig.settings import CommissionSettings, RigSettings, rig_settings, rig_toml
 from stickslip.settings import nearest
+from stickslip.signals.repair import fill_missing
 from stickslip.units import parse_unit
 
 CALIBRATIONS = {"gauge-x": "x", "gauge-z": "z", "turn": "a", "weigh": "load"}  # step -> channel
+# Of a channel's samples, that may be lost and bridged: a hundredth leaves noise and level as they are within a percent.
+BRIDGED = 0.01
 STANDS_ON = {"a": ACCELEROMETER, "load": CELL}
 
 
@@ -283,12 +288,19 @@ def commission(
             record = source(step)
             if record is None or any(name not in record for name in step.needs):
                 continue
-            known = known.having(step.name, step.ask(record, known))
+            known = known.having(step.name, step.ask(_bridged(record), known))
         except (EstimateError, RecordError) as error:  # what is asked wrongly ends all
             refused[step.name] = str(error)
         if answered is not None:
             answered(step, refused.get(step.name) or known.results[step.name])
     return Commissioned(known, refused, truth or {})
+
+
+def _bridged(record: Record) -> Record:
+    """The record with the few samples filled that its device lost; more than a few are left to the step's refusal."""
+    lost = {name: float(np.mean(~np.isfinite(record[name]))) for name in record}
+    few = [name for name, share in lost.items() if 0 < share <= BRIDGED]
+    return fill_missing(record, *few) if few else record
 
 
 # ---- what is known of the rig
