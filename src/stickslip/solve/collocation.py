@@ -18,7 +18,7 @@ from stickslip.compiled import compiled
 from stickslip.solve.roots import NOISE, NONE, first_rise
 from stickslip.solve.taylor import EXACT, Array, Exits, Guards, Sums, advance, awake, coded, turn, waking
 
-STAGES = 9
+STAGES = 9  # Radau's: exact to order 17, near the 14 and 18 of the Taylor steps that a leap replaces
 WIDTH = STAGES + 1
 NEWTON = 12  # most iterations
 ROUNDING = 1e-11  # most that rounding may leave of Newton's method

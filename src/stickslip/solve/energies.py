@@ -167,7 +167,7 @@ def _gauss(run: Trajectory, outputs: tuple[str, ...]) -> tuple[Array, Array]:
     return (widths[:, None] * weights / 2).ravel(), values
 
 
-FINEST = 1e-15
+FINEST = 1e-15  # the least tolerance that a run takes: beside it the run's own is judged
 
 
 @dataclass(frozen=True)

@@ -25,7 +25,7 @@ from stickslip.compiled import OPTIONS, compiled
 NONE = 2.0  # no root in the cell
 STEPS = 20_000  # of the march through a cell
 UNSURE = 3.0  # the march through the cell ran out of steps: nothing is proved
-NOISE = 64 * 2.220446049250313e-16
+NOISE = 64 * 2.220446049250313e-16  # of the terms' sizes: what rounding may leave of a sum of some tens of them
 
 
 @compiled(**OPTIONS)

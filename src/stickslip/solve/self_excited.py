@@ -132,7 +132,7 @@ def _settled(law: CurvedLaw, rates: Mapping[str, object], speed: float) -> dict[
 
 
 TRANSIENTS = 16  # transients of a self-excited motion before no orbit is expected any more
-ROUNDS = 16
+ROUNDS = 16  # of Newton's method; one that comes no nearer is given up before
 RANK = 1e-9  # of the largest singular value: below it a direction is free
 LOOKED = 96  # samples of a lag, of the shortest period looked for
 MOST, ALIKE = 64, 1e-4  # turns of an orbit that may be alike, and how alike, relative to its spread
