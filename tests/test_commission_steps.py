@@ -13,6 +13,7 @@ from scripts import loaded
 from stickslip import bench
 from stickslip.bench.calibration import find_holds
 from stickslip.bench.free import damper_of
+from stickslip.estimate import kinds
 
 NOISE = np.random.default_rng(7)
 
@@ -49,6 +50,28 @@ def test_a_rig_that_swings_is_not_at_rest() -> None:
     time = np.arange(10_000) / 1000
     found = bench.at_rest(of("x", 1e-4 * np.sin(2 * time) + 1e-6 * NOISE.standard_normal(time.size)))
     assert "swings" in found.sensors["x"].status
+
+
+@pytest.mark.parametrize(("frequency", "kind"), [(3.0, "moves"), (11.3, "moves"), (50.0, "hums"), (120.0, "hums")])
+def test_a_tone_that_is_most_of_the_noise_is_named(frequency: float, kind: str) -> None:
+    time = np.arange(10_000) / 1000
+    noise = 1e-6 * np.random.default_rng(5).standard_normal(time.size)
+    moving, quiet = (
+        bench.at_rest(of("x", size * np.sin(2 * np.pi * frequency * time) + noise)).sensors["x"]
+        for size in (1e-3, 0.2e-6)
+    )
+    assert kinds(moving.status) == {kind}
+    assert quiet.status == "ok"
+
+
+def test_noise_of_any_colour_is_no_tone() -> None:
+    rng = np.random.default_rng(6)
+    for slope in (0.0, 0.5, 1.0, 2.0):  # of the spectrum: white to a random walk
+        for _ in range(50):
+            shape = np.maximum(np.arange(2501.0), 1.0) ** (-slope / 2)
+            values = np.fft.irfft(shape * (rng.standard_normal(2501) + 1j * rng.standard_normal(2501)))
+            status = bench.at_rest(of("x", 1e-6 * values / values.std())).sensors["x"].status
+            assert "Hz" not in status
 
 
 @pytest.mark.parametrize(("lost", "answered"), [(10, True), (300, False)])

@@ -22,6 +22,8 @@ QUESTION = "what sensors read at rest"
 LEAST = 500  # samples of a record at rest
 COARSE = 3.0  # standard deviations of the noise in a count, up to which the counts themselves are fitted
 MOVES = 6.0  # deviations from chance of a slow swing, from which the rig was not at rest
+TONE, FEWEST = 0.5, 4  # of what is left, that one tone carries; and cycles of it: less may be a slow walk
+HUM = 45.0  # Hz: a tone from here on is the mains' as likely as the rig's
 WIDE = 1e-2  # of the logarithm: wide enough for rounding, narrow against what 500 samples tell
 HELD = 0.02  # of the samples off the one count, below which the noise is only bounded
 
@@ -143,7 +145,8 @@ def _sensor(name: str, record: Record) -> SensorAtRest:
     ).within(0.0)
     if not noise[0] or not math.isfinite(noise[1]):
         rounded = Estimate(rounded.name, 0.0, (0.0, count / 2 or 0.0), count / 4, unit, f"{of} stand on one count")
-    return SensorAtRest(name, zero, drift, rounded, count, _status(name, values, residual, worth, drift))
+    status = _status(name, values, residual, worth, drift, _tone(residual, record.fs))
+    return SensorAtRest(name, zero, drift, rounded, count, status)
 
 
 def _noise(values: Array, residual: Array, count: float, worth: float) -> tuple[float, tuple[float, float]]:
@@ -180,7 +183,15 @@ def _rounded(
     return level + count * float(best[0]), (noise, noise / math.sqrt(bend) if bend > 0 else math.inf)
 
 
-def _status(name: str, values: Array, residual: Array, worth: float, drift: Estimate) -> str:
+def _tone(residual: Array, fs: float) -> float | None:
+    """Frequency [Hz] of the tone that is most of what is left; None where none is."""
+    power = np.abs(np.fft.rfft(residual * np.hanning(len(residual)))) ** 2
+    peak = FEWEST + int(np.argmax(power[FEWEST:]))
+    around = power[peak - 2 : peak + 3]  # as wide as the window makes a line
+    return peak * fs / len(residual) if around.sum() > TONE * power.sum() > 0 else None
+
+
+def _status(name: str, values: Array, residual: Array, worth: float, drift: Estimate, tone: float | None) -> str:
     blocks = residual[: len(residual) // 20 * 20].reshape(20, -1).mean(axis=1)
     expected = residual.std() / math.sqrt(max(1.0, len(residual) / 20))
     doubts: list[Doubt | str] = []
@@ -188,6 +199,10 @@ def _status(name: str, values: Array, residual: Array, worth: float, drift: Esti
         doubts.append(Doubt(f"{name} reads one number throughout: is it plugged in?", "dead"))
     elif np.abs(blocks).max() > MOVES * expected and worth < len(residual) / 20:
         doubts.append(Doubt(f"{name} swings slowly: the rig moves, or its sensor warms up", "moves"))
+    elif tone is not None and tone < HUM:
+        doubts.append(Doubt(f"{name} swings at {tone:.3g} Hz, which is most of its noise: the rig moves", "moves"))
+    elif tone is not None:
+        doubts.append(Doubt(f"{name} hums at {tone:.4g} Hz, which is most of its noise", "hums", lesser=True))
     if drift.known and not drift.includes(0.0):
         doubts.append(Doubt(f"{name} drifts", "drifts", lesser=True))
     return Status(*doubts)
