@@ -225,7 +225,8 @@ def _refined(poles: Complex, ringing: _Ringing) -> tuple[list[_Mode], float]:
     residual = math.sqrt(float(fit.fun @ fit.fun) / max(1, freedom))
     scale = max(1.0, residual)
     sd = scale * np.sqrt(np.diag(np.linalg.pinv(fit.jac.T @ fit.jac)))
-    spread = scale * np.sqrt(np.diag(np.linalg.pinv(columns.T @ columns)))
+    variances = np.diag(np.linalg.pinv(columns.T @ columns))  # of a wave that others make up, a rounding below zero
+    spread = scale * np.sqrt(np.where(variances > 0, variances, math.inf))
     modes = []
     for j in np.argsort(fit.x[::2]):
         frequency, damping = math.exp(fit.x[2 * j]), float(fit.x[2 * j + 1])
