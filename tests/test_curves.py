@@ -221,7 +221,7 @@ def test_samples_that_were_filled_in_are_told() -> None:
     record = sweep()
     lost = np.where(np.arange(1, len(record) + 1) % 5 > 2, np.nan, record["friction"])
     found = fit_curve(fill_missing(Record.of({"v": record["v"], "friction": lost}, fs=FS)), curve="coulomb")
-    assert "40% of the samples were not measured" in found.status
+    assert "40 % of the samples were not measured" in found.status
     assert "measured" not in fit_curve(record, curve="coulomb").status
 
 

@@ -99,8 +99,8 @@ def test_the_best_law_says_what_it_leaves() -> None:
     found = ss.compare_laws(record, slider(), laws=["Coulomb"], nuisance=[])
     share = found.best.left["x"] / float(np.std(found.fit.traces[0].measured["x"]))
     assert 0.05 < share < 0.3
-    assert found.best.standing.verdict == f"best of those tried, leaves {share:.0%} of x"
-    assert found.verdict.startswith(f"Coulomb, the only law tried, leaves {share:.0%} of x, ")
+    assert found.best.standing.verdict == f"best of those tried, leaves {100 * share:.0f} % of x"
+    assert found.verdict.startswith(f"Coulomb, the only law tried, leaves {100 * share:.0f} % of x, ")
     assert "Confidence" not in found.verdict
 
 

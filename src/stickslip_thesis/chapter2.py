@@ -61,7 +61,7 @@ def plates(given: Given) -> Iterator[Plate]:
         yield figure(
             number,
             _balance(given, forced(given, case)),
-            f"{words} What is left: noise, and the {share:.1%} that the accelerometer's mount of 125 Hz adds.",
+            f"{words} What is left: noise, and the {100 * share:.1f} % that the accelerometer's mount of 125 Hz adds.",
         )
     for number, case in (("2.7", 0), ("2.8", 1), ("2.9", 2), ("2.10", 3)):
         record = rubbing(given, case)

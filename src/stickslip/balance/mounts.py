@@ -269,8 +269,8 @@ def _too_loud(channel: str, share: float) -> str:
     if share <= LOUD:
         return ""
     return (
-        f"the noise of {channel} is {share:.0%} of its standard deviation, and from {LOUD:.0%} on hides rings and "
-        "micro-slips: give x, z, mass and stiffness where they lack, or take a quieter record"
+        f"the noise of {channel} is {100 * share:.0f} % of its standard deviation, and from {100 * LOUD:.0f} % on "
+        "hides rings and micro-slips: give x, z, mass and stiffness where they lack, or take a quieter record"
     )
 
 

@@ -89,7 +89,7 @@ def fit(
         try:
             result, records = ss.answers.fit_records(
                 records, rig=rig, curve=curve, laws=names, system=_oscillator(system), calibration=calibration,
-                progress=lambda share: tell(f"fitting and comparing {count}, {share:.0%}", 1 + share),
+                progress=lambda share: tell(f"fitting and comparing {count}, {100 * share:.0f} %", 1 + share),
             )  # fmt: skip
         except ss.StickslipError as error:
             raise _caused(error, mistaken) from error

@@ -119,7 +119,7 @@ def measure(case: str, output: Path | None, as_json: bool, everything: bool, pla
     options["shaker"] = ss.rig.Shaker.of(settings.shaker) if settings and settings.shaker else None
     with progress(1) as tell:
         tell("simulating", 0)
-        run = ss.story.outcome(wanted, progress=lambda share: tell(f"simulating, {share:.0%}", 0)).run
+        run = ss.story.outcome(wanted, progress=lambda share: tell(f"simulating, {100 * share:.0f} %", 0)).run
         results = _planned(run, bench, tell, options) if plan else _measured(run, bench, tell, options)
         context = {"needs": needs} if plan else {"form": form}
         written = publish(results, folder, **context)

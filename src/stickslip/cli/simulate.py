@@ -68,7 +68,7 @@ def simulate(
         ss.story.require_output(wanted, folder=folder, **{key: options[key] for key in ("form", "animation")})
     with progress(4 if options["animation"] else 3) as tell:
         tell("simulating", 0)
-        result = ss.story.outcome(wanted, progress=lambda share: tell(f"simulating, {share:.0%}", share))
+        result = ss.story.outcome(wanted, progress=lambda share: tell(f"simulating, {100 * share:.0f} %", share))
         written = publish(result, folder, tell=tell, **options)
     show(result, written, as_json=as_json, everything=everything, **options)
     if result.run.status == "interrupted":

@@ -361,7 +361,9 @@ def _reason(residuals: tuple[float, ...], spread: float, lag: Estimate, give: fl
     )
     if give is not None:
         sentence += f"; the contact gives way by {1e6 * give:.3g} um before it slides"
-    return sentence + (f"; the lag would pass for {mimicked:.0%} of the transition speed" if mimicked > 0 else "")
+    return sentence + (
+        f"; the lag would pass for {100 * mimicked:.0f} % of the transition speed" if mimicked > 0 else ""
+    )
 
 
 def _give(parts: Array, value: float) -> Estimate:
@@ -379,7 +381,7 @@ def _give_of(contact: LikelyContact) -> Estimate:
 
 
 def _stiffness(level: float, give: Estimate) -> Estimate:
-    unknown = f"a damper in the contact may make it seem up to {STIFFENED:.0%} stiffer: see contact_stiffness"
+    unknown = f"a damper in the contact may make it seem up to {100 * STIFFENED:.0f} % stiffer: see contact_stiffness"
     return _over(level, give, "contact stiffness", "N/m", "sliding friction over give", unknown)
 
 

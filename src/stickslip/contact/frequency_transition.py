@@ -184,7 +184,7 @@ def heard_mode(ringing: Ringing) -> Mode:
     if loud < max(FAINT * spread, AUDIBLE * pooled.noise):
         raise _none(
             f"the sticks are quiet: {loud:.3g} m/s^2 where the acceleration changes by {spread:.3g}",
-            f"a ring is {FAINT:.0%} of that change at least, and five times the noise, {pooled.noise:.3g}",
+            f"a ring is {100 * FAINT:.0f} % of that change at least, and five times the noise, {pooled.noise:.3g}",
         )
     return pooled
 

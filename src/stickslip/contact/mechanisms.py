@@ -184,7 +184,7 @@ def not_one_mode(ringing: Ringing) -> str:
     likely = mechanism_of(ringing).probabilities.get(SWINGING, 0.0)
     if likely < LIKELY:
         return ""
-    return f"the sticks swing, but not as one mode ({likely:.0%}), as no contact rings"
+    return f"the sticks swing, but not as one mode ({100 * likely:.0f} %), as no contact rings"
 
 
 def features(ringing: Ringing) -> dict[str, float]:

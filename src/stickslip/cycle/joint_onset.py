@@ -112,8 +112,9 @@ def joint_breakaway(record: Record, *, joint: JointFriction) -> JointBreakaway:
     sd = math.hypot(half / NORMAL_95, inexact)
     if not NORMAL_95 * sd <= TOLD * mean.value or mean.value < 1 - TOLD:  # static friction is not below the sliding one
         raise EstimateError(
-            f"{len(ends)} rests give {mean.value:.2f} times the sliding friction, to {NORMAL_95 * sd / mean.value:.0%}",
-            f"{QUESTION} is told where it is known to {TOLD:.0%}",
+            f"{len(ends)} rests give {mean.value:.2f} times the sliding friction, "
+            f"to {100 * NORMAL_95 * sd / mean.value:.0f} %",
+            f"{QUESTION} is told where it is known to {100 * TOLD:.0f} %",
             "let it rest and creep away more often",
         )
     ratio = replace(mean, interval=_about(mean.value, sd), sd=sd)

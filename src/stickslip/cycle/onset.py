@@ -255,7 +255,7 @@ def _by_peak(record: Record, strokes: Strokes) -> _Borne:
     if stray > NOTHING * level:
         raise EstimateError(
             f"the friction strays by {stray:.2g} after each slip, from a level of {level:.2g}",
-            f"static friction is told where it strays by less than {NOTHING:.0%} of its level",
+            f"static friction is told where it strays by less than {100 * NOTHING:.0f} % of its level",
             unknown or "give a record with less noise",
         )
     best = next(iter(_used(record, method)), "x")

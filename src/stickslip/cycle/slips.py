@@ -143,7 +143,7 @@ def slip_ringing(record: Record, *, contact: str | None = None) -> SlipRinging:
     if ringing is None:
         raise EstimateError(
             f"no ringing: the friction of {len(strokes.strokes)} strokes swings about its level by less than "
-            f"{LOUD:.0%} of it, or in each stroke otherwise",
+            f"{100 * LOUD:.0f} % of it, or in each stroke otherwise",
             f"{QUESTION} needs {FASTER:g} cycles at least in the quarter of a stroke after the breakaway",
             "sample faster, or look at the map",
         )

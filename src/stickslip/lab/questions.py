@@ -283,7 +283,9 @@ def _on_twins(query: Query, findings: Any) -> Any:
         return findings
 
     def tell(share: float) -> None:
-        query.say(f"trying the answers of {findings.name} on {TWINS} simulated rigs, {share:.0%}", 0.1 + 0.8 * share)
+        query.say(
+            f"trying the answers of {findings.name} on {TWINS} simulated rigs, {100 * share:.0f} %", 0.1 + 0.8 * share
+        )
 
     tell(0.0)
     try:
@@ -341,7 +343,7 @@ def fit(query: Query) -> dict[str, Any]:
         curve=query.options.get("curve"),
         laws=_listed(query.options.get("laws")),
         calibration=query.options.get("calibration") or 0.01,
-        progress=lambda share: query.say(f"fitting and comparing laws, {share:.0%}", 0.05 + 0.85 * share),
+        progress=lambda share: query.say(f"fitting and comparing laws, {100 * share:.0f} %", 0.05 + 0.85 * share),
     )
     ss.publish(result, folder=FOLDER, record=records)
     answer = _shown(ss.summary(result, record=records))

@@ -62,7 +62,7 @@ class Patience:
         self.until = min(self.until, time.monotonic() + PATIENCE)
         if time.monotonic() > self.until:
             raise ss.errors.SolveError(
-                f"the run is {share:.0%} done after {PATIENCE:g} s",
+                f"the run is {100 * share:.0f} % done after {PATIENCE:g} s",
                 "the page waits no longer",
                 "ask for fewer cycles, or run it with stickslip simulate",
             )

@@ -281,7 +281,7 @@ def _answer(curve: str, family: Family, member: Member, *, filled: float) -> Cur
     if TOO_NOISY in worries:
         parameters = {name: estimate.doubted(TOO_NOISY) for name, estimate in parameters.items()}
     if filled > FILLED:
-        worries.append(f"{filled:.0%} of the samples were not measured, but filled in between others")
+        worries.append(f"{100 * filled:.0f} % of the samples were not measured, but filled in between others")
     for names, word in family.beware(parameters, samples):
         worries.append(word)
         parameters |= {name: replace(parameters[name], status=word) for name in names}
@@ -334,7 +334,7 @@ def _worries(member: Member, samples: Samples, along: str, missed: float) -> lis
     left = float(np.linalg.norm(samples.friction - member.fitted) / np.linalg.norm(samples.friction))
     if missed > MISSES:
         worries.append(
-            f"the friction does not follow the curve: {missed:.0%} of it is neither in the curve nor noise; "
+            f"the friction does not follow the curve: {100 * missed:.0f} % of it is neither in the curve nor noise; "
             "another curve may leave less, or another mass"
         )
     elif left > LEAVES:

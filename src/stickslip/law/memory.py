@@ -324,8 +324,8 @@ def _status(loops: list[_Loop], memory: str) -> str:
         stuck = float(np.mean(np.abs(loop.way) < HALF))
         if stuck > STICKS:
             doubts.append(
-                f"at {loop.frequency:.3g} Hz the contact rests {stuck:.0%} of the time, in which no memory shows: "
-                "records in which it slides all the time tell more"
+                f"at {loop.frequency:.3g} Hz the contact rests {100 * stuck:.0f} % of the time, in which no memory "
+                "shows: records in which it slides all the time tell more"
             )
     if memory == "undecided" and len(loops) > 1 and _reach(loops) >= FURTHEST:
         doubts.append("give records of higher frequencies, where the memories part")

@@ -45,7 +45,7 @@ class Remainder(NamedTuple):
         return cls.of(fit.residual, fit.noise, _sizes(fit))
 
     def __str__(self) -> str:
-        return f"leaves {self.share:.0%} of {self.channel}"
+        return f"leaves {100 * self.share:.0f} % of {self.channel}"
 
 
 def _sizes(fit: LawFit) -> dict[str, float]:
@@ -255,9 +255,9 @@ def _sentences(
     if best.family == "rigid" and len(families) == 1 and excess_ is not None:
         low, high = excess_.interval
         exceeds = (
-            f"by {excess_.value:.1%} (95 %: {low:.1%} to {high:.1%})"
+            f"by {100 * excess_.value:.1f} % (95 %: {100 * low:.1f} % to {100 * high:.1f} %)"
             if math.isfinite(high)
-            else f"by {low:.1%} or more"
+            else f"by {100 * low:.1f} % or more"
             if low > 0
             else "by what can not be told"
         )
@@ -267,12 +267,13 @@ def _sentences(
                 f"where calibrations within {100 * calibration:.2g} % hide {100 * CALIBRATIONS * calibration:.2g} %."
             )
         elif best.name == "Coulomb" or kept == ["Coulomb"]:
-            yield f"One level of friction explains it: static friction exceeds the kinetic by {high:.1%} at most."
+            most = f"{100 * high:.1f} % at most"
+            yield f"One level of friction explains it: static friction exceeds the kinetic by {most}."
         else:
             falls = "at once" if kept == ["static"] else "with the speed, along a Stribeck curve"
             yield f"Static friction exceeds the kinetic {exceeds} and falls {falls}."
     if len(kept) == 1:
-        yield f"Confidence {confidence:.1%}."
+        yield f"Confidence {100 * confidence:.1f} %."
 
 
 def _either(names: Sequence[str]) -> str:

@@ -209,8 +209,8 @@ class _Search(NamedTuple):
             silent = unexplained(nearest, shown)
             stated = [replace(one, channels=tuple(n for n in one.channels if n not in silent)) for one in shown]
             worries = tuple(
-                f"{name} is left out: the best law leaves {share:.0%} of it, and no mount or delay of its sensor is "
-                "stated"
+                f"{name} is left out: the best law leaves {100 * share:.0f} % of it, and no mount or delay of its "
+                "sensor is stated"
                 for name, share in silent.items()
             )
             looked = _Looked(tuned(stated, nearest, self.stretch(None), self.tell), stated, worries)
@@ -308,7 +308,7 @@ def _fit(trial: Trial, shown: Sequence[Shown], stretches: Sequence[Stretch], tel
     fit = replace(fit, noise=noise, checks=checks)
     remainder = Remainder.of_fit(fit)
     if remainder.share > LEFT:
-        doubt = f"the interval does not count that the law misses {remainder.share:.0%} of {remainder.channel}"
+        doubt = f"the interval does not count that the law misses {100 * remainder.share:.0f} % of {remainder.channel}"
         fit = _flagged(fit, doubt)
     return fit
 

@@ -295,7 +295,9 @@ class _Listener:
             return kind, "shown", evidence
         if share <= FREE:
             return "tonal", "no", f"{evidence}: too little to feed it"
-        between = f"more than beneath a free ringing, {FREE:.0%}, and less than beneath a squeak, {FED:.0%}"
+        between = (
+            f"more than beneath a free ringing, {100 * FREE:.0f} %, and less than beneath a squeak, {100 * FED:.0f} %"
+        )
         return "tonal", "not told", f"{evidence}: {between}; near the threshold it can not be told"
 
     def _broad(self, part: Span, *, slides: bool) -> tuple[str, str, str]:
@@ -406,7 +408,7 @@ def _unlike_a_contact(bursts: list[Squeak], claimed: list[Squeak]) -> str:
     clear = [burst for burst in bursts if burst.kind != "noise" and burst.tonality > CLEAR]
     tones = [burst for burst in clear if burst in claimed or burst.duration * burst.frequency > LASTS]
     if not tones:
-        return f"less than {CLEAR:.0%} of its power is in its tones"
+        return f"less than {100 * CLEAR:.0f} % of its power is in its tones"
     pitch = float(np.median([tone.frequency for tone in tones]))
     if any(abs(tone.frequency / pitch - 1) > ONE_PITCH for tone in tones):
         return "it has several pitches, as an instrument, a voice or a bird has"

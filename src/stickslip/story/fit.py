@@ -140,9 +140,9 @@ def _curve_told(fit: CurveFit) -> Iterator[str]:
     if fit.follows and fit.unexplained > LOUD:
         follows = f"as far as its noise lets it be seen, {follows}"
     yield f'{follows[0].upper()}{follows[1:]} the curve "{fit.curve}": {fit.formula}.'
-    left = f"{fit.unexplained:.1%} of the friction, {number(fit.residual, fit.residual / 100, fit.unit)}"
+    left = f"{100 * fit.unexplained:.1f} % of the friction, {number(fit.residual, fit.residual / 100, fit.unit)}"
     what = "It leaves" if fit.follows else "The best of that kind leaves"
-    yield f"{what} {left} root mean square; {fit.model_error:.1%} is no noise."
+    yield f"{what} {left} root mean square; {100 * fit.model_error:.1f} % is no noise."
 
 
 def _law_told(fit: LawFit) -> Iterator[str]:

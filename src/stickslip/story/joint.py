@@ -39,7 +39,13 @@ def of_comparison(comparison: Comparison) -> Story:
     """Several logs of one joint."""
     logs = list(zip(comparison.findings, comparison.together.predictions, strict=True))
     rows = [
-        (log.name, value_of(log.joint.level), interval_of(log.joint.level), f"{one.error:.2%}", f"{one.plain:.2%}")
+        (
+            log.name,
+            value_of(log.joint.level),
+            interval_of(log.joint.level),
+            f"{100 * one.error:.2f} %",
+            f"{100 * one.plain:.2f} %",
+        )
         for log, one in logs
     ]
     table = Table(
