@@ -65,7 +65,7 @@ def test_what_the_sensors_are_known_to_add_is_taken_out(rig: ss.Rig) -> None:
             {},
             "a mount of (999.*|100.) Hz shows in a, and none is stated",
         ),
-        (PERFECT.having("a", white=0.04), {}, "the noise of a is 1.% of its standard deviation"),
+        (PERFECT.having("a", white=0.04), {}, "the noise of a is 1. % of its standard deviation"),
         (ss.Rig(), RIG, "x comes 1.* ms after a: state the delays.*; a mount of 12.* Hz shows in a"),
     ],
     ids=["mount of 125 Hz", "mount of 1000 Hz", "noise", "the thesis's"],
