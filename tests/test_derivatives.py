@@ -70,6 +70,7 @@ def test_what_has_no_derivative_is_refused() -> None:
         ss.solve.sensitivities(run, "static")
     with pytest.raises(ss.errors.ModelError, match="no parameter is called 'sliding'"):
         ss.solve.sensitivities(run, "sliding")
-    curved = ss.Oscillator(mass=1.0, stiffness=4.0, law=ss.laws.Stribeck(1.0, 1.2, speed=0.1))
-    with pytest.raises(ss.errors.ModelError, match="linear between its events"):
-        ss.solve.sensitivities(ss.simulate(curved, duration=3.0, start={"x": 2.0}), "kinetic")
+    late = ss.laws.TimeDelay(ss.laws.Stribeck(1.0, 1.2, speed=0.1), lag=0.01)
+    lagging = ss.simulate(ss.Oscillator(mass=1.0, stiffness=4.0, law=late), duration=3.0, start={"x": 2.0})
+    with pytest.raises(ss.errors.ModelError, match="under a law without time lag"):
+        ss.solve.sensitivities(lagging, "lag")
