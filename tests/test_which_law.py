@@ -130,7 +130,7 @@ def test_a_comparison_is_cancelled_by_its_progress() -> None:
     [
         ({"laws": ["cheese"]}, ss.errors.ModelError, "laws are Coulomb, static"),
         ({"laws": []}, ss.errors.ModelError, "no law"),
-        ({"laws": [ss.laws.Dahl]}, ss.errors.ModelError, "values to start from"),
+        ({"laws": [ss.laws.Tabulated]}, ss.errors.ModelError, "speeds and forces can not be guessed"),
         ({"calibration": 2.0}, ss.errors.ModelError, "part of 1"),
     ],
 )

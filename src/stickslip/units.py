@@ -388,6 +388,24 @@ def _powers(reciprocal: str | None, chain: str, below: str | None) -> dict[str, 
 
 
 @functools.cache
+def dimensions(unit: str) -> tuple[float, float, float]:
+    """The powers of mass, length and time in an SI unit, also in one like "1/(N s)"; an angle has none.
+
+    Examples
+    --------
+    >>> dimensions("N s/m"), dimensions("1/(N s)")
+    ((1.0, 0.0, -1.0), (-1.0, -1.0, 1.0))
+    """
+    above, _, below = unit.partition("/(")
+    reciprocal, chain = ("1/", above[2:]) if above.startswith("1/") else (None, "" if above == "1" else above)
+    registry = _registry()
+    powers = registry.UnitsContainer(_powers(reciprocal, chain, below.removesuffix(")")))
+    measure = registry.Quantity(1.0, powers).dimensionality
+    mass, length, time = (float(measure.get(f"[{name}]", 0.0)) for name in ("mass", "length", "time"))
+    return mass, length, time
+
+
+@functools.cache
 def _registry():  # type: ignore[no-untyped-def]  # pint's registry type exists only once pint is imported
     import pint
 

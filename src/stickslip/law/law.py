@@ -12,8 +12,21 @@ from numpy.typing import NDArray
 
 from stickslip.errors import EstimateError, ModelError
 from stickslip.estimate import Estimate, Result, Status
-from stickslip.law.search import OF_SENSORS, SHARE, Knob, Point, Problem, Slopes, descend, rows_of, without_starts
+from stickslip.law.search import (
+    OF_SENSORS,
+    SHARE,
+    Knob,
+    Point,
+    Problem,
+    Profile,
+    Slopes,
+    descend,
+    rows_of,
+    without_starts,
+)
+from stickslip.law.standing import MISFIT
 from stickslip.law.start import (
+    CALIBRATION,
     Shown,
     best_start,
     better_start,
@@ -30,8 +43,11 @@ from stickslip.law.start import (
     value_of,
 )
 from stickslip.law.stretch import Sensor, Stretch, channels_of
+from stickslip.law.trials import PASSES, Search, Seen, seen_by
 from stickslip.laws.base import Law
 from stickslip.laws.curved import CurvedLaw
+from stickslip.laws.guessing import contained, hypotheses, hypothesis_of
+from stickslip.laws.rough import RoughSurface
 from stickslip.oscillator import Oscillator
 from stickslip.parameters import named
 from stickslip.parameters import unit as unit_of
@@ -41,7 +57,6 @@ from stickslip.statistics import mean_uncertainty, student
 Array = NDArray[np.float64]
 
 METHOD = "least squares of what the sensors read, the motion simulated"
-MISFIT = 1.2  # times its noise that a channel's residual may be
 STIFFEST = 1e-5  # of the stroke: what a contact gives way at least
 UNEVEN = 0.1  # of its mean, that a surface strays
 WORK = 24.0  # calls of progress after which most of a fit is taken to be done
@@ -97,7 +112,7 @@ class LawFit(Result):
     traces : tuple of Traces
         One for each record.
     surface : str
-        "even" or "rough", see :func:`fit_law`.
+        "even", or "rough" with the profile of a ``RoughSurface``.
     status : str
         "ok", or why the fit should not be trusted.
     checks : tuple of str
@@ -152,7 +167,7 @@ def fit_law(
     free: Sequence[str] | None = None,
     nuisance: Sequence[str] | None = None,
     channels: Sequence[str] | None = None,
-    surface: str = "even",
+    law: Any = None,
     intervals: bool = True,
     progress: Callable[[float], object] | None = None,
 ) -> LawFit:
@@ -185,10 +200,12 @@ def fit_law(
         delay of x, to 50 us; with nothing free, nothing. Empty: all is as stated.
     channels : sequence of str, optional
         Channels to explain; all that were measured where left out.
-    surface : {"even", "rough"}
-        "even": the friction is the same everywhere. "rough": the friction forces are multiplied by a profile along the
-        surface, which is fitted too; the law is Coulomb's or the CompliantContact, and its sliding friction the mean of
-        the profile, as sure as that mean is for another part of the surface.
+    law : str, type or law, optional
+        The law to fit: its name, its class, or an instance with the values to start from; the oscillator's own where
+        left out. ``RoughSurface``: the oscillator's own on a surface whose friction is not the same everywhere: its
+        forces are multiplied by a profile along the surface, which is fitted too; it is Coulomb's or the
+        CompliantContact, and its sliding friction the mean of the profile, as sure as that mean is for another part of
+        the surface.
     intervals : bool
         Whether to ask how sure the parameters are; without, the fit is quicker.
     progress : callable, optional
@@ -205,7 +222,8 @@ def fit_law(
     EstimateError
         No motion above the noise, no sliding, or sliding at one speed alone.
     ModelError
-        A parameter that the oscillator does not have, or is named twice; a channel that is not fitted.
+        A law that is not known or whose start can not be guessed; a parameter that the oscillator does not have, or is
+        named twice; a channel that is not fitted.
 
     Examples
     --------
@@ -223,33 +241,86 @@ def fit_law(
     records = [record] if isinstance(record, Record) else list(record)
     if not records:
         raise EstimateError("no record", "a law is fitted to one record at least", "give one")
-    if surface not in ("even", "rough"):
-        raise ModelError(f"surface = '{surface}'", "a surface is 'even' or 'rough'", "choose one, or leave it out")
     tell = teller(progress, WORK)
-    names = free_names(oscillator, free)
     shown = [Shown.of(one, channels_of(one, channels), oscillator) for one in records]
+    rough = law is RoughSurface
+    begun = _begun(None if rough else law, oscillator, records)
+    names = free_names(begun[0], free)
     if nuisance is None:
-        nuisance = usual_nuisance(oscillator, names, shown) if names else ()
-    require_apart(oscillator, names, nuisance, shown)
+        nuisance = usual_nuisance(begun[0], names, shown) if names else ()
+    require_apart(begun[0], names, nuisance, shown)
     stretches = [_sliding_stretch(motion, number) for number, motion in enumerate(shown)]
-    fastest = max(motion.fastest for motion in shown)
-    oscillator, profile = better_start(oscillator, names, shown), None
+    start = better_start(begun[0], names, shown)
     if names:
         dampers = [oscillator.damping, *([seen_damping(oscillator, shown).damping] if "damping" in nuisance else [])]
-        oscillator = best_start(oscillator, names, stretches, fastest, dampers, tell)
-    if surface == "rough":
-        profile = seen_profile(shown, value_of(oscillator, "kinetic"))
-        names = tuple(name for name in names if name != "kinetic")
-    knobs = [bounded(knob(oscillator, name), oscillator, stretches, STIFFEST) for name in names]
-    knobs += nuisance_knobs(oscillator, nuisance, stretches)
-    heights = enumerate(profile.values if profile else ())
-    knobs += [Knob(f"profile {j}", "profile", height, 0.01, prior=UNEVEN / 0.01) for j, height in heights]
-    problem = Problem.of(oscillator, stretches, knobs, profile)
+        start = best_start([start, *begun[1:]], names, stretches, dampers, tell)
+    problem = _posed(
+        start, names, nuisance, stretches, seen_profile(shown, value_of(start, "kinetic")) if rough else None
+    )
     point = _descended(problem, tell)
+    if free is None and not rough and not _explains(problem, point):
+        problem, point = _from_simpler(problem, point, records, shown, tell)
     sure = surety(problem, point, tell) if intervals else None
     if progress:
         progress(1.0)
     return answered(problem, point, sure, shown)
+
+
+def _begun(law: Any, oscillator: Oscillator, records: Sequence[Record]) -> list[Oscillator]:
+    """The oscillator with the law's values where the search begins: as given, or as the friction suggests them."""
+    if law is None:
+        return [oscillator]
+    kind = hypothesis_of(law)
+    guesses = kind.guesses(Seen.of(records, oscillator)) if isinstance(law, str | type) else [law]
+    return [replace(oscillator, law=guess) for guess in guesses]
+
+
+def _posed(
+    oscillator: Oscillator,
+    names: Sequence[str],
+    nuisance: Sequence[str],
+    stretches: Sequence[Stretch],
+    profile: Profile | None = None,
+) -> Problem:
+    """What is turned, from the oscillator's values; on a rough surface its profile in place of its level."""
+    names = [name for name in names if profile is None or name != "kinetic"]
+    knobs = [bounded(knob(oscillator, name), oscillator, stretches, STIFFEST) for name in names]
+    knobs += nuisance_knobs(oscillator, nuisance, stretches)
+    heights = enumerate(profile.values if profile else ())
+    knobs += [Knob(f"profile {j}", "profile", height, 0.01, prior=UNEVEN / 0.01) for j, height in heights]
+    return Problem.of(oscillator, stretches, knobs, profile)
+
+
+def _explains(problem: Problem, point: Point) -> bool:
+    """Whether no channel is left with more than noise."""
+    return all(
+        math.sqrt(float(np.mean(values[rows] ** 2))) <= MISFIT
+        for stretch, values in zip(problem.stretches, point.residuals, strict=True)
+        for rows in rows_of(stretch.sensors)
+    )
+
+
+def _from_simpler(
+    problem: Problem, point: Point, records: Sequence[Record], shown: Sequence[Shown], tell: Callable[[], None]
+) -> tuple[Problem, Point]:
+    """Where a search ends that begins at those of the simpler laws which the law contains, where that is lower.
+
+    A law next to rigid, or with a curve that is next to none, has valleys of its own: a compliant contact left 6 times
+    the noise of a record of another compliant contact, bristles 32 times that of a rigid one, which they contain.
+    """
+    known = hypotheses()
+    kind = hypothesis_of(problem.oscillator.law)
+    inner = [one for name, one in known.items() if name in contained(kind)]
+    nuisance = [turned.name for turned in problem.knobs if turned.name not in free_names(problem.oscillator, None)]
+    nuisance = list(dict.fromkeys(nuisance))
+    stated = [problem.oscillator, *([seen_damping(problem.oscillator, shown)] if "damping" in nuisance else [])]
+    search = Search([(one, []) for one in (*inner, kind)], seen_by(records, stated), nuisance, CALIBRATION, tell)
+    trial = search.tried(shown, None, PASSES, {}).get(kind.name)
+    if trial is None or type(trial.law) is not type(problem.oscillator.law):
+        return problem, point
+    other = _posed(trial.system, free_names(trial.system, None), nuisance, problem.stretches)
+    end = descend(other, other.begin(np.zeros(len(other.knobs))), tell=tell)
+    return (other, end) if end.chi2 < point.chi2 else (problem, point)
 
 
 def _sliding_stretch(motion: Shown, number: int) -> Stretch:

@@ -11,7 +11,7 @@ import numpy as np
 
 from stickslip.estimate import Doubt, Estimate, Result, Status
 from stickslip.law.law import LawFit
-from stickslip.law.standing import CALIBRATIONS, Standing, times
+from stickslip.law.standing import CALIBRATIONS, MISFIT, Standing, times
 from stickslip.laws.guessing import family_of
 from stickslip.oscillator import Oscillator
 from stickslip.record.record import Record, Step
@@ -44,8 +44,13 @@ class Remainder(NamedTuple):
         """What a fitted law leaves."""
         return cls.of(fit.residual, fit.noise, _sizes(fit))
 
+    @property
+    def explained(self) -> bool:
+        """Whether no more is left than noise."""
+        return self.share <= LEFT and self.over <= MISFIT
+
     def __str__(self) -> str:
-        return f"leaves {100 * self.share:.0f} % of {self.channel}"
+        return f"leaves {100 * self.share:.{0 if self.share > LEFT else 2}f} % of {self.channel}"
 
 
 def _sizes(fit: LawFit) -> dict[str, float]:
@@ -250,7 +255,8 @@ def _sentences(
             )
         rivalry = "; ".join(clauses) or "no law of another family was tried"
         fits = f"{kept[0][:1].upper()}{kept[0][1:]} fits best: the" if len(kept) == 1 else "The"
-        lead = f"The best of those tried {remainder}. Among them the" if remainder.share > LEFT else fits
+        many = f", {times(remainder.over)} its noise" if remainder.share <= LEFT else ""
+        lead = fits if remainder.explained else f"The best of those tried {remainder}{many}. Among them the"
         yield f"{lead} friction is {family_of(best.name).said}: {rivalry}."
     if best.family == "rigid" and len(families) == 1 and excess_ is not None:
         low, high = excess_.interval
