@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import stickslip as ss
-from stickslip.lab.forms import catalog
+from stickslip.lab.drawn import catalog
 from stickslip.laws.base import Exit, Mode, Rigid
 from stickslip.laws.export import FORMATS
 from stickslip.laws.guessing import RIGID, Hypothesis, Observed, registered

@@ -16,10 +16,10 @@ from stickslip.cli.program import main
 from stickslip.figures.law import law_plates
 from stickslip.law.law import _end
 from stickslip.law.search import Knob, Problem
-from stickslip.law.standing import CERTAIN, Evidence, Misfit, seen_above, standings
 from stickslip.law.start import Shown
 from stickslip.law.stretch import channels_of
 from stickslip.law.trials import Seen
+from stickslip.law.verdict import CERTAIN, Evidence, Misfit, seen_above, standings
 from stickslip.laws.guessing import hypotheses
 from stickslip.record.record import Step
 

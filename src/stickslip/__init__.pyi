@@ -48,9 +48,11 @@ from stickslip.maps.basins import basins as basins
 from stickslip.maps.bifurcation import bifurcation as bifurcation
 from stickslip.maps.dither import dither as dither
 from stickslip.maps.sweep import sweep as sweep
+from stickslip.oscillator import Contact as Contact
 
 # systems
 from stickslip.oscillator import Oscillator as Oscillator
+from stickslip.oscillator import Structure as Structure
 
 # telling
 from stickslip.record.record import Record as Record
@@ -63,8 +65,6 @@ from stickslip.squeak.stability import stability as stability
 from stickslip.story.folder import publish as publish
 from stickslip.story.folder import report as report
 from stickslip.story.story import summary as summary
-from stickslip.structure import Contact as Contact
-from stickslip.structure import Structure as Structure
 
 __version__: str
 __all__: list[str]

@@ -22,8 +22,7 @@ from stickslip.errors import EstimateError, RecordError
 from stickslip.estimate import Constant, Estimate, Result
 from stickslip.record.record import Record
 from stickslip.signals.ridges import Ridge, Spike, find_ridges, find_spikes
-from stickslip.signals.wavelet import wavelet_map, wavelet_overview
-from stickslip.signals.wavelet_grid import CENTRE
+from stickslip.signals.wavelet import CENTRE, wavelet_map, wavelet_overview
 from stickslip.units import parse_range
 
 if TYPE_CHECKING:

@@ -22,8 +22,7 @@ from stickslip.files import journal
 from stickslip.files.read import read_record
 from stickslip.files.table import Options
 from stickslip.files.write import WRITERS, require_free, write_record, write_table
-from stickslip.record.log import Log
-from stickslip.record.metadata import record_to_metadata
+from stickslip.record.metadata import Log, record_to_metadata
 from stickslip.record.record import Record, Step
 from stickslip.signals.clocks import clock_rate, synchronise
 

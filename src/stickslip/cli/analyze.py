@@ -25,8 +25,7 @@ from stickslip.cli.records import (
     rig_of,
     with_left_out,
 )
-from stickslip.cli.show import publish, show
-from stickslip.cli.terminal import complain, progress
+from stickslip.cli.terminal import complain, progress, publish, show
 from stickslip.errors import INTERRUPTED
 from stickslip.workers import processors
 

@@ -13,8 +13,7 @@ import click
 import stickslip as ss
 from stickslip.cli.options import constants_options, reading_options, result_options
 from stickslip.cli.records import RIG_FILE, answer_together, default_folder, groups_of, read, rig_of
-from stickslip.cli.show import publish, show
-from stickslip.cli.terminal import complain, progress
+from stickslip.cli.terminal import complain, progress, publish, show
 from stickslip.errors import ABSENT, EstimateError
 
 if TYPE_CHECKING:

@@ -12,8 +12,7 @@ import click
 import stickslip as ss
 from stickslip.cli.options import together
 from stickslip.cli.records import answer_together, checksum, names_of, read
-from stickslip.cli.show import publish, show
-from stickslip.cli.terminal import progress
+from stickslip.cli.terminal import progress, publish, show
 
 if TYPE_CHECKING:
     from stickslip import Record

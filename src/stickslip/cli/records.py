@@ -17,8 +17,7 @@ import click
 
 import stickslip as ss
 from stickslip.cli.options import pair
-from stickslip.cli.show import publish, show
-from stickslip.cli.terminal import complain, progress, spoken
+from stickslip.cli.terminal import complain, progress, publish, show, spoken
 from stickslip.printing import printable
 
 if TYPE_CHECKING:

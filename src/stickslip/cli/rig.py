@@ -19,8 +19,7 @@ from stickslip.cli.options import (
     wanted_case,
 )
 from stickslip.cli.records import folder_after, groups_of, read, rig_of
-from stickslip.cli.show import publish, show
-from stickslip.cli.terminal import progress
+from stickslip.cli.terminal import progress, publish, show
 
 if TYPE_CHECKING:
     from stickslip import Record, Rig

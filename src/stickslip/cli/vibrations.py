@@ -21,8 +21,7 @@ from stickslip.cli.records import (
     require_fits,
     rig_of,
 )
-from stickslip.cli.show import publish, show
-from stickslip.cli.terminal import progress
+from stickslip.cli.terminal import progress, publish, show
 
 if TYPE_CHECKING:
     from stickslip import Record

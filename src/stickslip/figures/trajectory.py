@@ -29,7 +29,7 @@ from stickslip.figures.style import (
     prefixed,
     styled,
 )
-from stickslip.structure import Structure
+from stickslip.oscillator import Structure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

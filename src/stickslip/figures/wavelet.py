@@ -27,8 +27,7 @@ from stickslip.figures.style import (
     styled,
 )
 from stickslip.signals.pieces import RING
-from stickslip.signals.wavelet import ends, wavelet_map
-from stickslip.signals.wavelet_grid import CENTRE
+from stickslip.signals.wavelet import CENTRE, ends, wavelet_map
 
 if TYPE_CHECKING:
     import xarray as xr

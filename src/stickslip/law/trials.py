@@ -17,9 +17,9 @@ from stickslip.errors import EstimateError
 from stickslip.estimate import NORMAL_95, Estimate
 from stickslip.law.drive import Sampled, as_driven, face_of
 from stickslip.law.search import Knob, Point, Problem, descend, rows_of
-from stickslip.law.standing import Evidence, Key, independent
 from stickslip.law.start import Shown, bounded, free_names, knob, nuisance_knobs, thinned
 from stickslip.law.stretch import Motion, Sensor, Stretch, attempted
+from stickslip.law.verdict import Evidence, Key, independent
 from stickslip.laws.guessing import LEAST_EXCESS, STIFF, STIFFEST, Observed
 from stickslip.oscillator import Oscillator
 from stickslip.record.record import Record

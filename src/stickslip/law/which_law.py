@@ -14,7 +14,6 @@ from stickslip.errors import EstimateError, ModelError
 from stickslip.estimate import NORMAL_95, Doubt, Estimate
 from stickslip.law.law import LawFit, answered, surety, teller
 from stickslip.law.search import descend
-from stickslip.law.standing import CALIBRATIONS, Evidence, Misfit, Standing, standings, undescribed
 from stickslip.law.start import CALIBRATION, Shown, require_apart, seen_damping, too_few, usual_nuisance
 from stickslip.law.stretch import Stretch, channels_of
 from stickslip.law.trials import (
@@ -31,13 +30,19 @@ from stickslip.law.trials import (
     with_static,
 )
 from stickslip.law.verdict import (
+    CALIBRATIONS,
     LEFT,
     Candidate,
+    Evidence,
     LawComparison,
+    Misfit,
     Remainder,
+    Standing,
     concluded,
     damper_found,
     doubt_of,
+    standings,
+    undescribed,
     unexplained_part,
 )
 from stickslip.laws.guessing import hypotheses

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from stickslip.errors import ModelError
 from stickslip.estimate import Estimate
+from stickslip.oscillator import Structure
 from stickslip.solve.poincare import extent
 from stickslip.solve.trajectory import Event, Trajectory
-from stickslip.structure import Structure
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,7 +14,7 @@ from stickslip.cycle.joint import JointFriction
 from stickslip.cycle.joint_fit import JointLogs
 from stickslip.errors import ModelError
 from stickslip.estimate import stands
-from stickslip.figures.joint import plates_of, plates_together
+from stickslip.figures.law import plates_of, plates_together
 from stickslip.laws.coulomb import LinearSlope
 from stickslip.laws.export import export_law, urdf_dynamics
 from stickslip.story.fit import ALONE, FILES
