@@ -11,8 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import stickslip as ss
-from stickslip.figures.plate import Plate
-from stickslip.figures.style import BLUE, FAINT, ORANGE, PURPLE, styled
+from stickslip.figures.style import BLUE, FAINT, ORANGE, PURPLE, Plate, styled
 from stickslip.figures.wavelet import plot_wavelet
 from stickslip_thesis import chapter4
 from stickslip_thesis.drawing import figure, panels, tag

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from stickslip import __version__
-from stickslip.figures.plate import Plate
+from stickslip.figures.style import Plate
 from stickslip.story.folder import check_folder, results_folder, templates, write_figures
 from stickslip.units import prefixed, spelled
 from stickslip.workers import processors, workers

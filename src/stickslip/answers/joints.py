@@ -13,10 +13,9 @@ import numpy as np
 
 from stickslip.answers.findings import Comparison, Findings, Inquiry, flagged, record_name, require_several, with_doubt
 from stickslip.answers.mistakes import called, require_angle
-from stickslip.cycle.backlash import joint_backlash
 from stickslip.cycle.joint import JointFriction, regress_joint
 from stickslip.cycle.joint_fit import regress_joint_logs
-from stickslip.cycle.joint_onset import joint_breakaway
+from stickslip.cycle.joint_onset import joint_backlash, joint_breakaway
 from stickslip.cycle.sticks import find_sticks
 from stickslip.errors import RecordError
 from stickslip.estimate import UNTRIED, Constant, Doubt, Estimate

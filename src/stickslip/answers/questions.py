@@ -21,8 +21,7 @@ from stickslip.balance.motion import is_measured, slid_on
 from stickslip.consistent.checks import Slip
 from stickslip.consistent.contradictions import consistency
 from stickslip.contact.cause import lag_or_compliance
-from stickslip.contact.contact import contact_damping, contact_stiffness
-from stickslip.contact.sliding_onset import coupled_frequency, transition_speed
+from stickslip.contact.contact import contact_damping, contact_stiffness, coupled_frequency, transition_speed
 from stickslip.cycle.before_slip import presliding
 from stickslip.cycle.loops import friction_loops
 from stickslip.cycle.onset import breakaway

@@ -11,8 +11,17 @@ from typing import TYPE_CHECKING, Any
 import click
 
 import stickslip as ss
-from stickslip.cli.options import constants_options, reading_options, result_options
-from stickslip.cli.records import RIG_FILE, answer_together, default_folder, groups_of, read, rig_of
+from stickslip.cli.records import (
+    RIG_FILE,
+    answer_together,
+    constants_options,
+    default_folder,
+    groups_of,
+    read,
+    reading_options,
+    result_options,
+    rig_of,
+)
 from stickslip.cli.terminal import complain, progress, publish, show
 from stickslip.errors import ABSENT, EstimateError
 

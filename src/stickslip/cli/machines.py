@@ -9,8 +9,18 @@ from typing import TYPE_CHECKING, Any
 import click
 
 import stickslip as ss
-from stickslip.cli.options import normal_option, number_of, reading_options, result_options
-from stickslip.cli.records import answer_together, default_folder, groups_of, read, require_fits, rig_of
+from stickslip.cli.records import (
+    answer_together,
+    default_folder,
+    groups_of,
+    normal_option,
+    number_of,
+    read,
+    reading_options,
+    require_fits,
+    result_options,
+    rig_of,
+)
 
 if TYPE_CHECKING:
     from stickslip import Record

@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 import stickslip as ss
-from stickslip.cli.options import together
-from stickslip.cli.records import answer_together, checksum, names_of, read
+from stickslip.cli.records import answer_together, checksum, names_of, read, together
 from stickslip.cli.terminal import progress, publish, show
 
 if TYPE_CHECKING:

@@ -9,16 +9,19 @@ from typing import TYPE_CHECKING, Any
 import click
 
 import stickslip as ss
-from stickslip.cli.options import (
+from stickslip.cli.records import (
     case_options,
+    folder_after,
     folder_name,
     form_option,
+    groups_of,
     pair,
+    read,
     reading_options,
     result_options,
+    rig_of,
     wanted_case,
 )
-from stickslip.cli.records import folder_after, groups_of, read, rig_of
 from stickslip.cli.terminal import progress, publish, show
 
 if TYPE_CHECKING:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 import stickslip as ss
-from stickslip.cli.options import (
+from stickslip.cli.records import (
     all_option,
     case_options,
     changes_option,

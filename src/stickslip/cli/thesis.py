@@ -10,7 +10,7 @@ from typing import Any
 
 import click
 
-from stickslip.cli.options import result_options
+from stickslip.cli.records import result_options
 from stickslip.cli.terminal import aligned, progress, say, say_json, wrapped
 
 _ROW = ("place", "quantity", "verdict", "why")

@@ -10,15 +10,18 @@ import click
 
 import stickslip as ss
 from stickslip.cli.many import Places, answer_all, many_options
-from stickslip.cli.options import contact_option, normal_option, reading_options, result_options
 from stickslip.cli.records import (
+    contact_option,
     default_folder,
     files_of,
     folder_after,
     groups_of,
     name_of,
+    normal_option,
     read_parts,
+    reading_options,
     require_fits,
+    result_options,
     rig_of,
 )
 from stickslip.cli.terminal import progress, publish, show

@@ -8,8 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from stickslip.contact.mechanisms import not_one_mode
-from stickslip.contact.ringing import Ringing, Window, checked_mass, find_ringing
+from stickslip.contact.ringing import Ringing, Window, checked_mass, find_ringing, not_one_mode
 from stickslip.errors import EstimateError
 from stickslip.estimate import Constant, Estimate, Result, Status
 from stickslip.record.record import Record

@@ -1,5 +1,3 @@
-from stickslip.cycle.backlash import JointBacklash as JointBacklash
-from stickslip.cycle.backlash import joint_backlash as joint_backlash
 from stickslip.cycle.before_slip import Presliding as Presliding
 from stickslip.cycle.before_slip import presliding as presliding
 from stickslip.cycle.joint import JointFriction as JointFriction
@@ -7,7 +5,9 @@ from stickslip.cycle.joint import regress_joint as regress_joint
 from stickslip.cycle.joint_fit import JointLogs as JointLogs
 from stickslip.cycle.joint_fit import JointPrediction as JointPrediction
 from stickslip.cycle.joint_fit import regress_joint_logs as regress_joint_logs
+from stickslip.cycle.joint_onset import JointBacklash as JointBacklash
 from stickslip.cycle.joint_onset import JointBreakaway as JointBreakaway
+from stickslip.cycle.joint_onset import joint_backlash as joint_backlash
 from stickslip.cycle.joint_onset import joint_breakaway as joint_breakaway
 from stickslip.cycle.joint_onset import telling_motion as telling_motion
 from stickslip.cycle.onset import Breakaway as Breakaway

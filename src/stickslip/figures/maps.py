@@ -12,16 +12,17 @@ import numpy as np
 from stickslip.consistent.sliding_balance import Slider
 from stickslip.drives.kinds import HarmonicBase, HarmonicForce
 from stickslip.errors import ModelError
-from stickslip.figures.plate import Plate, plate
 from stickslip.figures.style import (
     BLUE,
     INK,
     ORANGE,
     Array,
+    Plate,
     axes_of,
     axis_label,
     coloured,
     plain_decades,
+    plate,
     prefixed,
     styled,
 )

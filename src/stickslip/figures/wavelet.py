@@ -8,16 +8,17 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from stickslip.contact.mechanisms import UNTOLD
+from stickslip.contact.ringing import UNTOLD
 from stickslip.errors import RecordError
-from stickslip.figures.plate import Plate, captioned
 from stickslip.figures.style import (
     BLUE,
     INK,
     ORANGE,
     SHADE,
     Array,
+    Plate,
     axis_label,
+    captioned,
     coloured,
     empty_figure,
     envelope,

@@ -13,7 +13,7 @@ from stickslip.answers.frequencies import TimeFrequency
 from stickslip.answers.mistakes import hopeless
 from stickslip.balance.balance import Pull
 from stickslip.consistent.checks import Slip
-from stickslip.contact.mechanisms import UNTOLD
+from stickslip.contact.ringing import UNTOLD
 from stickslip.cycle.before_slip import Presliding
 from stickslip.cycle.onset import Breakaway
 from stickslip.cycle.slips import SlipRinging

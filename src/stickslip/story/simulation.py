@@ -14,7 +14,7 @@ import numpy as np
 from stickslip import scenarios
 from stickslip.errors import ModelError
 from stickslip.figures.animation import animate, require_writer
-from stickslip.figures.plate import Plate
+from stickslip.figures.style import Plate
 from stickslip.figures.trajectory import (
     contacts_of,
     cycle_of,
