@@ -22,9 +22,8 @@ from stickslip.consistent.checks import Slip
 from stickslip.consistent.contradictions import consistency
 from stickslip.contact.cause import lag_or_compliance
 from stickslip.contact.contact import contact_damping, contact_stiffness, coupled_frequency, transition_speed
-from stickslip.cycle.before_slip import presliding
 from stickslip.cycle.loops import friction_loops
-from stickslip.cycle.onset import breakaway
+from stickslip.cycle.onset import breakaway, presliding
 from stickslip.cycle.regression import Regression, regress_friction
 from stickslip.cycle.sticks import find_sticks
 from stickslip.errors import TOO_SHORT, UNNAMED, EstimateError, ModelError, StickslipError

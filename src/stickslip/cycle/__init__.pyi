@@ -1,5 +1,3 @@
-from stickslip.cycle.before_slip import Presliding as Presliding
-from stickslip.cycle.before_slip import presliding as presliding
 from stickslip.cycle.joint import JointFriction as JointFriction
 from stickslip.cycle.joint import regress_joint as regress_joint
 from stickslip.cycle.joint_fit import JointLogs as JointLogs
@@ -11,7 +9,9 @@ from stickslip.cycle.joint_onset import joint_backlash as joint_backlash
 from stickslip.cycle.joint_onset import joint_breakaway as joint_breakaway
 from stickslip.cycle.joint_onset import telling_motion as telling_motion
 from stickslip.cycle.onset import Breakaway as Breakaway
+from stickslip.cycle.onset import Presliding as Presliding
 from stickslip.cycle.onset import breakaway as breakaway
+from stickslip.cycle.onset import presliding as presliding
 from stickslip.cycle.parts import Stretch as Stretch
 from stickslip.cycle.parts import join_sticks as join_sticks
 from stickslip.cycle.parts import overlapping as overlapping

@@ -14,8 +14,7 @@ from stickslip.answers.mistakes import hopeless
 from stickslip.balance.balance import Pull
 from stickslip.consistent.checks import Slip
 from stickslip.contact.ringing import UNTOLD
-from stickslip.cycle.before_slip import Presliding
-from stickslip.cycle.onset import Breakaway
+from stickslip.cycle.onset import Breakaway, Presliding
 from stickslip.cycle.slips import SlipRinging
 from stickslip.estimate import Estimate, stands
 from stickslip.figures.friction import plates_of, plates_together
