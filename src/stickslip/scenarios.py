@@ -21,8 +21,8 @@ from stickslip.laws.formula import Formula
 from stickslip.laws.guessing import registered
 from stickslip.oscillator import Contact, Oscillator, Structure
 from stickslip.solve.assembly import table_of
-from stickslip.solve.orbit import SteadyState
 from stickslip.solve.periodic import steady_state
+from stickslip.solve.poincare import SteadyState
 from stickslip.solve.self_excited import steady_sliding
 from stickslip.solve.simulate import simulate
 from stickslip.solve.tables import System

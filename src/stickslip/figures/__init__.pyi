@@ -9,7 +9,7 @@ from stickslip.figures.bifurcation import plot_stability as plot_stability
 from stickslip.figures.contact import plot_transition_speed as plot_transition_speed
 from stickslip.figures.friction import plot_consistency as plot_consistency
 from stickslip.figures.maps import plot_map as plot_map
+from stickslip.figures.maps import plot_wavelet as plot_wavelet
 from stickslip.figures.traces import plot_force_comparison as plot_force_comparison
-from stickslip.figures.wavelet import plot_wavelet as plot_wavelet
 
 __all__: list[str]

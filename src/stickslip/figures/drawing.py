@@ -43,7 +43,7 @@ DRAWN = {
     "DecayFit": "drawing.of_decay", "Decrement": "decay.plot_differences",
     "ForceComparison": "traces.plot_force_comparison", "Consistency": "friction.plot_consistency",
     "TransitionSpeed": "contact.plot_transition_speed", "Trial": "traces.plot_twin", "Squeaks": "squeak.plot_squeaks",
-    "TimeFrequency": "drawing.of_frequencies", "DataArray": "wavelet.plot_wavelet",
+    "TimeFrequency": "drawing.of_frequencies", "DataArray": "maps.plot_wavelet",
     "LawComparison": "law.plot_laws", "LawFit": "law.plot_fit", "CurveFit": "law.plot_curve",
     "Trajectory": "trajectory.plot_motion", "CycleBranches": "bifurcation.plot_limit_cycles",
     "Bifurcation": "bifurcation.plot_bifurcation", "Basins": "bifurcation.plot_basins",
@@ -178,7 +178,7 @@ def of_loops(loops: Loops, *, ax: Axes | None = None, against: str = "displaceme
 
 def of_frequencies(findings: TimeFrequency) -> Figure | Axes:
     """The map of a channel, with the signal above it."""
-    return _named("wavelet.plot_wavelet")(findings.wavelets, record=findings.record)
+    return _named("maps.plot_wavelet")(findings.wavelets, record=findings.record)
 
 
 def of_decay(fit: DecayFit, *, ax: Axes | None = None) -> Axes:

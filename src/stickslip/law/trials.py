@@ -15,10 +15,9 @@ from stickslip.balance.force import friction_force
 from stickslip.drives.kinds import Release
 from stickslip.errors import EstimateError
 from stickslip.estimate import NORMAL_95, Estimate
-from stickslip.law.drive import Sampled, as_driven, face_of
 from stickslip.law.search import Knob, Point, Problem, descend, rows_of
 from stickslip.law.start import Shown, bounded, free_names, knob, nuisance_knobs, thinned
-from stickslip.law.stretch import Motion, Sensor, Stretch, attempted
+from stickslip.law.stretch import Motion, Sampled, Sensor, Stretch, as_driven, attempted, face_of
 from stickslip.law.verdict import Evidence, Key, independent
 from stickslip.laws.guessing import LEAST_EXCESS, STIFF, STIFFEST, Observed
 from stickslip.oscillator import Oscillator

@@ -25,10 +25,9 @@ from stickslip.solve import collocation, march, taylor
 from stickslip.solve.collocation import Model
 from stickslip.solve.march import DONE, DUE, LAPS, TIME, TRY, Dense, Shown, Steps, Work
 from stickslip.solve.refusal import Budget, chatter, held_back, named, require_numbers, unproved
-from stickslip.solve.series import expansion
 from stickslip.solve.tables import Stops, numbered
 from stickslip.solve.tape import Tape, tape
-from stickslip.solve.taylor import EXACT, GROWTH, Array, Index, coded, length
+from stickslip.solve.taylor import EXACT, GROWTH, Array, Index, coded, expansion, length
 from stickslip.solve.trajectory import Trajectory
 
 March = Callable[..., tuple[int, int, int, int]]  # of clock, state and what follows in `march.march`

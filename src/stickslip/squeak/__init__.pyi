@@ -12,11 +12,11 @@ from stickslip.squeak.cycles import LimitCycle as LimitCycle
 from stickslip.squeak.cycles import limit_cycle as limit_cycle
 from stickslip.squeak.hunting import Hunting as Hunting
 from stickslip.squeak.hunting import servo_hunting as servo_hunting
-from stickslip.squeak.sound import Impulsiveness as Impulsiveness
-from stickslip.squeak.sound import SoundQuality as SoundQuality
-from stickslip.squeak.sound import impulsiveness as impulsiveness
+from stickslip.squeak.quality import Impulsiveness as Impulsiveness
+from stickslip.squeak.quality import SoundQuality as SoundQuality
+from stickslip.squeak.quality import impulsiveness as impulsiveness
+from stickslip.squeak.quality import sound_quality as sound_quality
 from stickslip.squeak.sound import sound_pressure as sound_pressure
-from stickslip.squeak.sound import sound_quality as sound_quality
 from stickslip.squeak.sound import squeak_record as squeak_record
 from stickslip.squeak.sound import squeak_rig as squeak_rig
 from stickslip.squeak.spectra import BurstSpectra as BurstSpectra

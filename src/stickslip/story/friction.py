@@ -18,7 +18,7 @@ from stickslip.cycle.onset import Breakaway, Presliding
 from stickslip.cycle.slips import SlipRinging
 from stickslip.estimate import Estimate, stands
 from stickslip.figures.friction import plates_of, plates_together
-from stickslip.figures.wavelet import plates_of_map
+from stickslip.figures.maps import plates_of_map
 from stickslip.record.record import RIG_UNITS
 from stickslip.story import scope
 from stickslip.story.story import Line, Story

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stickslip.errors import StickslipError
-from stickslip.law.drive import DriveFrom, driving
+from stickslip.law.stretch import DriveFrom, driving
 from stickslip.laws.compliant import CompliantContact
 from stickslip.laws.coulomb import LinearSlope
 from stickslip.laws.lugre import LuGre

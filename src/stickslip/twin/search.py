@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from stickslip.balance.motion import is_measured
 from stickslip.drives.kinds import HarmonicBase
 from stickslip.errors import EstimateError, StickslipError
-from stickslip.law.drive import DriveFrom, driving, measured_drive
+from stickslip.law.stretch import DriveFrom, driving, measured_drive
 from stickslip.laws.coulomb import LinearSlope
 from stickslip.oscillator import Oscillator
 from stickslip.record.flaws import saturated
