@@ -128,8 +128,35 @@ def test_it_is_compared_by_its_name() -> None:
     assert found.family == "rigid"
     assert "asymmetric" in found.kept
     assert "that of a rigid contact" in found.verdict
-    with pytest.raises(ss.errors.ModelError, match="laws are Coulomb, static, Stribeck, asymmetric"):
+    with pytest.raises(ss.errors.ModelError, match=r"laws are .*asymmetric"):
         ss.compare_laws(measured(), slider(), laws=["nothing"])
+
+
+@pytest.mark.parametrize(
+    ("law", "values"),
+    [
+        (ss.laws.Dahl(1.1, 2e4), {"kinetic": 1.1, "law.stiffness": 2e4}),
+        (ss.laws.PositionLoad(1.0, 100.0), {"kinetic": 1.0, "gradient": 100.0}),
+    ],
+    ids=lambda value: type(value).__name__,
+)
+@pytest.mark.parametrize("by", [type, lambda law: type(law).__name__.lower(), repr], ids=["class", "name", "values"])
+def test_one_that_says_nothing_of_itself_is_found_by_its_units(law: Any, values: dict[str, float], by: Any) -> None:
+    """Measured by a load cell beside x and z; of class, name or values each is enough."""
+    rig = ss.Rig.perfect("x", "z", "load").having("x", white=1e-6).having("load", white=2e-3)
+    record = rig.measure(ss.simulate(slider(law), cycles=12), fs=1000, rng=1, start=0.7)
+    asked = law if by is repr else by(law)
+    found = ss.compare_laws(record, slider(ss.laws.Coulomb(1.0)), laws=["Coulomb", asked])
+    assert found.kept == (type(law).__name__,)
+    for name, value in values.items():
+        estimate = found.fit.parameters[name]
+        assert estimate.value == pytest.approx(value, rel=0.01), name
+        assert estimate.interval[0] < value < estimate.interval[1], name
+
+
+def test_a_law_of_other_laws_needs_its_values() -> None:
+    with pytest.raises(ss.errors.ModelError, match=r"InSeries of which no law is known.*give the law with its values"):
+        ss.compare_laws(measured(), slider(), laws=["InSeries"])
 
 
 def test_it_is_read_and_written_in_every_form(tmp_path: Path) -> None:

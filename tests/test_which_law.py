@@ -130,7 +130,7 @@ def test_a_comparison_is_cancelled_by_its_progress() -> None:
     [
         ({"laws": ["cheese"]}, ss.errors.ModelError, "laws are Coulomb, static"),
         ({"laws": []}, ss.errors.ModelError, "no law"),
-        ({"laws": [ss.laws.Dahl]}, ss.errors.ModelError, "values to start from"),
+        ({"laws": [ss.laws.InSeries]}, ss.errors.ModelError, "give the law with its values"),
         ({"calibration": 2.0}, ss.errors.ModelError, "part of 1"),
     ],
 )

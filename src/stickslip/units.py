@@ -9,7 +9,7 @@ import collections
 import functools
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -374,6 +374,18 @@ def _by_pint(name: str) -> tuple[float, str] | None:
             return scale, si
     si = f"{one.units:~C}".replace("**", "^").replace("*", " ") or "1"
     return (scale, si) if si == "1" or _UNIT.fullmatch(si) else None  # what is written is read again
+
+
+def dimensions(unit: str) -> Mapping[str, float]:
+    """The powers of mass, length and time in an SI unit, without those that are zero.
+
+    Examples
+    --------
+    >>> dimensions("N s/m")
+    {'mass': 1, 'time': -1}
+    """
+    of = _registry().Quantity(1.0, unit.replace(" ", "*")).dimensionality
+    return {name.strip("[]"): power for name, power in of.items()}
 
 
 def _powers(reciprocal: str | None, chain: str, below: str | None) -> dict[str, float]:

@@ -49,8 +49,8 @@ CURVES = (
 @click.option(
     "--laws",
     metavar="LIST",
-    help="The laws to compare, with commas: Coulomb, static, Stribeck, compliant, state variable, LuGre; all of them "
-    "unless given.",
+    help="The laws to compare, with commas: Coulomb, static, Stribeck, compliant, state variable, LuGre (which "
+    "are tried unless others are given), or any class of stickslip.laws, as Dahl.",
 )
 @click.option("--calibration", type=float, default=0.005, show_default=True, help="By what part gains may be wrong.")
 @click.option(

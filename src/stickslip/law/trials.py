@@ -89,6 +89,8 @@ class Trial:
         """Whether friction is there before the contact has moved by a noticeable part of the smallest stroke."""
         law = self.law
         stroke, fastest = self.scales.min(axis=0)
+        if not hasattr(law, "kinetic"):
+            return False
         if hasattr(law, "stiffness"):
             return bool(law.kinetic < STIFF * stroke * law.stiffness)
         return hasattr(law, "rate") and bool(fastest < STIFF * stroke * law.rate * law.kinetic)

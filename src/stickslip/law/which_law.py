@@ -45,20 +45,19 @@ from stickslip.law.verdict import (
     undescribed,
     unexplained_part,
 )
-from stickslip.laws.guessing import hypotheses
+from stickslip.laws.guessing import Hypothesis, hypotheses, hypothesis_of
 from stickslip.oscillator import Oscillator
 from stickslip.record.record import Record, require_record
+from stickslip.units import dimensions
 
 Array = NDArray[np.float64]
 
 CALLS = 40.0  # of progress that the trial of a law is taken for
 LOOK = 2  # passes of a descent after which it is seen how the sensors' mounts swing
 RETUNED = 8  # times that mounts and law are found in turn
-MOVED = {"kinetic", "static", "speed", "rate", "steepness"}  # parameters in proportion to the motion, or against it
-WEIGHED = {"kinetic", "static", "rate", "stiffness", "damping", "viscous"}  # those that go with the mass, or against it
-# times as wide as chance: so 95 % of intervals held on the first 39 rigs of `benchmarks/servo_laws.py --first 6000`, of
-# a contact's damping on the first 59
-STRAY, STRAYS = 1.25, {"stiffness": 1.0, "damping": 2.5, "law.damping": 2.0, "speed": 4.0, "steepness": 4.0}
+# times as wide as chance, by unit: so 95 % of intervals held on the first 39 rigs of `benchmarks/servo_laws.py --first
+# 6000`, of a contact's damping on the first 59
+STRAY, STRAYS = 1.25, {"N s/m": 2.5, "m/s": 4.0, "s/m": 4.0}
 
 
 def compare_laws(
@@ -92,8 +91,9 @@ def compare_laws(
     oscillator : Oscillator
         Mass, spring, damper, and the drive where the base's motion z was not measured. Its own law does not matter.
     laws : sequence, optional
-        Names ("Coulomb", "static", "Stribeck", "compliant", "state variable", "LuGre"), classes, or laws with the
-        values to start from. All six names where left out.
+        Names ("Coulomb", "static", "Stribeck", "compliant", "state variable", "LuGre", or of any class of
+        :mod:`stickslip.laws`), classes, or laws with the values to start from. The first six where left out. A law that
+        has no `hypotheses` of its own is begun at values of the size of what was seen, by its parameters' units.
     nuisance : sequence of str, optional
         What is fitted beside each law, as :func:`fit_law` takes it, and chooses it where left out.
     calibration : float
@@ -179,7 +179,7 @@ class _Looked(NamedTuple):
 class _Search(NamedTuple):
     """What stays the same while laws are searched: their starts, what is fitted beside them, and who is told."""
 
-    kinds: Sequence[tuple[str, list[Any]]]
+    kinds: Sequence[tuple[Hypothesis, list[Any]]]
     seen: Sequence[tuple[Oscillator, Seen]]
     known: Sequence[str]
     calibration: float
@@ -195,12 +195,13 @@ class _Search(NamedTuple):
         """Every law searched, or its search taken up again."""
         stretches = [self.stretch(evidence)(motion, number) for number, motion in enumerate(shown)]
         trials: dict[str, Trial] = {}
-        for name, given in self.kinds:
+        for kind, given in self.kinds:
+            name = kind.name
             least = min((one.point.chi2 for one in {**before, **trials}.values()), default=math.inf)
             trial = resumed(before[name], stretches, least, passes, self.tell) if name in before else None
             if trial is None:
-                begun = [replace(system, law=law) for system, seen in self.seen for law in _guessed(name, given, seen)]
-                begun += _continued(name, trials)
+                begun = [replace(system, law=law) for system, seen in self.seen for law in given or kind.guesses(seen)]
+                begun += _continued(kind, trials)
                 trial = searched(name, begun, stretches, self.known, self.calibration, least, passes, self.tell)
             if trial is not None:
                 trials[name] = trial
@@ -326,6 +327,7 @@ def _flagged(fit: LawFit, status: str) -> LawFit:
 def _calibrated(fit: LawFit, records: Sequence[Record], calibration: float) -> LawFit:
     """The fit no surer than the measured base is calibrated, by which all motion scales, and than the mass is weighed.
 
+    What of a parameter is a length goes with the motion, and what is a mass with what slides, as its unit has them.
     Without a sensor of force it is the mass that makes forces of motions, and intervals are as wide besides as they had
     to be where the truth was known: what is left over is mostly no noise.
     """
@@ -333,10 +335,10 @@ def _calibrated(fit: LawFit, records: Sequence[Record], calibration: float) -> L
     felt = any(name in record for record in records for name in ("load", "friction"))
     parameters = dict(fit.parameters)
     for key, one in fit.parameters.items():
-        name = key.removeprefix("law.")
-        if name in MOVED | WEIGHED:
-            unsure = math.hypot(driven and name in MOVED, not felt and name in WEIGHED)
-            parameters[key] = _widened(one, unsure * calibration, 1.0 if felt else STRAYS.get(key, STRAY))
+        moved, weighed = (part in dimensions(one.unit) for part in ("length", "mass"))
+        if moved or weighed:
+            unsure = math.hypot(driven and moved, not felt and weighed)
+            parameters[key] = _widened(one, unsure * calibration, 1.0 if felt else STRAYS.get(one.unit, STRAY))
     return replace(fit, parameters=parameters)
 
 
@@ -349,47 +351,22 @@ def _widened(estimate: Estimate, share: float, times: float) -> Estimate:
     return replace(estimate, interval=interval, sd=times * math.hypot(estimate.sd, more))
 
 
-def _guessed(name: str, given: Sequence[Any], seen: Seen) -> list[Any]:
-    """Where the search for a law begins: at the laws given, or its own guesses."""
-    known = hypotheses().get(name)
-    return [*given] if given or known is None else known.guesses(seen)
-
-
-def _continued(name: str, before: Mapping[str, Trial]) -> list[Oscillator]:
-    """Where else: at the ends of simpler laws' searches, with the damper of the one that left least."""
-    known = hypotheses().get(name)
-    if known is None or not before:
+def _continued(kind: Hypothesis, before: Mapping[str, Trial]) -> list[Oscillator]:
+    """Where else a search begins: at the ends of simpler laws' searches, with the damper of the one that left least."""
+    if not before:
         return []
     nearest = min(before.values(), key=lambda trial: trial.point.chi2)
     stated = nearest.problem.oscillator.having(damping=nearest.system.damping)
-    return [replace(stated, law=law) for law in known.continued(before)]
+    return [replace(stated, law=law) for law in kind.continued(before)]
 
 
-def _kinds(laws: Sequence[Any] | None) -> list[tuple[str, list[Any]]]:
-    """The laws to try: name, and the values to start from where they are given."""
-    kinds: dict[str, list[Any]] = {}
-    for law in hypotheses() if laws is None else [laws] if isinstance(laws, str) else laws:
-        name = _name(law)
-        kinds.setdefault(name, []).extend([] if isinstance(law, str | type) else [law])
+def _kinds(laws: Sequence[Any] | None) -> list[tuple[Hypothesis, list[Any]]]:
+    """The laws to try, and the values to start from where they are given."""
+    kinds: dict[str, tuple[Hypothesis, list[Any]]] = {}
+    for law in hypotheses() if laws is None else [laws] if isinstance(laws, str | type) else laws:
+        kind = hypothesis_of(law)
+        kinds.setdefault(kind.name, (kind, []))[1].extend([] if isinstance(law, str | type) else [law])
     if not kinds:
         raise ModelError("no law", "laws are compared by trying some", f"name some of {', '.join(hypotheses())}")
     order = list(hypotheses())
-    return sorted(kinds.items(), key=lambda kind: order.index(kind[0]) if kind[0] in order else len(order))
-
-
-def _name(law: Any) -> str:
-    if isinstance(law, str):
-        plain = law.strip().lower().replace("-", " ").replace("_", " ")
-        fits = [name for name in hypotheses() if name.lower() == plain]
-        if not fits:
-            raise ModelError(f"law '{law}'", f"laws are {', '.join(hypotheses())}", "choose among these, or give a law")
-        return fits[0]
-    kind = law if isinstance(law, type) else type(law)
-    if hasattr(kind, "hypotheses"):
-        fits = [hypothesis.name for hypothesis in kind.hypotheses() if law is kind or hypothesis.holds(law)]
-        return fits[0] if law is kind else fits[-1]
-    if isinstance(law, type) or not (hasattr(law, "modes") or hasattr(law, "rates")):
-        raise ModelError(
-            f"law {law!r}", "a law without a guess of its own needs values to start from", "give it with its values"
-        )
-    return kind.__name__
+    return sorted(kinds.values(), key=lambda kind: order.index(kind[0].name) if kind[0].name in order else len(order))

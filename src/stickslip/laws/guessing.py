@@ -6,7 +6,8 @@ The laws that every room knows by name: those of the room's stub that carry a fo
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Mapping
+import itertools
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import MISSING, dataclass, fields
 from typing import Any, NamedTuple, Protocol
 
@@ -14,6 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stickslip import laws
+from stickslip.errors import ModelError
+from stickslip.parameters import declaration
 
 Array = NDArray[np.float64]
 
@@ -25,6 +28,7 @@ LITTLE = 0.01  # of the kinetic friction, by which the static one exceeds it at 
 FALLS = (0.01, 0.05)  # of the largest speed, within which a Stribeck curve falls
 STIFF = 1e-2  # of the smallest stroke, by which a contact gives way that counts as rigid where a rigid law does as well
 STIFFEST = 1e-4  # of the stroke: what a contact that is next to rigid gives way
+MOST_GUESSED = 24  # starts of a law that is asked by its units alone: each costs a simulation
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,6 +64,11 @@ class Observed:
     def fastest(self) -> float:
         """The largest speed [m/s]."""
         return float(np.abs(self.speed).max())
+
+    @property
+    def furthest(self) -> float:
+        """About how far it moves [m]."""
+        return self.fastest / self.frequency
 
     def left(self, modelled: Array) -> float:
         """Mean square of what a modelled friction leaves [N^2]."""
@@ -155,6 +164,56 @@ def required(law: type[Any]) -> int:
     return sum(field.default is MISSING for field in fields(law))
 
 
+def asked_for(law: type[Any]) -> tuple[Hypothesis, ...]:
+    """How records are asked for a law: as its class says, or by the units of its parameters."""
+    if hasattr(law, "hypotheses"):
+        said: tuple[Hypothesis, ...] = law.hypotheses()
+        return said
+    family = Family(law.__name__, f"that of the law {law.__name__}")
+    return (Hypothesis(law.__name__, family, functools.partial(_by_units, law)),)
+
+
+def _by_units(law: type[Any], seen: Observed) -> list[Any]:
+    """Laws whose values have the size of what was observed, of those that the class allows."""
+    choices = [[(own.name, value) for value in _sized(law, own, seen)] for own in fields(law) if own.default is MISSING]
+    return list(itertools.islice(_allowed(law, choices), MOST_GUESSED))
+
+
+def _allowed(law: type[Any], choices: list[list[tuple[str, float]]]) -> Iterator[Any]:
+    for chosen in itertools.product(*choices):
+        try:
+            yield law(**dict(chosen))
+        except ModelError:  # a static friction below the kinetic
+            continue
+
+
+def _sized(law: type[Any], parameter: Any, seen: Observed) -> tuple[float, ...]:
+    """Values to begin with, by a parameter's unit: forces about the level, the rest where a law's effects are felt."""
+    declared, level, fastest, furthest = declaration(parameter), seen.level, seen.fastest, seen.furthest
+    sizes = {
+        "N": (level, (1 + EXCESSES[1]) * level),
+        "m/s": tuple(part * fastest for part in SPEEDS),
+        "s/m": tuple(1 / (part * fastest) for part in SPEEDS),
+        "m": tuple(part * furthest for part in (STIFF, 0.1)),
+        "N/m": tuple(
+            level / (part * furthest) for part in (STIFF, 0.1, 10.0)
+        ),  # a contact's, or friction along the way
+        "N s/m": (LITTLE * level / fastest, 0.1 * level / fastest),
+        "s": tuple(part / seen.frequency for part in SPEEDS),
+        "1/s": tuple(seen.frequency / part for part in SPEEDS),
+        "kg": (seen.mass,),
+        "1": (1.0, EXCESSES[1]),
+    }
+    if declared.unit not in sizes or declared.size != "number":
+        raise ModelError(
+            f"{law.__name__} of which no {parameter.name} is known",
+            "records tell where to begin with a number in N, m, s, kg or of these",
+            "give the law with its values",
+        )
+    values = sizes[declared.unit]
+    return (*values, *(-value for value in values)) if declared.signed else values
+
+
 def hypotheses() -> dict[str, Hypothesis]:
     """What records are asked to choose from, by name: rigid contacts, then others, the simplest of both first."""
     known = [
@@ -163,7 +222,33 @@ def hypotheses() -> dict[str, Hypothesis]:
     return {kind.name: kind for kind in sorted(known, key=lambda kind: kind.family is not RIGID)}
 
 
+def hypothesis_of(law: Any) -> Hypothesis:
+    """How records are asked for a law: by the name of a hypothesis or of a law, by a class, or by one with values.
+
+    Raises
+    ------
+    ModelError
+        No law has that name.
+    """
+    if isinstance(law, str):
+        named = {_plain(name): kind for name, kind in hypotheses().items()}
+        named = {_plain(name): asked_for(kind)[0] for name, kind in registered().items()} | named
+        if _plain(law) not in named:
+            choices = ", ".join(dict.fromkeys([*hypotheses(), *registered()]))
+            raise ModelError(f"law '{law}'", f"laws are {choices}", "choose among these, or give a law")
+        return named[_plain(law)]
+    kind = law if isinstance(law, type) else type(law)
+    if not (hasattr(kind, "modes") or hasattr(kind, "rates")):
+        raise ModelError(f"law {law!r}", "a law has modes or rates", "give a law's name, its class, or one with values")
+    held = [hypothesis for hypothesis in asked_for(kind) if law is kind or hypothesis.holds(law)]
+    return held[0] if law is kind else held[-1]
+
+
+def _plain(name: str) -> str:
+    return name.strip().lower().replace("-", "").replace("_", "").replace(" ", "")
+
+
 def family_of(name: str) -> Family:
     """The family of a law by its name; one that is no hypothesis is its own."""
     known = hypotheses().get(name)
-    return known.family if known else Family(name, name)
+    return known.family if known else Family(name, f"that of the law {name}")
