@@ -1,6 +1,4 @@
-from stickslip.signals.derivatives import Harmonics as Harmonics
 from stickslip.signals.derivatives import differentiate as differentiate
-from stickslip.signals.derivatives import harmonics as harmonics
 from stickslip.signals.derivatives import keep_band as keep_band
 from stickslip.signals.derivatives import remove_mode as remove_mode
 from stickslip.signals.derivatives import remove_trend as remove_trend
@@ -16,11 +14,13 @@ from stickslip.signals.repair import remove_spikes as remove_spikes
 from stickslip.signals.repair import repair_clock as repair_clock
 from stickslip.signals.repair import resample as resample
 from stickslip.signals.repair import restore_clipped as restore_clipped
+from stickslip.signals.ridges import Harmonics as Harmonics
 from stickslip.signals.ridges import LocalMaximum as LocalMaximum
 from stickslip.signals.ridges import Ridge as Ridge
 from stickslip.signals.ridges import Spike as Spike
 from stickslip.signals.ridges import find_ridges as find_ridges
 from stickslip.signals.ridges import find_spikes as find_spikes
+from stickslip.signals.ridges import harmonics as harmonics
 from stickslip.signals.ridges import local_maxima as local_maxima
 from stickslip.signals.ridges import stft_map as stft_map
 from stickslip.signals.wavelet import cone_of_influence as cone_of_influence
