@@ -22,7 +22,7 @@ from scipy.signal import butter, sosfiltfilt
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 import joints
 import stickslip as ss
-from stickslip.cycle.joint_data import joint_data
+from stickslip.cycle.joint_fit import joint_data
 from stickslip.estimate import NORMAL_95
 
 TOLD = ("level", "viscous", "inertia")

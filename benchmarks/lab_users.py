@@ -27,7 +27,7 @@ from websockets.asyncio.client import connect
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
 from labs import Lab, running_lab
-from stickslip.lab.frames import unframed
+from stickslip.lab.workers import unframed
 
 DRIVE = {"name": "HarmonicForce", "amplitude": 1.0, "frequency": 0.1}
 SYSTEM = {"system": {"mass": 1.0, "stiffness": 1.0}, "drive": DRIVE, "run": {"cycles": 20}}

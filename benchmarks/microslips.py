@@ -17,9 +17,8 @@ import numba
 import numpy as np
 
 import stickslip as ss
-from stickslip.contact.mechanisms import UNTOLD
 from stickslip.contact.microslip import microslips_of
-from stickslip.contact.ringing import find_ringing
+from stickslip.contact.ringing import UNTOLD, find_ringing
 
 MASS, SPRING, FREQUENCY, AMPLITUDE = 2.42, 2310.0, 2.5, 0.65e-3
 CONTACT = 192e3

@@ -2,7 +2,7 @@
 
 Servo drives, x and z alone in counts of 12 or 16 bits, stated dampers a tenth to ten times the true one, constants and
 gains 0.5 % off, rough surfaces. Told are each rig's laws kept with the confidence, how often the truth was left out,
-the lowest odds that a true law had (of them `LOWEST` in `law/standing.py` is made), and how often intervals held.
+the lowest odds that a true law had (of them `LOWEST` in `law/verdict.py` is made), and how often intervals held.
 
     python benchmarks/servo_laws.py --draws 10 --first 300 --keep servo.jsonl
 

@@ -20,9 +20,8 @@ import numpy as np
 
 import stickslip as ss
 from stickslip.contact.frequency_transition import transition_of
-from stickslip.contact.mechanisms import mechanism_of
 from stickslip.contact.microslip import microslips_of
-from stickslip.contact.ringing import Ringing, find_ringing
+from stickslip.contact.ringing import Ringing, find_ringing, mechanism_of
 
 MASS, SPRING, CONTACT, KINETIC, FS, CYCLES = 2.42, 2310.0, 192000.0, 1.1, 4000.0, 6
 LEVELS = (40, 25)  # dB

@@ -8,7 +8,7 @@ from typing import Any
 from matplotlib.figure import Figure
 from sphinx_gallery.scrapers import figure_rst
 
-from stickslip.figures.plate import Plate
+from stickslip.figures.style import Plate
 
 _SHOWN: weakref.WeakSet[Figure] = weakref.WeakSet()
 

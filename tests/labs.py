@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from stickslip.lab.frames import unframed
+from stickslip.lab.workers import unframed
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 import stickslip as ss
-from stickslip.laws.guessing import Observed, declared_guesses
 
 CASES = {5.61: (0.6e-3, 1.05), 8.7: (1.1e-3, 1.1), 11.1: (2e-3, 1.1), 2.5: (0.65e-3, 1.1)}
 RIG = {"mass": 2.42, "stiffness": 2310.0, "damping": 0.1196}
@@ -36,12 +35,6 @@ def measured(
     run = motion(frequency, rough, seconds)
     record = ss.Rig().measure(run, fs=4000, rng=seed, start=SETTLED)
     return record, run.sample(np.minimum(SETTLED + record.time, run.duration), ("friction",))[0][0]
-
-
-def any_of(law: type[Any]) -> Any:
-    """A law by what its parameters declare, in 1 N, 1 m and 1 s."""
-    seen = Observed(*np.ones((4, 1)), level=1.0, excess=0.1, frequency=1.0, mass=1.0)
-    return declared_guesses(law, seen)[0]
 
 
 def told(record: ss.Record, wrong: bool = False) -> ss.Record:

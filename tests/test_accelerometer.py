@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import stickslip as ss
-from stickslip.contact.mechanisms import UNTOLD
+from stickslip.contact.ringing import UNTOLD
 
 RIG = {"mass": 2.42, "stiffness": 2310.0}
 TRUE = 45.0914  # Hz: sqrt((k + K)/m (1 - zeta^2)) / 2 pi

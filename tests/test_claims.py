@@ -15,7 +15,7 @@ from scipy.signal import lsim
 import stickslip as ss
 from stickslip.cli.program import main
 from stickslip.estimate import Estimate
-from stickslip.law.standing import Evidence, Misfit, standings
+from stickslip.law.verdict import Evidence, Misfit, standings
 
 MASS, SPRING, FS, STEPS = 2.0, 3000.0, 2000, 20
 

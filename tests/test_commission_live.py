@@ -10,7 +10,7 @@ from click.testing import CliRunner
 import stickslip as ss
 from stickslip import bench
 from stickslip.bench import Block, Input, Picture
-from stickslip.bench.picture import HEIGHTS
+from stickslip.bench.monitor import HEIGHTS
 from stickslip.bench.replay import Replay
 from stickslip.cli.program import main
 

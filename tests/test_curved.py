@@ -15,8 +15,8 @@ import stickslip as ss
 from stickslip.laws.base import Exit, Rigid
 from stickslip.laws.curved import CurvedMode, asinh, exp, log, sqrt, symbol, tanh
 from stickslip.solve import march
-from stickslip.solve.series import expansion
 from stickslip.solve.tape import tape
+from stickslip.solve.taylor import expansion
 
 HEAVY = 1e30  # kg: whatever friction does, the mass keeps its speed
 LUGRE = ss.laws.LuGre(1.0, 1.5, speed=1e-3, stiffness=1e5, damping=math.sqrt(1e5), viscous=0.4)

@@ -9,22 +9,21 @@ import subprocess
 import tomllib
 from dataclasses import fields, replace
 from pathlib import Path
-from typing import Any
 from xml.etree import ElementTree
 
 import numpy as np
 import pytest
 
 import stickslip as ss
-from rigs import any_of
+from any_law import with_values
+from stickslip import scenarios
 from stickslip.errors import ModelError
 from stickslip.laws.c_code import at, modes_of
 from stickslip.laws.curved import exp
 from stickslip.laws.export import FORMATS, formula_of
 from stickslip.laws.formula import Formula
-from stickslip.laws.guessing import registered
 
-LAWS: dict[str, Any] = {
+LAWS = {
     "Coulomb": ss.laws.Coulomb(1.1, static=1.3),
     "CompliantContact": ss.laws.CompliantContact(1.1, stiffness=192000, damping=23.9, static=1.2),
     "consistent contact": ss.laws.CompliantContact(1.1, stiffness=192000, damping=23.9, rule="consistent"),
@@ -48,16 +47,16 @@ LAWS: dict[str, Any] = {
     "InSeries": ss.laws.InSeries(ss.laws.LinearSlope(1.0, slope=-5.0), stiffness=192000, damping=24),
     "TimeDelay": ss.laws.TimeDelay(ss.laws.LinearSlope(1.0, slope=2.0), lag=1e-3),
 }
+LAWS |= {
+    name: with_values(law)
+    for name, law in scenarios.LAWS.items()
+    if name not in {type(known).__name__ for known in LAWS.values()}
+}
 CC = shutil.which("cc") or shutil.which("gcc") or shutil.which("clang")
 
 
-LAWS |= {
-    name: any_of(law) for name, law in registered().items() if law not in {type(listed) for listed in LAWS.values()}
-}  # every other law, by what it declares
-
-
 def test_every_law_has_a_label_and_a_formula() -> None:
-    assert all(law.label and law.formula for law in registered().values())
+    assert all(law.label and law.formula for law in scenarios.LAWS.values())
 
 
 ALL = {

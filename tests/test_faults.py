@@ -25,8 +25,8 @@ from starlette.exceptions import HTTPException
 
 import stickslip as ss
 from stickslip import Record, StickslipError, read_record, whole, write_record
+from stickslip.lab.data import Uploads
 from stickslip.lab.jobs import Jobs
-from stickslip.lab.uploads import Uploads
 from stickslip.story import folder as folder_module
 from stickslip.story.folder import publish
 

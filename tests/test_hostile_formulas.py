@@ -24,7 +24,7 @@ from stickslip.laws.base import Exit, Mode, Rigid, Row
 from stickslip.laws.curved import CurvedMode, Expression, Sliding, either_side, symbol, tanh
 from stickslip.laws.export import FORMATS
 from stickslip.laws.formula import DEEPEST, Formula
-from stickslip.solve import series
+from stickslip.solve import taylor
 from stickslip.solve.tape import tape
 
 CC = shutil.which("cc") or shutil.which("gcc") or shutil.which("clang")
@@ -257,7 +257,7 @@ def test_every_law_of_the_package_is_far_from_that_limit() -> None:
     slip = ss.laws.RateState(9.0, friction=0.6, direct=0.01, evolution=0.01, distance=1e-5, reference=1e-6, law="slip")
     for law in (law_of(HONEST[1]), slip):
         table = tape(ss.Oscillator(mass=1.0, stiffness=4.0, law=law, drive=ss.drives.HarmonicBase(1e-3, frequency=1.0)))
-        assert series.curved_nodes(table.nodes) <= series.MOST // 1.5
+        assert taylor.curved_nodes(table.nodes) <= taylor.MOST // 1.5
 
 
 def test_a_hostile_file_is_one_sentence_and_makes_nothing(tmp_path: Path) -> None:

@@ -16,7 +16,7 @@ from stickslip.cli.program import main
 from stickslip.cycle import joint_backlash, joint_breakaway, regress_joint
 from stickslip.errors import EstimateError, ModelError, RecordError
 from stickslip.estimate import kinds, stands
-from stickslip.figures.joint import plot_joint
+from stickslip.figures.law import plot_joint
 from stickslip.units import parse_unit
 
 TRUTH = {"inertia": 0.02, "forward": 0.07, "back": 0.05, "load": 0.15, "viscous": 0.03, "sine": 0.5, "cosine": -0.2}

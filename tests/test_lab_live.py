@@ -14,9 +14,9 @@ from starlette.testclient import TestClient
 from starlette.websockets import WebSocketDisconnect
 
 import stickslip as ss
-from stickslip.lab.frames import unframed
 from stickslip.lab.live import Place
 from stickslip.lab.server import lab_app
+from stickslip.lab.workers import unframed
 
 TOKEN, PORT = "secret of this start", 8723
 HEADERS = {"Authorization": f"Bearer {TOKEN}"}

@@ -20,8 +20,8 @@ from starlette.testclient import TestClient
 import stickslip as ss
 from labs import received
 from stickslip.lab import drawn
-from stickslip.lab.frames import frame, unframed
 from stickslip.lab.server import lab_app
+from stickslip.lab.workers import frame, unframed
 
 COMPLIANT = ss.systems.scenario_case("THESIS compliant 2.5Hz fk=1.1 Ky=192000 z.0174(k+Ky)").lasting(cycles=40)
 STATE = json.loads(ss.systems.export_system(COMPLIANT, format="json"))

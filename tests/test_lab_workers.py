@@ -15,8 +15,7 @@ import pytest
 
 pytest.importorskip("starlette", reason="the extra [lab] is not installed")
 from stickslip.lab import drawn, worker, workers
-from stickslip.lab.frames import unframed
-from stickslip.lab.workers import Workers
+from stickslip.lab.workers import Workers, unframed
 
 CATALOG = json.dumps({"id": 1, "want": "catalog"}).encode()
 

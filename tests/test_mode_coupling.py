@@ -14,9 +14,9 @@ from stickslip.laws.base import Law
 from stickslip.laws.compliant import CompliantContact
 from stickslip.laws.coulomb import Coulomb, LinearSlope
 from stickslip.laws.stribeck import Tabulated
+from stickslip.oscillator import Contact, Structure
 from stickslip.solve.assembly import table_of
 from stickslip.solve.simulate import simulate
-from stickslip.structure import Contact, Structure
 
 
 def sliding(structure: Structure, *modes: str) -> np.ndarray:

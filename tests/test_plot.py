@@ -17,8 +17,7 @@ from stickslip.answers.many import compare
 from stickslip.answers.questions import analyze
 from stickslip.figures.contact import plot_velocity_loop
 from stickslip.figures.friction import plot_load_dependence
-from stickslip.figures.plate import Plate
-from stickslip.figures.style import COLUMNS, STYLE, envelope, prefixed, thinned
+from stickslip.figures.style import COLUMNS, STYLE, Plate, envelope, prefixed, thinned
 from stickslip.figures.traces import close_up, force_balance, plot_force_balance, plot_traces
 from stickslip.story.story import summary
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import stickslip as ss
-from stickslip.cycle.before_slip import HIGH, LOW, _branch
+from stickslip.cycle.onset import HIGH, LOW, _branch
 from stickslip.cycle.slips import find_strokes
 
 Sets = Callable[[str], Path]

@@ -198,7 +198,7 @@ def test_emps_asymmetric(dataset):
 
 
 def test_rack_of_two_instruments(dataset):
-    from stickslip.signals.clocks import synchronise
+    from stickslip.signals.interpolate import synchronise
 
     folder = dataset("rack_two_daq")
     force = read_record(

@@ -24,7 +24,7 @@ from stickslip import Oscillator, simulate, sweep
 from stickslip.drives import HarmonicForce
 from stickslip.errors import ModelError, SolveError
 from stickslip.laws import Coulomb
-from stickslip.maps.block import run_block
+from stickslip.maps.crowd import run_block
 from stickslip.maps.store import Store
 from stickslip.maps.sweep import planned
 from stickslip.solve import Trajectory

@@ -19,12 +19,11 @@ from stickslip.laws.coulomb import Coulomb, LinearSlope
 from stickslip.laws.series import ElastoSlip
 from stickslip.laws.state_variable import StateVariable
 from stickslip.laws.time_delay import TimeDelay
-from stickslip.oscillator import Oscillator
+from stickslip.oscillator import Contact, Oscillator, Structure
 from stickslip.solve.energies import energy
 from stickslip.solve.periodic import steady_state
 from stickslip.solve.simulate import simulate
 from stickslip.solve.trajectory import Trajectory
-from stickslip.structure import Contact, Structure
 
 SWELL = np.cumsum(np.random.default_rng(5).normal(size=40)) * 0.4
 

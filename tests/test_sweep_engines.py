@@ -16,7 +16,7 @@ import pytest
 
 import stickslip as ss
 from stickslip.errors import ModelError, SolveError
-from stickslip.maps.block import _alone, run_block
+from stickslip.maps.crowd import _alone, run_block
 from stickslip.maps.engines import threads
 from stickslip.maps.measures import LOG, MEASURES
 from stickslip.maps.sweep import planned

@@ -15,7 +15,7 @@ import pytest
 from click.testing import CliRunner
 
 from stickslip.cli.program import main
-from stickslip_thesis import observations, page, printed
+from stickslip_thesis import measures, page, printed
 
 CHAPTERS = pytest.mark.parametrize("chapter", page.CHAPTERS)
 MOVED = {  # a parameter, and a number that has to follow it
@@ -184,5 +184,5 @@ def test_the_docs_tell_how_many_there_are() -> None:
     told = (Path(__file__).parent.parent / "docs" / "thesis.md").read_text("utf-8")
     rows = dict(re.findall(r"^\| ([a-z ]+) \| .* \| (\d+) \|$", told, re.MULTILINE))
     assert {verdict: int(count) for verdict, count in rows.items()} == {k: v for k, v in counts.items() if v}
-    seen = [one.why == "" for one in observations.observations()]
+    seen = [one.why == "" for one in measures.observations()]
     assert f"{sum(seen)} of {len(seen)} are seen" in " ".join(told.split())

@@ -9,7 +9,7 @@ import pytest
 from matplotlib.figure import Figure
 
 import stickslip as ss
-from stickslip_thesis import beyond, chapter7, page, printed, sketches, small
+from stickslip_thesis import beyond, chapter7, drawing, page, printed, small
 
 Sketch = Callable[[printed.Given], Figure]
 
@@ -80,12 +80,12 @@ def words_of(drawn: Figure) -> str:
 @pytest.mark.parametrize(
     ("sketch", "section", "name", "told"),
     [
-        (sketches.apparatus, "rig", "mass", "m = 2.42 kg"),
-        (sketches.massless_contact, "sliding", "spring", "k = 2.31 N/mm"),
-        (sketches.contact_with_inertia, "inertial", "ratio", "= 0.0555"),
-        (sketches.system_i, "paper", "stiffness", "0.304 N or 0.264 N"),
-        (sketches.system_ii, "bearing", "kinetic", "f_k = 0.413 N"),
-        (sketches.transducers, "squeak", "heavy", "rubber, 6.13 or 1.23 N"),
+        (drawing.apparatus, "rig", "mass", "m = 2.42 kg"),
+        (drawing.massless_contact, "sliding", "spring", "k = 2.31 N/mm"),
+        (drawing.contact_with_inertia, "inertial", "ratio", "= 0.0555"),
+        (drawing.system_i, "paper", "stiffness", "0.304 N or 0.264 N"),
+        (drawing.system_ii, "bearing", "kinetic", "f_k = 0.413 N"),
+        (drawing.transducers, "squeak", "heavy", "rubber, 6.13 or 1.23 N"),
     ],
 )
 def test_a_sketch_says_what_the_parameters_say(sketch: Sketch, section: str, name: str, told: str) -> None:

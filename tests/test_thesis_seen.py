@@ -7,12 +7,12 @@ import functools
 
 import pytest
 
-from stickslip_thesis import measures, observations, printed
+from stickslip_thesis import measures, printed
 
 
 @functools.cache
-def seen(chapter: str) -> tuple[observations.Seen, ...]:
-    return observations.seen(chapter, printed.given())
+def seen(chapter: str) -> tuple[measures.Seen, ...]:
+    return measures.seen(chapter, printed.given())
 
 
 @pytest.mark.parametrize("chapter", measures.MEASURES)
@@ -27,11 +27,11 @@ def test_every_measure_is_asked_for(chapter: str) -> None:
 
 
 def test_every_observation_is_of_figures_that_there_are_and_has_a_bound() -> None:
-    assert {one.chapter for one in observations.observations()} == set(measures.MEASURES)
-    for one in observations.observations():
+    assert {one.chapter for one in measures.observations()} == set(measures.MEASURES)
+    for one in measures.observations():
         assert set(one.figures) <= set(printed.captions()), one.says
         assert one.above > float("-inf") or one.below < float("inf"), one.says
 
 
 def test_the_examples_run() -> None:
-    assert not doctest.testmod(observations).failed
+    assert not doctest.testmod(measures).failed

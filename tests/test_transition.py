@@ -13,7 +13,7 @@ from click.testing import CliRunner
 import stickslip as ss
 from stickslip.cli.program import main
 from stickslip.contact.frequency_transition import _agreement
-from stickslip.contact.mechanisms import UNTOLD
+from stickslip.contact.ringing import UNTOLD
 from stickslip.errors import EstimateError, RecordError
 from stickslip.estimate import Estimate
 

@@ -153,7 +153,7 @@ def test_a_sensor_whose_zero_is_off_changes_no_speed() -> None:
 def test_a_contact_damped_beyond_ringing_is_refused() -> None:
     """Its square root of a negative number ended the whole analysis of a record at 1 kHz."""
     from stickslip.balance.balance import Rig
-    from stickslip.contact.sliding_onset import _set_going
+    from stickslip.contact.contact import _set_going
 
     known = np.array([1.13, 2.97, 71.5, np.log(20_000.0), 440.0])
     with pytest.raises(EstimateError, match="rings"):

@@ -16,10 +16,10 @@ from stickslip.cli.program import main
 from stickslip.figures.law import law_plates
 from stickslip.law.law import _end
 from stickslip.law.search import Knob, Problem
-from stickslip.law.standing import CERTAIN, Evidence, Misfit, seen_above, standings
 from stickslip.law.start import Shown
 from stickslip.law.stretch import channels_of
 from stickslip.law.trials import Seen
+from stickslip.law.verdict import CERTAIN, Evidence, Misfit, seen_above, standings
 from stickslip.laws.guessing import hypotheses
 from stickslip.record.record import Step
 
@@ -130,7 +130,7 @@ def test_a_comparison_is_cancelled_by_its_progress() -> None:
     [
         ({"laws": ["cheese"]}, ss.errors.ModelError, "laws are Coulomb, static"),
         ({"laws": []}, ss.errors.ModelError, "no law"),
-        ({"laws": [ss.laws.Tabulated]}, ss.errors.ModelError, "speeds and forces can not be guessed"),
+        ({"laws": [ss.laws.InSeries]}, ss.errors.ModelError, "give the law with its values"),
         ({"calibration": 2.0}, ss.errors.ModelError, "part of 1"),
     ],
 )

@@ -20,8 +20,7 @@ from scipy.optimize import minimize
 from scipy.special import logsumexp
 
 import stickslip as ss
-from stickslip.contact.mechanisms import COLUMNS, FASTEST, columns, features
-from stickslip.contact.ringing import find_ringing
+from stickslip.contact.ringing import COLUMNS, FASTEST, columns, features, find_ringing
 
 MASS, STIFFNESS, AMPLITUDE = 2.42, 2310.0, 0.65e-3
 NAMES = ("bare spikes", "oscillation without micro-slip", "double stick-slip", "non-sinusoidal oscillation")

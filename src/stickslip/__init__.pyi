@@ -42,15 +42,17 @@ from stickslip.files.read import read_blocks as read_blocks
 from stickslip.files.read import read_record as read_record
 from stickslip.files.write import write_record as write_record
 from stickslip.law.fit_curve import fit_curve as fit_curve
-from stickslip.law.law import fit_law as fit_law
 from stickslip.law.which_law import compare_laws as compare_laws
+from stickslip.law.which_law import fit_law as fit_law
 from stickslip.maps.basins import basins as basins
 from stickslip.maps.bifurcation import bifurcation as bifurcation
 from stickslip.maps.dither import dither as dither
 from stickslip.maps.sweep import sweep as sweep
+from stickslip.oscillator import Contact as Contact
 
 # systems
 from stickslip.oscillator import Oscillator as Oscillator
+from stickslip.oscillator import Structure as Structure
 
 # telling
 from stickslip.record.record import Record as Record
@@ -63,8 +65,6 @@ from stickslip.squeak.stability import stability as stability
 from stickslip.story.folder import publish as publish
 from stickslip.story.folder import report as report
 from stickslip.story.story import summary as summary
-from stickslip.structure import Contact as Contact
-from stickslip.structure import Structure as Structure
 
 __version__: str
 __all__: list[str]

@@ -19,15 +19,14 @@ from stickslip.errors import ModelError
 from stickslip.laws.coulomb import Coulomb
 from stickslip.laws.formula import Formula
 from stickslip.laws.guessing import registered
-from stickslip.oscillator import Oscillator
+from stickslip.oscillator import Contact, Oscillator, Structure
 from stickslip.solve.assembly import table_of
-from stickslip.solve.orbit import SteadyState
 from stickslip.solve.periodic import steady_state
+from stickslip.solve.poincare import SteadyState
 from stickslip.solve.self_excited import steady_sliding
 from stickslip.solve.simulate import simulate
 from stickslip.solve.tables import System
 from stickslip.solve.trajectory import Trajectory
-from stickslip.structure import Contact, Structure
 
 LAWS = registered()
 DRIVES: dict[str, type[Any]] = {name: getattr(drives, name) for name in drives.__all__}

@@ -9,7 +9,7 @@ import collections
 import functools
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -376,6 +376,18 @@ def _by_pint(name: str) -> tuple[float, str] | None:
     return (scale, si) if si == "1" or _UNIT.fullmatch(si) else None  # what is written is read again
 
 
+def dimensions(unit: str) -> Mapping[str, float]:
+    """The powers of mass, length and time in an SI unit, without those that are zero.
+
+    Examples
+    --------
+    >>> dimensions("N s/m")
+    {'mass': 1, 'time': -1}
+    """
+    of = _registry().Quantity(1.0, unit.replace(" ", "*")).dimensionality
+    return {name.strip("[]"): power for name, power in of.items()}
+
+
 def _powers(reciprocal: str | None, chain: str, below: str | None) -> dict[str, float]:
     """The power of each of pint's names in ``chain/(below)``, or in ``1/chain/(below)``."""
     registry, powers = _registry(), collections.defaultdict[str, float](float)
@@ -385,24 +397,6 @@ def _powers(reciprocal: str | None, chain: str, below: str | None) -> dict[str, 
             size = float(halves[1]) / 2 if halves else float(power or 1)
             powers[registry.get_name(name)] += sign * size * (-1 if joint == "/" else 1)
     return powers
-
-
-@functools.cache
-def dimensions(unit: str) -> tuple[float, float, float]:
-    """The powers of mass, length and time in an SI unit, also in one like "1/(N s)"; an angle has none.
-
-    Examples
-    --------
-    >>> dimensions("N s/m"), dimensions("1/(N s)")
-    ((1.0, 0.0, -1.0), (-1.0, -1.0, 1.0))
-    """
-    above, _, below = unit.partition("/(")
-    reciprocal, chain = ("1/", above[2:]) if above.startswith("1/") else (None, "" if above == "1" else above)
-    registry = _registry()
-    powers = registry.UnitsContainer(_powers(reciprocal, chain, below.removesuffix(")")))
-    measure = registry.Quantity(1.0, powers).dimensionality
-    mass, length, time = (float(measure.get(f"[{name}]", 0.0)) for name in ("mass", "length", "time"))
-    return mass, length, time
 
 
 @functools.cache

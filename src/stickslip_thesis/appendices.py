@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 from scipy.optimize import brentq
 
-from stickslip.figures.plate import Plate
-from stickslip.figures.style import BLUE, ORANGE, styled
+from stickslip.figures.style import BLUE, ORANGE, Plate, styled
 from stickslip.signals.derivatives import five_point_response
 from stickslip_thesis.drawing import figure, panels, tag
 from stickslip_thesis.printed import Given, Ours

@@ -11,8 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import stickslip as ss
-from stickslip.figures.plate import Plate
-from stickslip.figures.style import BLUE, FAINT, GREEN, INK, ORANGE, PURPLE, styled
+from stickslip.figures.style import BLUE, FAINT, GREEN, INK, ORANGE, PURPLE, Plate, styled
 from stickslip.maps.dither import longest_stick
 from stickslip_thesis import chapter3, chapter4, small
 from stickslip_thesis.drawing import around, exact, figure, panels, tag

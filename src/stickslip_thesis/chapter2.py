@@ -11,13 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 import stickslip as ss
-from stickslip.figures.plate import Plate
-from stickslip.figures.style import BLUE, GREEN, INK, ORANGE, PURPLE, envelope, styled
+from stickslip.figures.style import BLUE, GREEN, INK, ORANGE, PURPLE, Plate, envelope, styled
 from stickslip.signals.derivatives import five_point_average
 from stickslip_thesis import flange
-from stickslip_thesis.drawing import figure, panels, tag
+from stickslip_thesis.drawing import apparatus, figure, panels, tag
 from stickslip_thesis.printed import Given, Ours
-from stickslip_thesis.sketches import apparatus
 
 Array = NDArray[np.float64]
 

@@ -13,11 +13,19 @@ from scipy.optimize import brentq
 
 import stickslip as ss
 from stickslip.contact.contact import branch_slopes
-from stickslip.figures.plate import Plate
-from stickslip.figures.style import BLUE, FAINT, GREEN, ORANGE, PURPLE, styled
-from stickslip_thesis.drawing import RESPONSES, around, characteristics, exact, figure, panels, responses, tag
+from stickslip.figures.style import BLUE, FAINT, GREEN, ORANGE, PURPLE, Plate, styled
+from stickslip_thesis.drawing import (
+    RESPONSES,
+    around,
+    characteristics,
+    exact,
+    figure,
+    massless_contact,
+    panels,
+    responses,
+    tag,
+)
 from stickslip_thesis.printed import Given, Ours
-from stickslip_thesis.sketches import massless_contact
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -12,12 +12,10 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 import stickslip as ss
-from stickslip.figures.plate import Plate
-from stickslip.figures.style import BLUE, GREEN, INK, ORANGE, PURPLE, styled
+from stickslip.figures.style import BLUE, GREEN, INK, ORANGE, PURPLE, Plate, styled
 from stickslip_thesis import readings
-from stickslip_thesis.drawing import around, characteristics, figure, panels, responses, tag
+from stickslip_thesis.drawing import around, characteristics, contact_with_inertia, figure, panels, responses, tag
 from stickslip_thesis.printed import Given, Ours
-from stickslip_thesis.sketches import contact_with_inertia
 
 Array = NDArray[np.float64]
 

@@ -11,9 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 import stickslip as ss
-from stickslip.figures.plate import Plate
-from stickslip.figures.style import BLUE, FAINT, ORANGE, PURPLE, styled
-from stickslip.figures.wavelet import plot_wavelet
+from stickslip.figures.maps import plot_wavelet
+from stickslip.figures.style import BLUE, FAINT, ORANGE, PURPLE, Plate, styled
 from stickslip_thesis import chapter4
 from stickslip_thesis.drawing import figure, panels, tag
 from stickslip_thesis.printed import Given, Ours

@@ -13,11 +13,9 @@ from numpy.typing import NDArray
 import stickslip as ss
 from stickslip.decay import extremes as ex
 from stickslip.figures.decay import plot_bounds, plot_decay, plot_differences, plot_identified
-from stickslip.figures.plate import Plate
-from stickslip.figures.style import BLUE, ORANGE, styled
-from stickslip_thesis.drawing import figure, panels
+from stickslip.figures.style import BLUE, ORANGE, Plate, styled
+from stickslip_thesis.drawing import figure, panels, system_i, system_ii
 from stickslip_thesis.printed import Given, Ours
-from stickslip_thesis.sketches import system_i, system_ii
 
 Array = NDArray[np.float64]
 

@@ -12,12 +12,10 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 import stickslip as ss
-from stickslip.figures.limit_cycle import plot_stability
-from stickslip.figures.plate import Plate
-from stickslip.figures.style import BLUE, GREEN, INK, ORANGE, PURPLE, envelope, styled
-from stickslip_thesis.drawing import figure, panels, responses, tag
+from stickslip.figures.bifurcation import plot_stability
+from stickslip.figures.style import BLUE, GREEN, INK, ORANGE, PURPLE, Plate, envelope, styled
+from stickslip_thesis.drawing import figure, panels, responses, tag, transducers
 from stickslip_thesis.printed import Given, Ours
-from stickslip_thesis.sketches import transducers
 
 Array = NDArray[np.float64]
 

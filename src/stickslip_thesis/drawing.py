@@ -1,17 +1,31 @@
-"""How the figures are drawn: the panels that several chapters share."""
+"""How the figures are drawn: the panels that several chapters share, and the sketches that chapters start from."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from stickslip.figures.plate import Plate, plate
-from stickslip.figures.style import BLUE, GREEN, ORANGE, PURPLE, WIDTH, envelope, styled
+from stickslip import Rig
+from stickslip.figures.style import (
+    BLUE,
+    FAINT,
+    GREEN,
+    INK,
+    ORANGE,
+    PURPLE,
+    SHADE,
+    WIDTH,
+    Plate,
+    envelope,
+    plate,
+    styled,
+)
 from stickslip.figures.trajectory import curve
-from stickslip_thesis.printed import captions
+from stickslip_thesis.printed import Given, captions
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -19,11 +33,275 @@ if TYPE_CHECKING:
 
     from stickslip.solve import SteadyState, Trajectory
 
+Place = tuple[float, float]
 Array = NDArray[np.float64]
 
 NAMES = ("x", "v", "a", "friction")
 RESPONSES = {"x": "displacement [mm]", "v": "velocity [mm/s]", "a": "acceleration [m/s²]", "friction": "friction [N]"}
 COLOURS = {"x": BLUE, "v": GREEN, "a": PURPLE, "friction": ORANGE}
+
+
+def _sheet(width: float, height: float) -> tuple[Any, Axes]:
+    """An empty sheet, its lengths alike in both directions."""
+    from matplotlib.figure import Figure
+
+    drawn = Figure(figsize=(WIDTH, WIDTH * height / width), layout="constrained")
+    ax = drawn.subplots()
+    ax.set(xlim=(0, width), ylim=(0, height), aspect="equal", xticks=[], yticks=[])
+    ax.grid(visible=False)
+    for spine in ax.spines.values():
+        spine.set_visible(False)
+    return drawn, ax
+
+
+def _block(ax: Axes, corner: Place, width: float, height: float, words: str = "", *, colour: str = SHADE) -> None:
+    from matplotlib.patches import Rectangle
+
+    ax.add_patch(Rectangle(corner, width, height, facecolor=colour, edgecolor=INK, linewidth=1.2))
+    ax.text(corner[0] + width / 2, corner[1] + height / 2, words, ha="center", va="center", fontsize=8)
+
+
+def _wall(ax: Axes, start: Place, length: float, *, upright: bool = False, side: int = -1) -> None:
+    """A face with hatching on one side."""
+    x, y = start
+    along, across = ((0.0, length), (0.22 * side, 0.0)) if upright else ((length, 0.0), (0.0, 0.22 * side))
+    ax.plot([x, x + along[0]], [y, y + along[1]], color=INK, linewidth=1.6)
+    for share in np.arange(0.0, 1.0, 0.3 / length):
+        foot = (x + share * along[0], y + share * along[1])
+        ax.plot(
+            [foot[0], foot[0] + across[0] + 0.15 * (not upright)],
+            [foot[1], foot[1] + across[1] + 0.15 * upright],
+            color=FAINT, linewidth=0.9,
+        )  # fmt: skip
+
+
+def _spring(ax: Axes, start: Place, end: Place, words: str = "", *, coils: int = 6) -> None:
+    length = math.dist(start, end)
+    way = np.array([end[0] - start[0], end[1] - start[1]]) / length
+    side = np.array([-way[1], way[0]])
+    along = np.concatenate([[0.0, 0.15], np.linspace(0.2, 0.8, 2 * coils), [0.85, 1.0]])
+    off = np.concatenate([[0, 0], np.where(np.arange(2 * coils) % 2, 0.16, -0.16), [0, 0]])
+    places = np.array(start) + length * along[:, None] * way + off[:, None] * side
+    ax.plot(*places.T, color=INK, linewidth=1.1)
+    _beside(ax, start, end, words)
+
+
+def _damper(ax: Axes, start: Place, end: Place, words: str = "") -> None:
+    """Along x alone."""
+    (x, y), middle = start, (start[0] + end[0]) / 2
+    ax.plot([x, middle], [y, y], color=INK, linewidth=1.1)
+    ax.plot([middle, middle], [y - 0.13, y + 0.13], color=INK, linewidth=1.6)
+    ax.plot(
+        [middle - 0.2, middle + 0.15, middle + 0.15, middle - 0.2],
+        [y + 0.2, y + 0.2, y - 0.2, y - 0.2],
+        color=INK,
+        linewidth=1.1,
+    )
+    ax.plot([middle + 0.15, end[0]], [y, y], color=INK, linewidth=1.1)
+    _beside(ax, start, end, words)
+
+
+def _beside(ax: Axes, start: Place, end: Place, words: str) -> None:
+    upright = abs(end[0] - start[0]) < abs(end[1] - start[1])
+    x, y = (start[0] + end[0]) / 2, (start[1] + end[1]) / 2
+    ax.text(
+        x + 0.3 * upright, y + 0.28 * (not upright), words, ha="left" if upright else "center",
+        va="center" if upright else "bottom", fontsize=8,
+    )  # fmt: skip
+
+
+def _arrow(ax: Axes, start: Place, end: Place, words: str, *, colour: str = BLUE) -> None:
+    ax.annotate("", xy=end, xytext=start, arrowprops={"arrowstyle": "->", "color": colour, "linewidth": 1.2})
+    upright = abs(end[0] - start[0]) < abs(end[1] - start[1])
+    ax.text(
+        (start[0] + end[0]) / 2 + 0.12 * upright, (start[1] + end[1]) / 2 + 0.12 * (not upright), words, color=colour,
+        ha="left" if upright else "center", va="center" if upright else "bottom", fontsize=8,
+    )  # fmt: skip
+
+
+def _told(ax: Axes, at: Place, place: Place, words: str, *, colour: str = PURPLE) -> None:
+    """Words beside the drawing, with a line to what they are about."""
+    ax.annotate(
+        words, xy=at, xytext=place, fontsize=8, color=colour, ha="center", va="center",
+        arrowprops={"arrowstyle": "-", "color": colour, "linewidth": 0.8},
+    )  # fmt: skip
+
+
+def _number(value: float, unit: str) -> str:
+    return f"{value:,.4g}".replace(",", " ").replace("e+05", "·10⁵") + f" {unit}"
+
+
+def _kilo(value: float) -> str:
+    return _number(value / 1e3, "N/mm")
+
+
+@styled
+def apparatus(given: Given) -> Any:
+    """Figure 2.1."""
+    told = given["rig"]
+    x, _, a, load = Rig.air_track().sensors
+    assert a.mount is not None
+    assert load.mount is not None
+    drawn, ax = _sheet(11, 5.6)
+    _wall(ax, (0.3, 1.5), 10.4)
+    ax.text(9.1, 1.05, "air track", fontsize=8, ha="center")
+    _block(ax, (0.6, 1.6), 1.1, 1.1, "base")
+    _spring(ax, (1.7, 2.15), (4.2, 2.15), f"k = {_kilo(told['spring'])}")
+    _block(ax, (4.2, 1.6), 2.0, 1.1, f"m = {told['mass']:g} kg")
+    _arrow(ax, (0.75, 3.0), (1.65, 3.0), "z(t)")
+    _arrow(ax, (4.3, 3.0), (5.2, 3.0), "x(t)")
+    ax.plot([6.2, 8.3], [2.15, 2.15], color=INK, linewidth=3)  # the strip that is rubbed
+    for y, ends in ((2.2, (3.2, 2.52)), (1.84, (1.52, 1.8))):
+        _block(ax, (7.3, y), 0.5, 0.26, colour=ORANGE)
+        _arrow(ax, (7.55, ends[0]), (7.55, ends[1]), "N" if ends[0] > ends[1] else "", colour=INK)
+    ax.plot([7.8, 9.0, 9.0, 7.8], [2.33, 2.33, 1.97, 1.97], color=INK, linewidth=1.6)  # the flange
+    _block(ax, (9.0, 1.85), 0.55, 0.6, colour=GREEN)
+    _wall(ax, (9.55, 1.55), 1.3, upright=True, side=1)
+    _told(ax, (1.1, 1.6), (1.5, 0.5), f"LVDT, S3: {1e6 * x.digitiser.step:.1f} µm a count")
+    _told(ax, (4.9, 1.6), (4.9, 0.5), "LVDT, S1")
+    _told(ax, (5.9, 2.7), (5.6, 4.3), f"accelerometer, S2,\non a mount of {a.mount.frequency:g} Hz")
+    _told(
+        ax, (9.27, 2.45), (9.2, 4.3),
+        f"load cell, discharge {load.discharge:g} s,\nbehind a flange of {load.mount.frequency:g} Hz",
+    )  # fmt: skip
+    _told(ax, (7.4, 1.84), (7.0, 0.5), f"friction contact, f = {told['kinetic']:g} N", colour=ORANGE)
+    ax.text(2.6, 4.3, f"natural frequency {told['natural']:g} rad/s", fontsize=8, ha="center")
+    return drawn
+
+
+@styled
+def massless_contact(given: Given) -> Any:
+    """Figure 3.1."""
+    told = given["sliding"]
+    drawn, ax = _sheet(11, 4.9)
+    ratio = 2 * told["damping_ratio"] * math.sqrt(told["mass"] * (told["spring"] + told["stiffness"][1]))
+    _wall(ax, (0.6, 1.9), 1.6, upright=True)
+    _arrow(ax, (0.3, 4.0), (1.3, 4.0), "z(t)")
+    _spring(ax, (0.6, 2.7), (3.6, 2.7), f"k = {_kilo(told['spring'])}")
+    _block(ax, (3.6, 2.0), 2.0, 1.4, f"m = {told['mass']:g} kg")
+    _arrow(ax, (4.0, 3.7), (5.2, 3.7), "x(t)")
+    _contact(ax, 5.6, f"K_y = {_kilo(told['stiffness'][1])}", f"c = {ratio:.3g} N s/m")
+    _block(ax, (8.5, 1.75), 0.35, 1.8, colour=ORANGE)
+    _wall(ax, (7.6, 1.55), 3.0)
+    ax.plot([8.68, 8.68], [1.55, 1.75], color=INK, linewidth=1.2)
+    _arrow(ax, (7.6, 4.0), (8.6, 4.0), "x(t) - y(t)", colour=ORANGE)
+    _told(ax, (8.68, 1.75), (9.7, 2.5), f"massless,\nf_k = {told['kinetic'][1]:g} N", colour=ORANGE)
+    ax.text(1.6, 0.7, f"at {told['frequency'][1]:g} Hz: the base moves by {1e3 * told['base'][1]:g} mm, "
+            f"the contact gives way by f_k / K_y = {1e6 * told['kinetic'][1] / told['stiffness'][1]:.2f} µm",
+            fontsize=8, ha="left")  # fmt: skip
+    return drawn
+
+
+def _contact(ax: Axes, x: float, spring: str, damper: str) -> None:
+    """Spring and damper beside each other between a mass's face at `x` and a bar 2.9 further on."""
+    _spring(ax, (x, 3.15), (x + 2.9, 3.15), spring)
+    _damper(ax, (x, 2.2), (x + 2.9, 2.2), damper)
+
+
+@styled
+def contact_with_inertia(given: Given) -> Any:
+    """Figure 4.14."""
+    told = given["inertial"]
+    drawn, ax = _sheet(11, 4.4)
+    _wall(ax, (0.8, 1.6), 1.9, upright=True)
+    _spring(ax, (0.8, 2.5), (4.2, 2.5), f"k = {told['stiffness']:g}")
+    _block(ax, (4.2, 1.9), 1.9, 1.2, "contact, m")
+    _arrow(ax, (4.6, 3.4), (5.7, 3.4), "y(t)")
+    _block(ax, (3.0, 1.3), 6.4, 0.6, "slider", colour=FAINT)
+    _arrow(ax, (8.0, 2.3), (9.2, 2.3), "x(t) = X_m cos ωt", colour=ORANGE)
+    _told(ax, (5.1, 1.9), (7.2, 3.1), f"f = ±{told['kinetic']:g}", colour=ORANGE)
+    cases = " and ".join(f"{each:g}" for each in told["amplitude"])
+    ax.text(5.5, 0.6, f"X_m = {cases}, Ω = ω √(m/k) = {told['ratio']:g}", fontsize=8, ha="center")
+    return drawn
+
+
+@styled
+def system_i(given: Given) -> Any:
+    """Figure 6.3."""
+    told = given["paper"]
+    drawn, ax = _sheet(11, 5.4)
+    _wall(ax, (0.6, 1.6), 1.8, upright=True)
+    _spring(ax, (0.6, 2.5), (3.8, 2.5), f"k = {_kilo(told['stiffness'])}")
+    _wall(ax, (0.4, 1.6), 10.2)
+    ax.text(1.9, 1.15, "air track", fontsize=8, ha="center")
+    _block(ax, (3.8, 1.7), 2.2, 1.5, f"m = {told['mass']:g} kg")
+    _damper(ax, (6.0, 2.7), (9.9, 2.7), "")
+    _wall(ax, (9.9, 1.6), 1.8, upright=True, side=1)
+    ax.plot([6.0, 8.4], [2.0, 2.0], color=INK, linewidth=3)
+    for y, sign in ((2.05, 1), (1.95, -1)):
+        _block(ax, (7.2, y - 0.2 * (sign < 0)), 0.5, 0.2, colour=ORANGE)
+    cases = [told["case1"], told["case2"]]
+    _told(ax, (7.9, 2.9), (8.2, 4.4), "damper, switched on: ζ = "
+          + " or ".join(f"{each['damping_ratio']:g}" for each in cases))  # fmt: skip
+    _told(ax, (7.45, 1.75), (7.6, 0.5), "paper, switched on: f_k = "
+          + " or ".join(f"{told['stiffness'] * each['dry']:.3f} N" for each in cases), colour=ORANGE)  # fmt: skip
+    _moves(ax, (4.4, 3.5), 1.0, (2.6, 4.4), told["resolution"])
+    return drawn
+
+
+def _moves(ax: Axes, start: Place, length: float, words: Place, resolution: float) -> None:
+    """The motion of a mass over its face, and the LVDT that feels it."""
+    _arrow(ax, start, (start[0] + length, start[1]), "x(t)")
+    _told(ax, (start[0] + 0.2, start[1] - 0.3), words, f"LVDT, {1e6 * resolution:g} µm a count")
+
+
+@styled
+def system_ii(given: Given) -> Any:
+    """Figure 6.12."""
+    told = given["bearing"]
+    drawn, ax = _sheet(11, 4.9)
+    _wall(ax, (0.4, 1.3), 10.2)
+    ax.plot([0.8, 10.2], [1.75, 1.75], color=INK, linewidth=2.2)  # the rail
+    for x in (0.8, 10.2):
+        ax.plot([x, x], [1.3, 1.75], color=INK, linewidth=2.2)
+    for x in (4.3, 6.3):
+        _block(ax, (x, 1.55), 0.9, 0.4, colour=ORANGE)
+    _block(ax, (3.9, 1.95), 3.6, 1.0, f"table, m = {told['mass']:g} kg")
+    for y in (2.15, 2.45, 2.75):
+        _spring(ax, (0.8, y), (3.9, y), "", coils=9)
+    _wall(ax, (0.8, 1.75), 1.4, upright=True)
+    ax.text(2.5, 3.3, f"three springs, k = {_kilo(told['stiffness'])} together", fontsize=8, ha="center")
+    friction = f"ζ = {told['damping_ratio']:g}, f_k = {told['kinetic']:g} N"
+    _told(ax, (6.75, 1.65), (8.0, 0.6), f"two linear bearings: {friction}", colour=ORANGE)
+    _moves(ax, (5.2, 3.25), 1.1, (3.6, 4.2), given["paper"]["resolution"])
+    return drawn
+
+
+@styled
+def transducers(given: Given) -> Any:
+    """Figure 7.7."""
+    told = given["squeak"]
+    drawn, ax = _sheet(11, 6.0)
+    _wall(ax, (0.4, 1.0), 10.2)
+    _block(ax, (1.0, 1.1), 5.4, 0.9, "mass on the linear bearing, driven at " + f"{told['frequency']:g} Hz")
+    ax.plot([1.2, 6.2], [2.05, 2.05], color=INK, linewidth=3)
+    _told(ax, (1.7, 2.1), (1.7, 3.2), "steel strip,\ndry or wet", colour=INK)
+    for x in (3.5, 4.5):
+        ax.add_patch(_hemisphere((x, 2.42)))
+    _block(ax, (3.1, 2.42), 1.8, 0.3)
+    _block(ax, (3.85, 2.72), 0.3, 1.9, colour=FAINT)
+    _wall(ax, (3.2, 4.62), 1.6, side=1)
+    _told(ax, (4.0, 4.0), (2.2, 4.3), "beam: bends\nand twists", colour=INK)
+    _told(ax, (4.6, 2.3), (6.3, 2.75), f"rubber, {told['heavy']:g} or {told['light']:g} N", colour=ORANGE)
+    _block(ax, (4.3, 2.72), 0.35, 0.3, colour=GREEN)
+    _told(ax, (4.5, 3.02), (6.5, 3.7), "accelerometer, normal: ÿ", colour=GREEN)
+    _block(ax, (8.6, 4.2), 1.2, 0.5, "laser", colour=SHADE)
+    for y in (4.35, 4.55):
+        ax.plot([4.15, 8.6], [y, y], color=PURPLE, linewidth=0.9, linestyle="--")
+    ax.text(6.9, 4.75, "two beams on a reflector, torsion: θ̇", color=PURPLE, fontsize=8, ha="center")
+    _block(ax, (8.4, 2.4), 1.1, 0.4, colour=FAINT)
+    ax.text(8.95, 2.95, "microphone", fontsize=8, ha="center")
+    _told(ax, (5.9, 2.0), (7.9, 1.7), "accelerometer: ẍ", colour=BLUE)
+    _block(ax, (0.5, 1.25), 0.5, 0.6, colour=GREEN)
+    ax.text(0.75, 0.5, "load cell: f", color=GREEN, fontsize=8, ha="center")
+    ax.text(6.3, 0.5, f"sampled at {told['fs'] / 1e3:g} kHz", fontsize=8, ha="center")
+    return drawn
+
+
+def _hemisphere(top: Place) -> Any:
+    from matplotlib.patches import Wedge
+
+    return Wedge(top, 0.36, 180, 360, facecolor=ORANGE, edgecolor=INK, linewidth=1.0)
 
 
 def figure(number: str, drawn: Figure | Axes, words: str, *, title: str = "") -> Plate:

@@ -1,9 +1,11 @@
-"""The numbers by which an observation of the text is seen in our figures, or is not."""
+"""What the text says that one should see, and whether our figures show it, by numbers measured on what they draw."""
 
 from __future__ import annotations
 
+import functools
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
@@ -13,12 +15,109 @@ from numpy.typing import NDArray
 import stickslip as ss
 from stickslip_thesis import chapter2, chapter3, chapter4, chapter5, chapter6, chapter7, readings
 from stickslip_thesis.drawing import around
-from stickslip_thesis.printed import Given, Ours
+from stickslip_thesis.printed import Given, Ours, read
 
 Array = NDArray[np.float64]
 
 INNER = slice(400, -400)  # a tenth of a second at either end, where the delayed reading has no samples
 SLIDING, STICKING = (0, 1, 2), 3  # cases of section 2.4
+MOST_TOLD = 6  # numbers that are told one by one
+
+
+@dataclass(frozen=True)
+class Observation:
+    """One thing to see.
+
+    Attributes
+    ----------
+    chapter, section : str
+        Where the text says it.
+    figures : tuple of str
+        In which figures; none where it is not drawn.
+    says : str
+        What is to be seen, in our words.
+    measure : str
+        Its name among the measures of its chapter: a number or several.
+    above, below : float
+        Between which all of them have to lie.
+    why : str
+        Why ours does not show it; empty where it has to.
+    """
+
+    chapter: str
+    section: str
+    figures: tuple[str, ...]
+    says: str
+    measure: str
+    above: float
+    below: float
+    why: str
+
+    def shown(self, values: Sequence[float]) -> bool:
+        """Do all of its numbers lie where they should?
+
+        Examples
+        --------
+        >>> Observation("2", "2.3", ("2.3",), "what is left is noise", "left", -np.inf, 0.1, "").shown([0.02, 0.05])
+        True
+        """
+        return all(self.above < value < self.below for value in values)
+
+
+@dataclass(frozen=True)
+class Seen:
+    """An observation with its numbers."""
+
+    observation: Observation
+    values: tuple[float, ...]
+
+    @property
+    def shown(self) -> bool:
+        """Whether ours shows it."""
+        return self.observation.shown(self.values)
+
+    @property
+    def text(self) -> str:
+        """The numbers and what they should be.
+
+        Examples
+        --------
+        >>> Seen(Observation("2", "2.3", (), "what is left is noise", "left", -np.inf, 0.1, ""), (0.0213,)).text
+        'left: 0.0213, below 0.1'
+        """
+        bounds = [("above", self.observation.above), ("below", self.observation.below)]
+        wanted = " and ".join(f"{word} {bound:g}" for word, bound in bounds if np.isfinite(bound))
+        told = ", ".join(f"{value:.3g}" for value in self.values)
+        if len(self.values) > MOST_TOLD:
+            told = f"{min(self.values):.3g} to {max(self.values):.3g}"
+        return f"{self.observation.measure}: {told}, {wanted}"
+
+
+@functools.cache
+def observations() -> tuple[Observation, ...]:
+    """All of them, in the order of the text."""
+    return tuple(
+        Observation(
+            entry["section"].partition(".")[0],
+            entry["section"],
+            tuple(entry.get("figures", ())),
+            entry["says"],
+            entry["measure"],
+            entry.get("above", -np.inf),
+            entry.get("below", np.inf),
+            entry.get("why", ""),
+        )
+        for entry in read("observations.toml")["observation"]
+    )
+
+
+def seen(chapter: str, given: Given) -> tuple[Seen, ...]:
+    """The observations of a chapter, measured on what its figures show."""
+    own = [one for one in observations() if one.chapter == chapter]
+    if not own:
+        return ()
+    values = MEASURES[chapter](given)
+    return tuple(Seen(one, tuple(float(value) for value in np.atleast_1d(values[one.measure]))) for one in own)
 
 
 def of_chapter_2(given: Given) -> Ours:

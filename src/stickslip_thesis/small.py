@@ -11,8 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import stickslip as ss
-from stickslip.figures.plate import Plate
-from stickslip.figures.style import BLUE, FAINT, GREEN, INK, ORANGE, PURPLE, styled
+from stickslip.figures.style import BLUE, FAINT, GREEN, INK, ORANGE, PURPLE, Plate, styled
 from stickslip_thesis import chapter3, readings
 from stickslip_thesis.drawing import figure, panels, tag
 from stickslip_thesis.printed import Given

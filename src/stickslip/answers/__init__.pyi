@@ -11,21 +11,21 @@ from stickslip.answers.fits import predict as predict
 from stickslip.answers.fits import read_fitted as read_fitted
 from stickslip.answers.frequencies import TimeFrequency as TimeFrequency
 from stickslip.answers.frequencies import time_frequency as time_frequency
-from stickslip.answers.joints import analyze_joint as analyze_joint
-from stickslip.answers.joints import axis_record as axis_record
-from stickslip.answers.joints import compare_joints as compare_joints
-from stickslip.answers.joints import episodes as episodes
-from stickslip.answers.long_records import analyze_blocks as analyze_blocks
+from stickslip.answers.machines import analyze_joint as analyze_joint
+from stickslip.answers.machines import analyze_tribometer as analyze_tribometer
+from stickslip.answers.machines import axis_record as axis_record
+from stickslip.answers.machines import compare_joints as compare_joints
+from stickslip.answers.machines import compare_tribometers as compare_tribometers
+from stickslip.answers.machines import episodes as episodes
 from stickslip.answers.many import Batch as Batch
 from stickslip.answers.many import Kept as Kept
 from stickslip.answers.many import Row as Row
 from stickslip.answers.many import require_engine as require_engine
 from stickslip.answers.many import spread as spread
 from stickslip.answers.preparation import mend as mend
+from stickslip.answers.questions import analyze_blocks as analyze_blocks
 from stickslip.answers.questions import stated_wrongly as stated_wrongly
 from stickslip.answers.squeaks import Condition as Condition
 from stickslip.answers.squeaks import compare_squeaks as compare_squeaks
-from stickslip.answers.tribometers import analyze_tribometer as analyze_tribometer
-from stickslip.answers.tribometers import compare_tribometers as compare_tribometers
 
 __all__: list[str]

@@ -14,7 +14,7 @@ from stickslip.answers.findings import BY_DECREMENTS, Comparison, Findings, Inqu
 from stickslip.answers.mistakes import mistakes_of_decay
 from stickslip.decay.answer import DecayFit, rig_units
 from stickslip.decay.decrement import Decrement, decrement
-from stickslip.decay.envelope import EnvelopeDecay, extreme_decay, hilbert_decay, linear_decrement, log_decrement
+from stickslip.decay.extremes import EnvelopeDecay, extreme_decay, hilbert_decay, linear_decrement, log_decrement
 from stickslip.decay.fit_decay import fit_decay
 from stickslip.decay.motions import Restoring
 from stickslip.decay.release import Releases, find_releases

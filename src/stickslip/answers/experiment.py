@@ -20,8 +20,7 @@ from stickslip.errors import ModelError, StickslipError
 from stickslip.oscillator import Oscillator
 from stickslip.parameters import finite
 from stickslip.record.record import Record
-from stickslip.rig.rig import Rig
-from stickslip.rig.shaker import Shaker
+from stickslip.rig.rig import Rig, Shaker
 from stickslip.solve.trajectory import Trajectory
 from stickslip.units import parse_value, prefixed
 

@@ -14,16 +14,14 @@ from numpy.typing import ArrayLike, NDArray
 from stickslip.answers.findings import Inquiry, record_name
 from stickslip.balance.motion import is_measured
 from stickslip.contact.frequency_transition import Transition, transition_of
-from stickslip.contact.mechanisms import UNTOLD, Mechanism, mechanism_of
 from stickslip.contact.microslip import MicroSlips, microslips_of
-from stickslip.contact.ringing import Ringing, checked_mass, find_ringing
+from stickslip.contact.ringing import UNTOLD, Mechanism, Ringing, checked_mass, find_ringing, mechanism_of
 from stickslip.cycle.slips import SlipRinging, slip_ringing
 from stickslip.errors import EstimateError, RecordError
 from stickslip.estimate import Constant, Estimate, Result
 from stickslip.record.record import Record
 from stickslip.signals.ridges import Ridge, Spike, find_ridges, find_spikes
-from stickslip.signals.wavelet import wavelet_map, wavelet_overview
-from stickslip.signals.wavelet_grid import CENTRE
+from stickslip.signals.wavelet import CENTRE, wavelet_map, wavelet_overview
 from stickslip.units import parse_range
 
 if TYPE_CHECKING:

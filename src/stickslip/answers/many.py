@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from stickslip.answers.findings import Comparison, Findings, require_several
 from stickslip.errors import ModelError, RecordError
 from stickslip.estimate import NORMAL_95, Estimate, Result
-from stickslip.law.load import LATE
+from stickslip.law.fit_curve import LATE
 from stickslip.maps.engines import AHEAD, client_of
 from stickslip.statistics import student
 from stickslip.workers import processors

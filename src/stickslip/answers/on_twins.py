@@ -10,9 +10,8 @@ from typing import Any, TypeVar
 
 from stickslip.answers.findings import BY_FORCE, NOT_TRIED, Findings, flagged, without
 from stickslip.balance.force import friction_force
-from stickslip.cycle.before_slip import Presliding, presliding
 from stickslip.cycle.loops import Loops, friction_loops
-from stickslip.cycle.onset import Breakaway, breakaway
+from stickslip.cycle.onset import Breakaway, Presliding, breakaway, presliding
 from stickslip.cycle.sticks import Sticks, find_sticks
 from stickslip.errors import StickslipError
 from stickslip.estimate import UNTRIED, Estimate, Result, Status

@@ -24,8 +24,8 @@ from stickslip.bench.free import onto_stick as onto_stick
 from stickslip.bench.monitor import Cycle as Cycle
 from stickslip.bench.monitor import Flaw as Flaw
 from stickslip.bench.monitor import Monitor as Monitor
+from stickslip.bench.monitor import Picture as Picture
 from stickslip.bench.monitor import answers as answers
-from stickslip.bench.picture import Picture as Picture
 from stickslip.bench.recording import Acquired as Acquired
 from stickslip.bench.recording import Tape as Tape
 from stickslip.bench.recording import Trigger as Trigger

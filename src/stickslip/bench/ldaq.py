@@ -14,8 +14,7 @@ from typing import Any
 import numpy as np
 from pydantic import BaseModel, Field
 
-from stickslip.bench.device import Block, Input, Listening, Output, vendors
-from stickslip.bench.wiring import Wires, inputs
+from stickslip.bench.device import Block, Input, Listening, Output, Wires, inputs, vendors
 from stickslip.errors import ModelError
 from stickslip.settings import STRICT, checked
 

@@ -13,8 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, Field
 
-from stickslip.bench.device import Block, Input, Output, Signal, Tone, output_of, vendors
-from stickslip.bench.wiring import Mover, Wires, inputs
+from stickslip.bench.device import Block, Input, Mover, Output, Signal, Tone, Wires, inputs, output_of, vendors
 from stickslip.errors import ModelError, RecordError
 from stickslip.files.expression import apply_sensitivity
 from stickslip.settings import STRICT, checked, quantity

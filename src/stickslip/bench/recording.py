@@ -22,10 +22,9 @@ from stickslip.files import journal
 from stickslip.files.read import read_record
 from stickslip.files.table import Options
 from stickslip.files.write import WRITERS, require_free, write_record, write_table
-from stickslip.record.log import Log
-from stickslip.record.metadata import record_to_metadata
+from stickslip.record.metadata import Log, record_to_metadata
 from stickslip.record.record import Record, Step
-from stickslip.signals.clocks import clock_rate, synchronise
+from stickslip.signals.interpolate import clock_rate, synchronise
 
 SYNC = 1.0  # s between two times that the journal is put on the disk itself
 SILENCE = 10.0  # s without a sample after which a device is given up

@@ -15,7 +15,7 @@ from pydantic import BaseModel, Field
 from stickslip.drives.kinds import HarmonicBase
 from stickslip.errors import EstimateError, ModelError, StickslipError
 from stickslip.oscillator import Oscillator
-from stickslip.rig.shaker import Shaker
+from stickslip.rig.rig import Shaker
 from stickslip.settings import STRICT, checked, quantity, read_toml
 from stickslip.solve.simulate import simulate
 

@@ -12,8 +12,7 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import BaseModel, Field
 
-from stickslip.bench.device import Block, Input, Listening, Output, vendors
-from stickslip.bench.wiring import Wires, columns, inputs
+from stickslip.bench.device import Block, Input, Listening, Output, Wires, columns, inputs, vendors
 from stickslip.errors import ModelError
 from stickslip.settings import STRICT, checked, quantity
 

@@ -13,8 +13,7 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import BaseModel, Field
 
-from stickslip.bench.device import Block, Input, Listening, Output, vendors
-from stickslip.bench.wiring import Wire, Wires, columns, inputs
+from stickslip.bench.device import Block, Input, Listening, Output, Wire, Wires, columns, inputs, vendors
 from stickslip.errors import ModelError
 from stickslip.settings import STRICT, checked, quantity
 

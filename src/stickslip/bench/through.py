@@ -32,12 +32,11 @@ from stickslip.law.verdict import LawComparison
 from stickslip.laws.compliant import CompliantContact
 from stickslip.laws.coulomb import Coulomb
 from stickslip.oscillator import Oscillator
-from stickslip.record.log import Log
+from stickslip.record.metadata import Log
 from stickslip.record.record import Record
-from stickslip.rig.rig import Rig
+from stickslip.rig.rig import Rig, Shaker
 from stickslip.rig.sensor import Sensor
 from stickslip.rig.settings import CommissionSettings, RigSettings, read_rig
-from stickslip.rig.shaker import Shaker
 from stickslip.solve.simulate import simulate
 from stickslip.squeak.sound import HEAVY, squeak_record, squeak_rig
 

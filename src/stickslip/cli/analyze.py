@@ -12,21 +12,25 @@ import click
 
 import stickslip as ss
 from stickslip.cli.many import Places, answer_many, many_options
-from stickslip.cli.options import all_option, constants_options, normal_option, reading_options, result_options, usable
 from stickslip.cli.records import (
+    all_option,
     answers,
+    constants_options,
     default_folder,
     files_of,
     folder_after,
     groups_of,
     name_left_out,
+    normal_option,
     read,
+    reading_options,
     require_fits,
+    result_options,
     rig_of,
+    usable,
     with_left_out,
 )
-from stickslip.cli.show import publish, show
-from stickslip.cli.terminal import complain, progress
+from stickslip.cli.terminal import complain, progress, publish, show
 from stickslip.errors import INTERRUPTED
 from stickslip.workers import processors
 

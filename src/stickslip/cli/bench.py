@@ -14,10 +14,8 @@ import click
 
 import stickslip as ss
 import stickslip.bench as bench
-from stickslip.cli.options import all_option, pair, usable
-from stickslip.cli.records import groups_of, read
-from stickslip.cli.show import print_json, show
-from stickslip.cli.terminal import aligned, progress, redrawn, say, say_json, wrapped
+from stickslip.cli.records import all_option, groups_of, pair, read, usable
+from stickslip.cli.terminal import aligned, print_json, progress, redrawn, say, say_json, show, wrapped
 from stickslip.errors import INTERRUPTED
 
 if TYPE_CHECKING:

@@ -10,8 +10,17 @@ from typing import TYPE_CHECKING, Any
 import click
 
 import stickslip as ss
-from stickslip.cli.options import all_option, constants_options, reading_options
-from stickslip.cli.records import RIG_FILE, collected, files_of, groups_of, read, rig_of
+from stickslip.cli.records import (
+    RIG_FILE,
+    all_option,
+    collected,
+    constants_options,
+    files_of,
+    groups_of,
+    read,
+    reading_options,
+    rig_of,
+)
 from stickslip.cli.terminal import aligned, complain, say, spoken, wrapped
 
 if TYPE_CHECKING:

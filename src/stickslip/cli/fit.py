@@ -11,10 +11,18 @@ from typing import TYPE_CHECKING, Any
 import click
 
 import stickslip as ss
-from stickslip.cli.options import constants_options, reading_options, result_options
-from stickslip.cli.records import RIG_FILE, answer_together, default_folder, groups_of, read, rig_of
-from stickslip.cli.show import publish, show
-from stickslip.cli.terminal import complain, progress
+from stickslip.cli.records import (
+    RIG_FILE,
+    answer_together,
+    constants_options,
+    default_folder,
+    groups_of,
+    read,
+    reading_options,
+    result_options,
+    rig_of,
+)
+from stickslip.cli.terminal import complain, progress, publish, show
 from stickslip.errors import ABSENT, EstimateError
 
 if TYPE_CHECKING:
@@ -41,8 +49,8 @@ CURVES = (
 @click.option(
     "--laws",
     metavar="LIST",
-    help="The laws to compare, with commas: Coulomb, static, Stribeck, compliant, state variable, LuGre; these six "
-    "unless given. Any other by the name of its class, as in Dahl.",
+    help="The laws to compare, with commas: Coulomb, static, Stribeck, compliant, state variable, LuGre (which "
+    "are tried unless others are given), or any class of stickslip.laws, as Dahl.",
 )
 @click.option("--calibration", type=float, default=0.005, show_default=True, help="By what part gains may be wrong.")
 @click.option(

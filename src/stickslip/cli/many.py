@@ -10,10 +10,8 @@ from typing import TYPE_CHECKING, Any
 import click
 
 import stickslip as ss
-from stickslip.cli.options import together
-from stickslip.cli.records import answer_together, checksum, names_of, read
-from stickslip.cli.show import publish, show
-from stickslip.cli.terminal import progress
+from stickslip.cli.records import answer_together, checksum, names_of, read, together
+from stickslip.cli.terminal import progress, publish, show
 
 if TYPE_CHECKING:
     from stickslip import Record

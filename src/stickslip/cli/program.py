@@ -20,11 +20,9 @@ COMMANDS = {  # by the file that they stand in
     "bench": ("acquire", "commission", "devices", "simulated_bench"),
     "files": ("check", "convert", "datasets", "init"),
     "fit": ("fit", "predict"),
-    "machines": ("joint", "tribometer"),
-    "rig": ("rig",),
+    "rig": ("rig", "thesis"),
     "simulate": ("bifurcation", "dither", "lab", "simulate", "stability", "sweep"),
-    "thesis": ("thesis",),
-    "vibrations": ("decay", "squeak", "wavelet"),
+    "vibrations": ("decay", "joint", "squeak", "tribometer", "wavelet"),
 }
 ARGUMENTS = "stickslip.arguments"  # the key under which the context keeps what was typed
 # Of each kind of error the options without which the command may succeed.

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 import stickslip as ss
-from stickslip.cli.options import (
+from stickslip.cli.records import (
     all_option,
     case_options,
     changes_option,
@@ -23,8 +23,7 @@ from stickslip.cli.options import (
     usable,
     wanted_case,
 )
-from stickslip.cli.show import print_json, publish, show
-from stickslip.cli.terminal import progress, say, say_json, wrapped
+from stickslip.cli.terminal import print_json, progress, publish, say, say_json, show, wrapped
 from stickslip.errors import INTERRUPTED
 
 if TYPE_CHECKING:

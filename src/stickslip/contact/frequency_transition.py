@@ -8,14 +8,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from stickslip.contact.mechanisms import not_one_mode
-from stickslip.contact.ringing import Ringing, Window, checked_mass, find_ringing
+from stickslip.contact.ringing import Ringing, Window, checked_mass, find_ringing, not_one_mode
 from stickslip.errors import EstimateError
 from stickslip.estimate import Constant, Estimate, Result, Status
 from stickslip.record.record import Record
 from stickslip.signals.morlet import ridge_centre
-from stickslip.signals.wavelet import wavelet_map
-from stickslip.signals.wavelet_grid import CENTRE
+from stickslip.signals.wavelet import CENTRE, wavelet_map
 from stickslip.statistics import correlation_time, least_squares, mean_of_cycles, student
 
 Array = NDArray[np.float64]

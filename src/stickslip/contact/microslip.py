@@ -12,8 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stickslip.contact.frequency_transition import heard_mode
-from stickslip.contact.mechanisms import UNTOLD, not_one_mode, too_fast
-from stickslip.contact.ringing import PENALTY, Ringing, Window, find_ringing
+from stickslip.contact.ringing import PENALTY, UNTOLD, Ringing, Window, find_ringing, not_one_mode, too_fast
 from stickslip.errors import EstimateError
 from stickslip.estimate import Constant, Estimate, Result, Status
 from stickslip.record.record import Record

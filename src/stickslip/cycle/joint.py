@@ -7,8 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from stickslip.cycle.joint_data import JointData, joint_data, turning
-from stickslip.cycle.joint_fit import ADVICE, Telling, fitted
+from stickslip.cycle.joint_fit import ADVICE, JointData, Telling, fitted, joint_data, turning
 from stickslip.estimate import Constant, Doubt, Estimate, Result, Status
 from stickslip.record.record import Record
 from stickslip.signals.noise import noise_level

@@ -1,12 +1,12 @@
 from stickslip.decay.answer import DecayFit as DecayFit
 from stickslip.decay.decrement import Bounds as Bounds
 from stickslip.decay.decrement import Decrement as Decrement
-from stickslip.decay.envelope import EnvelopeDecay as EnvelopeDecay
-from stickslip.decay.envelope import extreme_decay as extreme_decay
-from stickslip.decay.envelope import hilbert_decay as hilbert_decay
-from stickslip.decay.envelope import linear_decrement as linear_decrement
-from stickslip.decay.envelope import log_decrement as log_decrement
+from stickslip.decay.extremes import EnvelopeDecay as EnvelopeDecay
 from stickslip.decay.extremes import effective_rate_bound as effective_rate_bound
+from stickslip.decay.extremes import extreme_decay as extreme_decay
+from stickslip.decay.extremes import hilbert_decay as hilbert_decay
+from stickslip.decay.extremes import linear_decrement as linear_decrement
+from stickslip.decay.extremes import log_decrement as log_decrement
 from stickslip.decay.release import Releases as Releases
 from stickslip.decay.release import RingDown as RingDown
 from stickslip.decay.release import find_releases as find_releases

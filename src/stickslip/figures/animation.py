@@ -27,7 +27,7 @@ from stickslip.figures.style import (
     styled,
 )
 from stickslip.figures.trajectory import MASSES, contacts_of, curve, last_cycles, numbered_words, sampled
-from stickslip.structure import Structure
+from stickslip.oscillator import Structure
 from stickslip.whole import whole_file
 
 if TYPE_CHECKING:

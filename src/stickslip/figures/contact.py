@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from stickslip.balance.motion import contact_motion
-from stickslip.figures.plate import Plate, captioned
 from stickslip.figures.style import (
     BARS,
     BLUE,
@@ -18,8 +17,10 @@ from stickslip.figures.style import (
     ORANGE,
     SHADE,
     Array,
+    Plate,
     axes_of,
     axis_label,
+    captioned,
     legend_above,
     new_figure,
     prefixed,
@@ -32,7 +33,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from stickslip.answers.findings import Findings
-    from stickslip.contact.sliding_onset import TransitionSpeed
+    from stickslip.contact.contact import TransitionSpeed
     from stickslip.cycle.tribometer import Coefficients
 
 MARGIN = 0.25  # of a stick's duration, drawn on either side of it

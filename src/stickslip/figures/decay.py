@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stickslip.decay import extremes as ex
-from stickslip.figures.plate import Plate, captioned
 from stickslip.figures.style import (
     BLUE,
     FAINT,
@@ -19,8 +18,10 @@ from stickslip.figures.style import (
     ORANGE,
     PURPLE,
     SHADE,
+    Plate,
     axes_of,
     axis_label,
+    captioned,
     envelope,
     legend_above,
     named_intervals,

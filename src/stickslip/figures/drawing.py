@@ -39,13 +39,13 @@ if TYPE_CHECKING:
 # What draws each kind of result, the file of this room and the function. One that takes no `ax` fills a whole figure.
 DRAWN = {
     "Record": "drawing.of_record", "Findings": "drawing.of_findings", "Comparison": "drawing.of_comparison",
-    "Loops": "drawing.of_loops", "JointFriction": "joint.plot_joint", "Coefficients": "contact.plot_coefficients",
+    "Loops": "drawing.of_loops", "JointFriction": "law.plot_joint", "Coefficients": "contact.plot_coefficients",
     "DecayFit": "drawing.of_decay", "Decrement": "decay.plot_differences",
     "ForceComparison": "traces.plot_force_comparison", "Consistency": "friction.plot_consistency",
     "TransitionSpeed": "contact.plot_transition_speed", "Trial": "traces.plot_twin", "Squeaks": "squeak.plot_squeaks",
-    "TimeFrequency": "drawing.of_frequencies", "DataArray": "wavelet.plot_wavelet",
+    "TimeFrequency": "drawing.of_frequencies", "DataArray": "maps.plot_wavelet",
     "LawComparison": "law.plot_laws", "LawFit": "law.plot_fit", "CurveFit": "law.plot_curve",
-    "Trajectory": "trajectory.plot_motion", "CycleBranches": "limit_cycle.plot_limit_cycles",
+    "Trajectory": "trajectory.plot_motion", "CycleBranches": "bifurcation.plot_limit_cycles",
     "Bifurcation": "bifurcation.plot_bifurcation", "Basins": "bifurcation.plot_basins",
     "Boundary": "bifurcation.plot_boundary", "Dither": "bifurcation.plot_dither", "Dataset": "drawing.of_dataset",
     "ExperimentPlan": "bench.plot_plan", "Estimate": "drawing.of_estimates", "list": "drawing.of_estimates",
@@ -147,7 +147,7 @@ def of_findings(findings: Findings, *, ax: Axes | None = None) -> Figure | Axes:
     if results.get("decay") is not None:
         return _named("decay.plot_decay")(findings.decay, ax=ax)
     if results.get("joint") is not None:
-        return _named("joint.plot_joint")(findings.joint, ax=ax)
+        return _named("law.plot_joint")(findings.joint, ax=ax)
     if results.get("squeaks") is not None and ax is None:
         return _named("squeak.plot_squeaks")(findings.squeaks)
     return of_record(findings.record, ax=ax)
@@ -178,7 +178,7 @@ def of_loops(loops: Loops, *, ax: Axes | None = None, against: str = "displaceme
 
 def of_frequencies(findings: TimeFrequency) -> Figure | Axes:
     """The map of a channel, with the signal above it."""
-    return _named("wavelet.plot_wavelet")(findings.wavelets, record=findings.record)
+    return _named("maps.plot_wavelet")(findings.wavelets, record=findings.record)
 
 
 def of_decay(fit: DecayFit, *, ax: Axes | None = None) -> Axes:
@@ -195,7 +195,7 @@ def of_decay(fit: DecayFit, *, ax: Axes | None = None) -> Axes:
 def of_dataset(data: Any, *, ax: Axes | None = None, **options: Any) -> Figure | Axes:
     """A map of a sweep; where steady sliding lasts."""
     if "growth" in data:
-        return _named("limit_cycle.plot_stability")(data, **options)
+        return _named("bifurcation.plot_stability")(data, **options)
     return _named("maps.plot_map")(data, ax=ax, **options)
 
 

@@ -26,7 +26,6 @@ from stickslip.figures.contact import (
     plot_transition_speed,
     plot_velocity_loop,
 )
-from stickslip.figures.plate import Plate, captioned
 from stickslip.figures.style import (
     BARS,
     BLUE,
@@ -35,8 +34,10 @@ from stickslip.figures.style import (
     ORANGE,
     PURPLE,
     SKY,
+    Plate,
     axes_of,
     axis_label,
+    captioned,
     empty_figure,
     envelope,
     legend_above,

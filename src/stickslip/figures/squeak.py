@@ -12,7 +12,6 @@ import numpy as np
 
 from stickslip.estimate import decimals
 from stickslip.figures.contact import plot_displacement_loop, plot_velocity_loop
-from stickslip.figures.plate import Plate, captioned
 from stickslip.figures.style import (
     BARS,
     BLUE,
@@ -22,7 +21,9 @@ from stickslip.figures.style import (
     ORANGE,
     PURPLE,
     Array,
+    Plate,
     axis_label,
+    captioned,
     coloured,
     empty_figure,
     envelope,
@@ -42,8 +43,8 @@ if TYPE_CHECKING:
 
     from stickslip.answers.findings import Comparison, Findings
     from stickslip.record.record import Record
+    from stickslip.squeak.bursts import Squeak, Squeaks
     from stickslip.squeak.spectra import BurstSpectra
-    from stickslip.squeak.squeaks import Squeak, Squeaks
 
 MARKS = {
     "squeaks": (ORANGE, "D"), "squeals": (ORANGE, "D"), "creaks": (PURPLE, "^"), "does not squeak": (BLUE, "o"),

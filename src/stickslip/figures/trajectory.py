@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from stickslip.figures.plate import Plate, captioned
 from stickslip.figures.style import (
     BLUE,
     FAINT,
@@ -21,15 +20,17 @@ from stickslip.figures.style import (
     SHADE,
     SKY,
     Array,
+    Plate,
     axes_of,
     axis_label,
+    captioned,
     envelope,
     legend_above,
     new_figure,
     prefixed,
     styled,
 )
-from stickslip.structure import Structure
+from stickslip.oscillator import Structure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

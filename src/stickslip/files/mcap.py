@@ -7,8 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from stickslip.files.messages import Message, joined, streams_of
-from stickslip.files.rosbag import Decode, decoder
+from stickslip.files.rosbag import Decode, Message, decoder, joined, streams_of
 from stickslip.files.table import Options, Table, optional, reading
 
 NAME = "MCAP"

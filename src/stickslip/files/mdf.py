@@ -9,7 +9,7 @@ from typing import BinaryIO
 import numpy as np
 
 from stickslip.errors import FormatError
-from stickslip.files.messages import Stream, joined
+from stickslip.files.rosbag import Stream, joined
 from stickslip.files.table import Budget, Options, Table, optional, reading
 
 NAME = "MDF"

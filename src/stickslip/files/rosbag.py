@@ -1,23 +1,170 @@
-"""ROS bags, .bag of ROS 1 and .db3 of ROS 2: the numbers of every topic on the clock of the joints' states."""
+"""ROS bags, .bag of ROS 1 and .db3 of ROS 2: the numbers of every topic on the clock of the joints' states.
+
+The columns of topics become one table: what was heard last at each sample of the one clock. MCAP and MDF join alike."""
 
 from __future__ import annotations
 
+import dataclasses
 import sqlite3
-from collections.abc import Callable, Iterator
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import closing
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
-from stickslip.files.messages import Message, joined, streams_of
-from stickslip.files.table import Options, Table, optional, reading
+import numpy as np
 
+from stickslip.errors import FormatError
+from stickslip.files.table import LISTED, Array, Budget, Column, Options, Table, optional, reading, slices, unique
+
+NAMES = ("name", "joint_names")  # of a message whose lists have one number for each joint
+LATE = 0.1  # of the clock: a topic that is silent for longer at its beginning would cost these rows
+
+Message = tuple[str, int, Any]  # topic, when it was heard [ns], what it says: fields of numbers, lists, fields
 NAME = "ROS bag"
 SUFFIXES = (".bag", ".db3")
 FIRST, SECOND = b"#ROSBAG V2.0", b"SQLite format 3\0"  # as files of ROS 1 and of ROS 2 begin
 DEFINED = "SELECT topic_type, encoded_message_definition FROM message_definitions WHERE encoding = 'ros2msg'"
 
 Decode = Callable[[bytes], Any]
+
+
+@dataclass(frozen=True)
+class Stream:
+    """Columns with one clock of their own.
+
+    Attributes
+    ----------
+    topic : str
+        What they are called together.
+    heard : ndarray, shape (n,)
+        When each row was heard [s], on the clock of all streams.
+    columns : mapping of str to ndarray
+        Of n numbers each.
+    stamps : ndarray or None
+        When each row was measured [s] as the sender says, where it does.
+    named : bool
+        Whether the columns are called by the joints' own names.
+    units : mapping of str to str
+        Where the file states them.
+    """
+
+    topic: str
+    heard: Array
+    columns: Mapping[str, Array]
+    stamps: Array | None = None
+    named: bool = False
+    units: Mapping[str, str] = dataclasses.field(default_factory=dict)
+
+
+def streams_of(path: Path, messages: Iterable[Message]) -> list[Stream]:
+    """The streams of messages, one for each topic and each set of numbers that it sends."""
+    budget, cells = Budget.of(path), 0
+    rows: dict[tuple[str, tuple[str, ...]], list[tuple[int, int, list[float]]]] = {}
+    named = set()
+    for topic, heard, message in messages:
+        numbers = dict(_numbers(message))
+        key = topic, tuple(numbers)
+        rows.setdefault(key, []).append((heard, _stamp(message), list(numbers.values())))
+        if _names(message):
+            named.add(key)
+        budget.require(cells := cells + len(numbers) + 2)
+    first = min((part[0][0] for part in rows.values()), default=0)
+    streams = []
+    for (topic, names), part in rows.items():
+        values = np.array([row for _, _, row in part], dtype=np.float64).reshape(len(part), len(names))
+        stamps = np.array([stamp for _, stamp, _ in part], dtype=np.int64)
+        times = _seconds(np.array([heard for heard, _, _ in part], dtype=np.int64) - first)
+        own = _seconds(stamps - stamps[0]) if np.all(stamps > 0) else None
+        columns = dict(zip(names, values.T, strict=True))
+        streams.append(Stream(topic.strip("/"), times, columns, own, (topic, names) in named))
+    return streams
+
+
+def joined(path: Path, streams: Sequence[Stream], notes: Sequence[str] = ()) -> Table:
+    """The table of all streams on the clock of one: that of the joints' states, else the one heard most often.
+
+    A controller holds what it was told last, so that columns of others are read as last heard.
+    """
+    streams = [one for one in streams if one.columns and len(one.heard) > 1 and np.all(np.diff(one.heard) >= 0)]
+    if not streams:
+        raise FormatError(
+            f"'{path.name}' holds no topic with two rows of numbers" + "".join(f"; {note}" for note in notes),
+            "a record needs numbers over time",
+            "export what was measured as CSV",
+        )
+    clock = max(streams, key=lambda one: (one.named, len(one.columns) if one.named else 0, len(one.heard)))
+    latest = clock.heard[int(LATE * len(clock.heard))]
+    kept = [stream for stream in streams if stream.heard[0] <= latest]
+    begin = int(np.searchsorted(clock.heard, max(stream.heard[0] for stream in kept)))
+    stamps = clock.stamps if clock.stamps is not None and np.all(np.diff(clock.stamps) > 0) else clock.heard
+    arrays, columns = {"time": stamps[begin:]}, [Column("time", "s", len(stamps) - begin)]
+    history = [f"the clock is that of {clock.topic}", *notes]
+    for stream, names in zip(kept, _titles(kept), strict=True):
+        rows = np.searchsorted(stream.heard, clock.heard[begin:], side="right") - 1
+        if stream is not clock:
+            history.append(f"{stream.topic} is read as last heard")
+        for name, (own, values) in zip(names, stream.columns.items(), strict=True):
+            arrays[name] = values[begin:] if stream is clock else values[rows]
+            columns.append(Column(name, stream.units.get(own), len(rows)))
+    history += [f"{stream.topic} is heard too late, left out" for stream in streams if stream.heard[0] > latest]
+    return Table(tuple(columns), slices(arrays), notes=tuple(history))
+
+
+def _titles(streams: Sequence[Stream]) -> list[list[str]]:
+    """Of each stream its columns' names: those of joints as they are, others, and what clashes, after the topic."""
+    often = Counter(name for stream in streams if stream.named for name in stream.columns)
+    titles = iter(
+        unique([
+            "time",
+            *(
+                name if stream.named and often[name] == 1 else f"{stream.topic}/{name}"
+                for stream in streams for name in stream.columns
+            ),
+        ])[1:]
+    )  # fmt: skip
+    return [[next(titles) for _ in stream.columns] for stream in streams]
+
+
+def _fields(message: Any) -> dict[str, Any]:
+    if isinstance(message, Mapping):
+        return dict(message)
+    if dataclasses.is_dataclass(message) and not isinstance(message, type):
+        return {field.name: getattr(message, field.name) for field in dataclasses.fields(message)}
+    return {}
+
+
+def _names(message: Any) -> list[str]:
+    """What the joints of a message are called."""
+    fields = _fields(message)
+    names = next((fields[name] for name in NAMES if name in fields), None)
+    return list(names) if isinstance(names, list) and all(isinstance(name, str) for name in names) else []
+
+
+def _numbers(message: Any, path: str = "", names: Sequence[str] = ()) -> Iterator[tuple[str, float]]:
+    """Every number in a message, under the names of the fields that lead to it; of lists by joint or by place."""
+    names = _names(message) or names
+    if isinstance(message, (bool, int, float, np.number)):
+        yield path, float(message)
+    elif isinstance(message, (list, tuple, np.ndarray)) and len(message) <= LISTED:
+        for place, value in enumerate(message):
+            yield from _numbers(value, f"{path}.{names[place] if len(names) == len(message) else place}", names)
+    for name, value in _fields(message).items():
+        if name != "header":
+            yield from _numbers(value, f"{path}.{name}" if path else name, names)
+
+
+def _stamp(message: Any) -> int:
+    """When a message was measured [ns], by its header; 0 where it does not say."""
+    stamp = _fields(_fields(_fields(message).get("header")).get("stamp"))
+    seconds, more = (stamp.get("sec", stamp.get("secs")), stamp.get("nanosec", stamp.get("nsec", stamp.get("nsecs"))))
+    return seconds * 10**9 + more if isinstance(seconds, int) and isinstance(more, int) else 0
+
+
+def _seconds(nanoseconds: np.ndarray[Any, Any]) -> Array:
+    return np.asarray(nanoseconds * 1e-9, dtype=np.float64)
 
 
 def recognise(path: Path, head: bytes) -> bool:

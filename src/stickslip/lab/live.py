@@ -24,8 +24,8 @@ from starlette.websockets import WebSocket
 
 import stickslip as ss
 import stickslip.bench as bench
-from stickslip.lab.frames import frame
 from stickslip.lab.play import conversation, readable
+from stickslip.lab.workers import frame
 from stickslip.workers import pool
 
 WANTED = ("open", "close", "record", "stop", "mark", "drive")

@@ -20,9 +20,8 @@ from starlette.responses import JSONResponse, Response
 from starlette.routing import BaseRoute, Route, WebSocketRoute
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
-from stickslip.lab.frames import frame, unframed
 from stickslip.lab.openapi import described
-from stickslip.lab.workers import Tell, Worker, Workers
+from stickslip.lab.workers import Tell, Worker, Workers, frame, unframed
 
 COUNTED = ("stops", "micro_slips", "period")  # where an answer jumps, its border is refined
 STRIP, SIDE, HALVINGS = 2, 64, 3  # columns at a time, points along an axis, of a border

@@ -30,8 +30,8 @@ from uvicorn.protocols.http.h11_impl import H11Protocol
 
 import stickslip as ss
 from stickslip.lab import data, live, play
+from stickslip.lab.data import LARGEST
 from stickslip.lab.openapi import described, document
-from stickslip.lab.uploads import LARGEST
 from stickslip.lab.workers import Workers
 
 HOSTS = ("127.0.0.1", "localhost")

@@ -14,10 +14,9 @@ from contextlib import contextmanager, nullcontext
 from typing import Any, BinaryIO
 
 import stickslip as ss
-from stickslip.lab import drawn, forms
-from stickslip.lab.frames import frame
+from stickslip.lab import drawn
 from stickslip.lab.task import bound
-from stickslip.lab.workers import ANSWER, HEAD
+from stickslip.lab.workers import ANSWER, HEAD, frame
 
 MEMORY = 4 * 2**30  # bytes of data
 PATIENCE = 30.0  # s of one run
@@ -135,7 +134,7 @@ def serve(requests: BinaryIO, answers: BinaryIO) -> None:
             listen(patience, compiling)
             listening = True
         if catalog:  # while the page draws its form, the kernels are loaded
-            answer({"want": "run", "state": forms.first_state()})
+            answer({"want": "run", "state": drawn.first_state()})
         else:
             write(answer(request), last=True)
 

@@ -1,22 +1,52 @@
-"""A few processes that compute for the page, so that none of what they meet can take the server with it."""
+"""A few processes that compute for the page, and the messages that pass: JSON and arrays as they lie in memory.
+
+None of what such a process meets can take the server with it."""
 
 from __future__ import annotations
 
 import asyncio
 import contextlib
+import json
 import os
 import signal
 import struct
 import sys
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Mapping
 from types import TracebackType
+from typing import Any
 
+import numpy as np
+
+EDGE = 8  # bytes: where arrays of doubles may begin
+KINDS = {"f": "<f8", "i": "<i4", "u": "u1"}
 LONGEST = 180.0  # s of one answer, the first compilation of a law included
 ABANDONED = 5.0  # s that a worker may go on with what no one waits for: a compilation that ends by then is kept
 HEAD = struct.Struct("<I")  # of a request: its length
 ANSWER = struct.Struct("<?I")  # of what comes back: whether it is the answer, or word on the way; its length
 Tell = Callable[[bytes], Awaitable[None]]
 INTERRUPTIBLE = os.name == "posix"
+
+
+def frame(header: Mapping[str, Any], arrays: Mapping[str, Any] | None = None) -> bytes:
+    """Length of the header, the header, and the arrays that it names, each on an edge of eight bytes."""
+    kept = {name: np.ascontiguousarray(values) for name, values in (arrays or {}).items()}
+    kept = {name: values.astype(KINDS[values.dtype.kind], copy=False) for name, values in kept.items()}
+    table = [[name, KINDS[values.dtype.kind], values.size] for name, values in kept.items()]
+    text = json.dumps({**header, "arrays": table}, ensure_ascii=False, allow_nan=False).encode()
+    text += b" " * (-(len(text) + 4) % EDGE)
+    bodies = (values.tobytes() for values in kept.values())
+    return b"".join([struct.pack("<I", len(text)), text, *(body + bytes(-len(body) % EDGE) for body in bodies)])
+
+
+def unframed(message: bytes) -> tuple[dict[str, Any], dict[str, Any]]:
+    """The header and the arrays of a message, as the page reads them."""
+    (length,) = struct.unpack_from("<I", message)
+    header = json.loads(message[4 : 4 + length])
+    arrays, place = {}, 4 + length
+    for name, kind, size in header.pop("arrays"):
+        arrays[name] = np.frombuffer(message, kind, size, place)
+        place += arrays[name].nbytes + -arrays[name].nbytes % EDGE
+    return header, arrays
 
 
 class Worker:

@@ -12,8 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stickslip.errors import ModelError
-from stickslip.law.drive import Sampled
-from stickslip.law.stretch import Sensor, Stretch, attempted, remembered
+from stickslip.law.stretch import Sampled, Sensor, Stretch, attempted, remembered
 from stickslip.laws.rough import RoughSurface
 from stickslip.oscillator import Oscillator
 from stickslip.solve.sensitivity import sensitivity

@@ -12,9 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stickslip.errors import UNNAMED, EstimateError, ModelError, RecordError
-from stickslip.law.drive import DriveFrom, as_driven, measured_drive
 from stickslip.law.search import ABOVE, Knob, Point, Problem, Profile, descend
-from stickslip.law.stretch import Sensor, Stretch
+from stickslip.law.stretch import DriveFrom, Sensor, Stretch, as_driven, measured_drive
 from stickslip.oscillator import Oscillator
 from stickslip.parameters import find
 from stickslip.record.record import Record

@@ -1,4 +1,6 @@
-"""A stretch of a record as a fit of a law sees it: what each sensor read, and what it would have read of a motion."""
+"""A stretch of a record as a fit of a law sees it: what drove the rig, what each sensor read and would have read.
+
+The drive is the base's measured motion, or an applied force's, as one that the engine follows."""
 
 from __future__ import annotations
 
@@ -6,16 +8,19 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from stickslip.drives.kinds import Release
-from stickslip.errors import ModelError, SolveError
-from stickslip.law.drive import DriveFrom
+from stickslip.drives.kinds import Belt, Drive, HarmonicBase, MultiTone, Recorded, Release
+from stickslip.errors import EstimateError, ModelError, SolveError
+from stickslip.laws.coulomb import Coulomb
 from stickslip.oscillator import Oscillator
 from stickslip.record.channels import Channel
 from stickslip.record.record import Record
+from stickslip.signals.derivatives import LEAST, Filter, best_bandwidth
+from stickslip.signals.noise import noise_level, quantisation_step
 from stickslip.signals.response import Response, leak, resonance, respond
 from stickslip.solve.sensitivity import Sensitivity
 from stickslip.solve.simulate import simulate
@@ -23,12 +28,231 @@ from stickslip.solve.trajectory import Trajectory
 
 Array = NDArray[np.float64]
 
+DRIVES = {"z": "base", "force": "force"}  # channels of what moves the mass, and what each moves
+HARMONICS = 5
+AS_GOOD = 1.15  # times its noise that a sum of tones may stray from what was measured
+COARSE = (128, 64, 32, 16, 8, 4, 2)  # samples from knot to knot of a motion without tones, tried in turn
+NEAR = 0.3  # of its noise by which the knots may miss it
+DRIFT = 0.1  # of a tone: what a sensor may drift in a record; more of it is a motion
+SURE = 1e-9  # of a drive, that is never surer
 SENSED = {"x": "x", "v": "v", "a": "a", "friction": "friction", "load": "friction"}  # of a channel, in the run
 JUMPS = ("a", "friction")
 RTOL = 1e-9  # of curved laws
 JUMPED = 1e-6  # of the largest jump, below which one is rounding
 NODES = 3  # of the quadrature through a mount, which turns little between two samples
 GLIDE, HEAVY = 0.5, 1e9  # s and kg: a mass that slides on at a steady speed until the law has no memory of before
+
+
+class DriveFrom(Protocol):
+    """A drive from any instant of the record on; its measurement may be off in the ways of `unsure`."""
+
+    @property
+    def unsure(self) -> tuple[float, ...]:
+        """Standard deviation of each way in which the measured drive may be off."""
+
+    def __call__(self, begin: float, end: float, off: ArrayLike = ()) -> Drive:
+        """The drive whose time 0 is `begin` [s] on the record's clock."""
+
+
+@dataclass(frozen=True, eq=False)
+class Tones:
+    """``sum A cos(2 pi F t + phase)``, t on the record's clock; off by a share, an angle, and turns in the record."""
+
+    tones: tuple[tuple[float, float, float], ...]
+    on: str
+    contact: str
+    unsure: tuple[float, float, float]
+    middle: float
+    length: float
+
+    def __call__(self, begin: float, end: float, off: ArrayLike = ()) -> Drive:
+        """The drive whose time 0 is `begin`."""
+        share, angle, turns = np.asarray(off) if np.size(off) else (0.0, 0.0, 0.0)
+        slower = turns / self.length
+        moved = []
+        for order, (size, f, phase) in enumerate(self.tones, start=1):
+            then = phase + 2 * np.pi * (f * begin + order * slower * (begin - self.middle)) + order * angle
+            moved.append((size * (1 + share), f + order * slower, float(then % (2 * np.pi))))
+        if len(moved) == 1 and self.on == "base":
+            size, frequency, phase = moved[0]
+            return HarmonicBase(size, frequency=frequency, phase=phase, contact=self.contact)
+        return MultiTone(moved, on=self.on, contact=self.contact)
+
+
+@dataclass(frozen=True, eq=False)
+class Sampled:
+    """A motion of any shape, smoothed, at instants as dense as its bandwidth asks for."""
+
+    values: Array
+    fs: float
+    late: float
+    contact: str
+    unsure: tuple[float]
+
+    def coarser(self, share: float) -> Sampled:
+        """At fewer instants, a share of the motion's deviation away: each instant costs the engine a new start."""
+        knots, rate = _knots(self.values, self.fs, share * float(np.std(self.values)) / NEAR)
+        return replace(self, values=knots, fs=rate)
+
+    def __call__(self, begin: float, end: float, off: ArrayLike = ()) -> Drive:
+        """The drive whose time 0 is `begin`."""
+        share = float(np.sum(off))
+        from scipy.interpolate import CubicSpline
+
+        own = np.arange(len(self.values)) / self.fs - self.late
+        count = max(4, int(np.ceil((end - begin) * self.fs)) + 1)
+        step = max((end - begin) / (count - 1), 1e-12)
+        samples = (1 + share) * CubicSpline(own, self.values)(begin + step * np.arange(count + 1))
+        return Recorded(samples, fs=1 / step, contact=self.contact)
+
+
+def measured_drive(record: Record, given: Drive) -> DriveFrom:
+    """What moves the oscillator during a record, from any instant on.
+
+    The base's motion z, or the applied force, is a tone with its harmonics where these reach its noise; any other
+    motion of the base is smoothed and followed as it was recorded. A record of neither is driven as `given`.
+    """
+    channel = driving(record)
+    return Known(given) if channel is None else _driven(record, channel, getattr(given, "contact", "ground"))
+
+
+def driving(record: Record) -> str | None:
+    """The channel of what moves the mass: of the base's motion z, or of a force on it; None where neither changes."""
+    return next((name for name in DRIVES if name in record and np.ptp(record[name]) > 0), None)
+
+
+def as_driven(record: Record, given: Drive) -> Record:
+    """The record with the base's motion z that a known drive makes, where none was measured."""
+    if {"z", "force"} & set(record) or not given.motion().base:
+        return record
+    still = Oscillator(mass=1.0, stiffness=0.0, law=Coulomb(1.0), drive=given)
+    time = np.arange(len(record)) / record.fs
+    values, _ = simulate(still, duration=float(time[-1]) or 1.0, start={}).sample(time, ("z",))
+    return record.with_channel("z", values[0], unit="m")
+
+
+def face_of(given: Drive, record: Record) -> tuple[Array | float, Array | float]:
+    """Displacement and velocity of the counter-face at each row."""
+    if getattr(given, "contact", "ground") == "base" and "z" in record:
+        return record["z"], np.asarray(np.gradient(record["z"]) * record.fs, dtype=np.float64)
+    speed = given.speed if isinstance(given, Belt) else 0.0
+    return speed * np.arange(len(record), dtype=np.float64) / record.fs, speed
+
+
+def _driven(record: Record, channel: str, contact: str) -> DriveFrom:
+    on, values, late = DRIVES[channel], record[channel], record.channels[channel].delay
+    record.require_clean(channel, question="a fitted law", samples=LEAST)
+    stated = record.channels[channel].noise  # before the counts, which are in what is measured
+    noise = math.hypot(stated, quantisation_step(values) / 12**0.5) if stated else noise_level(values, record.fs)
+    time = np.arange(len(values)) / record.fs - late
+    tones = _tones(values, time, noise)
+    share = max(SURE, noise * np.sqrt(2 / len(values)))
+    if tones is not None:
+        share, length = share / tones[0][0], time[-1] - time[0]
+        unsure = (share, share, share * np.sqrt(12) / (2 * np.pi))
+        return Tones(tones, on, contact, unsure, float(time[0] + length / 2), length)
+    if on == "force":
+        raise EstimateError(
+            "an applied force that is no tone with harmonics",
+            "the force on the mass is periodic",
+            "cut the record to where it is, drive the base, or fit a curve of friction instead (fit_curve, --curve)",
+        )
+    bandwidth = best_bandwidth(values, record.fs)
+    smooth = Filter("smoother", record.fs, bandwidth).apply(values - values.mean(), {0: 1.0})
+    knots, rate = _knots(smooth, record.fs, noise)
+    return Sampled(knots, rate, late, contact, (share / (2**0.5 * float(np.std(values))),))
+
+
+def _knots(smooth: Array, fs: float, noise: float) -> tuple[Array, float]:
+    """As few instants as follow a smooth motion within a part of its noise, and their rate [Hz]."""
+    from scipy.interpolate import CubicSpline
+
+    time, allowed = np.arange(len(smooth)) / fs, max(NEAR * noise, 1e-6 * float(np.ptp(smooth)))
+    for step in COARSE:
+        at = np.linspace(0.0, time[-1], max(4, math.ceil(len(smooth) / step) + 1))
+        knots = np.interp(at, time, smooth)
+        if np.sqrt(np.mean((CubicSpline(at, knots)(time) - smooth) ** 2)) <= allowed:
+            return knots, (len(at) - 1) / float(time[-1])
+    return smooth, fs
+
+
+def _tones(values: Array, time: Array, noise: float) -> tuple[tuple[float, float, float], ...] | None:
+    """Amplitude, frequency and phase of a tone and as many harmonics as it needs; None where they do not suffice."""
+    from scipy.optimize import minimize_scalar
+
+    size, span = len(values), time[-1] - time[0]
+    centred = values - values.mean()
+    spectrum = np.abs(np.fft.rfft(centred * np.hanning(size), 4 * size))
+    coarse = float(np.argmax(spectrum)) / (4 * size) * size / span
+    if coarse * span < 1.0:
+        return None
+    allowed = max(AS_GOOD * noise, 1e-6 * float(np.ptp(values)))
+    for count in range(1, HARMONICS + 1):
+
+        def left(frequency: float, count: int = count) -> float:
+            return _fitted(values, time, frequency, count)[1]
+
+        best = minimize_scalar(
+            left, bounds=(coarse - 0.5 / span, coarse + 0.5 / span), method="bounded", options={"xatol": 1e-9 * coarse}
+        )
+        solution, rest = _fitted(values, time, float(best.x), count)
+        cosines, sines = solution[1:-1:2], solution[2:-1:2]
+        sizes, angles = np.hypot(cosines, sines), np.arctan2(-sines, cosines)
+        if rest <= allowed and abs(solution[-1]) <= DRIFT * sizes[0]:
+            return tuple(
+                (float(a), (j + 1) * float(best.x), float(p))
+                for j, (a, p) in enumerate(zip(sizes, angles, strict=True))
+            )
+    return None
+
+
+def _fitted(values: Array, time: Array, frequency: float, count: int) -> tuple[Array, float]:
+    waves = np.cumprod(np.tile(np.exp(2j * np.pi * frequency * time)[:, None], count), axis=1)
+    columns = np.ones((len(time), 2 * count + 2))
+    columns[:, 1:-1:2], columns[:, 2:-1:2] = waves.real, waves.imag
+    columns[:, -1] = np.linspace(-0.5, 0.5, len(time))
+    solution = np.linalg.solve(columns.T @ columns, columns.T @ values)
+    return np.asarray(solution), float(np.sqrt(np.mean((values - columns @ solution) ** 2)))
+
+
+@dataclass(frozen=True, eq=False)
+class Known:
+    """The oscillator's own drive, that nobody has measured."""
+
+    drive: Drive
+    unsure: tuple[float, ...] = ()
+
+    def __call__(self, begin: float, end: float, off: ArrayLike = ()) -> Drive:
+        """The drive whose time 0 is `begin`."""
+        return self.drive if begin == 0 else _Later(self.drive, begin)
+
+
+@dataclass(frozen=True, eq=False)
+class _Later:
+    """A drive that has gone on for `begin` seconds when the run starts."""
+
+    drive: Drive
+    begin: float
+
+    def motion(self) -> Any:
+        """The same signals from then on."""
+        motion = self.drive.motion()
+        if motion.knots is not None:
+            raise EstimateError(
+                "a drive with knots that starts before the record's first slide",
+                "a run begins with its drive",
+                "give the base's motion as channel z",
+            )
+        values = {name: motion.start[name] for name in motion.rates}
+        turned: dict[str, float] = {}
+        for cosine, sine, omega, phase in motion.tones:
+            angle = phase + omega * self.begin
+            turned |= {cosine: float(np.cos(angle)), sine: float(np.sin(angle))}
+        for name, rate in motion.rates.items():
+            if name not in turned:
+                values[name] += self.begin * rate.get("1", 0.0)
+        tones = tuple((c, s, w, phase + w * self.begin) for c, s, w, phase in motion.tones)
+        return replace(motion, start={**values, **turned}, tones=tones)
 
 
 class Motion:

@@ -15,11 +15,10 @@ from stickslip.balance.force import friction_force
 from stickslip.drives.kinds import Release
 from stickslip.errors import EstimateError
 from stickslip.estimate import NORMAL_95, Estimate
-from stickslip.law.drive import Sampled, as_driven, face_of
 from stickslip.law.search import Knob, Point, Problem, descend, rows_of
-from stickslip.law.standing import Evidence, Key, independent
 from stickslip.law.start import Shown, bounded, free_names, knob, nuisance_knobs, thinned
-from stickslip.law.stretch import Motion, Sensor, Stretch, attempted
+from stickslip.law.stretch import Motion, Sampled, Sensor, Stretch, as_driven, attempted, face_of
+from stickslip.law.verdict import Evidence, Key, independent
 from stickslip.laws.guessing import LEAST_EXCESS, STIFF, STIFFEST, Hypothesis, Observed
 from stickslip.oscillator import Oscillator
 from stickslip.record.record import Record
@@ -91,6 +90,8 @@ class Trial:
         """Whether friction is there before the contact has moved by a noticeable part of the smallest stroke."""
         law = self.law
         stroke, fastest = self.scales.min(axis=0)
+        if not hasattr(law, "kinetic"):
+            return False
         if hasattr(law, "stiffness"):
             return bool(law.kinetic < STIFF * stroke * law.stiffness)
         return hasattr(law, "rate") and bool(fastest < STIFF * stroke * law.rate * law.kinetic)

@@ -6,7 +6,8 @@ The laws that every room knows by name: those of the room's stub that carry a fo
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Mapping
+import itertools
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import MISSING, dataclass, fields
 from typing import Any, NamedTuple, Protocol
 
@@ -16,7 +17,6 @@ from numpy.typing import NDArray
 from stickslip import laws
 from stickslip.errors import ModelError
 from stickslip.parameters import declaration
-from stickslip.units import dimensions
 
 Array = NDArray[np.float64]
 
@@ -28,7 +28,7 @@ LITTLE = 0.01  # of the kinetic friction, by which the static one exceeds it at 
 FALLS = (0.01, 0.05)  # of the largest speed, within which a Stribeck curve falls
 STIFF = 1e-2  # of the smallest stroke, by which a contact gives way that counts as rigid where a rigid law does as well
 STIFFEST = 1e-4  # of the stroke: what a contact that is next to rigid gives way
-STARTS, DECADES = 32, 4.0  # of a law that does not guess: starts, and decades about its natural size for a parameter
+MOST_GUESSED = 24  # starts of a law that is asked by its units alone: each costs a simulation
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,6 +64,11 @@ class Observed:
     def fastest(self) -> float:
         """The largest speed [m/s]."""
         return float(np.abs(self.speed).max())
+
+    @property
+    def furthest(self) -> float:
+        """About how far it moves [m]."""
+        return self.fastest / self.frequency
 
     def left(self, modelled: Array) -> float:
         """Mean square of what a modelled friction leaves [N^2]."""
@@ -162,6 +167,56 @@ def required(law: type[Any]) -> int:
     return sum(field.default is MISSING for field in fields(law))
 
 
+def asked_for(law: type[Any]) -> tuple[Hypothesis, ...]:
+    """How records are asked for a law: as its class says, or by the units of its parameters."""
+    if hasattr(law, "hypotheses"):
+        said: tuple[Hypothesis, ...] = law.hypotheses()
+        return said
+    family = Family(law.__name__, f"that of the law {law.__name__}")
+    return (Hypothesis(law.__name__, family, functools.partial(_by_units, law)),)
+
+
+def _by_units(law: type[Any], seen: Observed) -> list[Any]:
+    """Laws whose values have the size of what was observed, of those that the class allows."""
+    choices = [[(own.name, value) for value in _sized(law, own, seen)] for own in fields(law) if own.default is MISSING]
+    return list(itertools.islice(_allowed(law, choices), MOST_GUESSED))
+
+
+def _allowed(law: type[Any], choices: list[list[tuple[str, float]]]) -> Iterator[Any]:
+    for chosen in itertools.product(*choices):
+        try:
+            yield law(**dict(chosen))
+        except ModelError:  # a static friction below the kinetic
+            continue
+
+
+def _sized(law: type[Any], parameter: Any, seen: Observed) -> tuple[float, ...]:
+    """Values to begin with, by a parameter's unit: forces about the level, the rest where a law's effects are felt."""
+    declared, level, fastest, furthest = declaration(parameter), seen.level, seen.fastest, seen.furthest
+    sizes = {
+        "N": (level, (1 + EXCESSES[1]) * level),
+        "m/s": tuple(part * fastest for part in SPEEDS),
+        "s/m": tuple(1 / (part * fastest) for part in SPEEDS),
+        "m": tuple(part * furthest for part in (STIFF, 0.1)),
+        "N/m": tuple(
+            level / (part * furthest) for part in (STIFF, 0.1, 10.0)
+        ),  # a contact's, or friction along the way
+        "N s/m": (LITTLE * level / fastest, 0.1 * level / fastest),
+        "s": tuple(part / seen.frequency for part in SPEEDS),
+        "1/s": tuple(seen.frequency / part for part in SPEEDS),
+        "kg": (seen.mass,),
+        "1": (1.0, EXCESSES[1]),
+    }
+    if declared.unit not in sizes or declared.size != "number":
+        raise ModelError(
+            f"{law.__name__} of which no {parameter.name} is known",
+            "records tell where to begin with a number in N, m, s, kg or of these",
+            "give the law with its values",
+        )
+    values = sizes[declared.unit]
+    return (*values, *(-value for value in values)) if declared.signed else values
+
+
 def hypotheses() -> dict[str, Hypothesis]:
     """What records are asked to choose from, by name: rigid contacts, then others, the simplest of both first."""
     known = [
@@ -170,36 +225,26 @@ def hypotheses() -> dict[str, Hypothesis]:
     return {kind.name: kind for kind in sorted(known, key=lambda kind: kind.family is not RIGID)}
 
 
-def family_of(name: str) -> Family:
-    """The family of a law by its name; one that is no hypothesis is its own."""
-    known = hypotheses().get(name)
-    return known.family if known else Family(name, f"that of the law {name}")
-
-
 def hypothesis_of(law: Any) -> Hypothesis:
-    """As what a law is tried: by its name, its class, or an instance with the values to start from.
+    """How records are asked for a law: by the name of a hypothesis or of a law, by a class, or by one with values.
 
     Raises
     ------
     ModelError
-        No law has that name, or it is none.
-
-    Examples
-    --------
-    >>> [hypothesis_of(law).name for law in ("state-variable", laws.Dahl, laws.Coulomb(1.0, static=1.2))]
-    ['state variable', 'Dahl', 'static']
+        No law has that name.
     """
-    named = _named(law) if isinstance(law, str) else law
-    if isinstance(named, Hypothesis):
-        return named
-    kind: type[Any] = named if isinstance(named, type) else type(named)
+    if isinstance(law, str):
+        named = {_plain(name): kind for name, kind in hypotheses().items()}
+        named = {_plain(name): asked_for(kind)[0] for name, kind in registered().items()} | named
+        if _plain(law) not in named:
+            choices = ", ".join(dict.fromkeys([*hypotheses(), *registered()]))
+            raise ModelError(f"law '{law}'", f"laws are {choices}", "choose among these, or give a law")
+        return named[_plain(law)]
+    kind = law if isinstance(law, type) else type(law)
     if not (hasattr(kind, "modes") or hasattr(kind, "rates")):
-        raise ModelError(f"law {law!r}", "a law has modes() or rates()", "give a law, its class or its name")
-    own: tuple[Hypothesis, ...] = kind.hypotheses() if hasattr(kind, "hypotheses") else ()
-    fitting = [one for one in own if isinstance(law, str | type) or one.holds(law)]
-    if fitting:
-        return fitting[0] if isinstance(law, str | type) else fitting[-1]
-    return Hypothesis(kind.__name__, family_of(kind.__name__), functools.partial(declared_guesses, kind))
+        raise ModelError(f"law {law!r}", "a law has modes or rates", "give a law's name, its class, or one with values")
+    held = [hypothesis for hypothesis in asked_for(kind) if law is kind or hypothesis.holds(law)]
+    return held[0] if law is kind else held[-1]
 
 
 def contained(kind: Hypothesis) -> set[str]:
@@ -209,66 +254,11 @@ def contained(kind: Hypothesis) -> set[str]:
     return own.union(*(contained(known[name]) for name in own))
 
 
-def _named(name: str) -> Any:
-    """A law as it is called among the hypotheses, or in the register."""
-    known: dict[str, Any] = {**registered(), **hypotheses()}
-    plain = {_plain(one): one for one in known}
-    if _plain(name) not in plain:
-        raise ModelError(
-            f"law '{name}'",
-            f"laws are {', '.join([*hypotheses(), *(one for one in registered() if one not in hypotheses())])}",
-            "choose among these, or give a law",
-        )
-    return known[plain[_plain(name)]]
-
-
 def _plain(name: str) -> str:
-    return name.lower().replace("-", "").replace("_", "").replace(" ", "")
+    return name.strip().lower().replace("-", "").replace("_", "").replace(" ", "")
 
 
-def declared_guesses(law: type[Any], seen: Observed) -> list[Any]:
-    """Where the search for a law begins that says no more of its parameters than their units.
-
-    Every unit is made of a force, a length and a time, and the friction has one of each: its level, the way and the
-    time of the motion. Forces begin at the level; all else is spread about that natural size, together (an additive
-    recurrence in the logarithms), since ever so many values of each would be ever so many starts.
-
-    Raises
-    ------
-    ModelError
-        A parameter that must be given is no number with a unit.
-    """
-    asked = {own.name: declaration(own) for own in fields(law) if own.default is MISSING}
-    if strange := [name for name, one in asked.items() if not one.unit or one.size != "number"]:
-        raise ModelError(
-            f"{law.__name__} without values",
-            f"its {' and '.join(strange)} can not be guessed from a record",
-            "give the law with its values",
-        )
-    sizes = {name: natural_size(one.unit, seen) for name, one in asked.items()}
-    spread = [name for name, one in asked.items() if one.unit != "N"]
-    golden = _golden(len(spread))
-    guesses = []
-    for number in range(STARTS if spread else 1):
-        places = (0.5 + number * golden ** -np.arange(1.0, len(spread) + 1)) % 1
-        factors = dict(zip(spread, 10 ** (DECADES * (places - 0.5)), strict=True))
-        try:
-            guesses.append(law(**{name: float(size * factors.get(name, 1.0)) for name, size in sizes.items()}))
-        except ModelError:  # values that the law itself does not allow together
-            continue
-    return guesses
-
-
-def natural_size(unit: str, seen: Observed) -> float:
-    """What a quantity is when measured by the friction's level, the way and the time of the motion."""
-    mass, length, time = dimensions(unit)
-    way, while_ = seen.fastest / seen.frequency, 1 / seen.frequency
-    return float((seen.level * while_**2 / way) ** mass * way**length * while_**time)
-
-
-def _golden(count: int) -> float:
-    """The root of ``g^(count + 1) = g + 1``, whose powers step evenly through so many dimensions."""
-    root = 2.0
-    for _ in range(30):
-        root = (1 + root) ** (1 / (count + 1))
-    return root
+def family_of(name: str) -> Family:
+    """The family of a law by its name; one that is no hypothesis is its own."""
+    known = hypotheses().get(name)
+    return known.family if known else Family(name, f"that of the law {name}")

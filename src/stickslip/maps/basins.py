@@ -15,15 +15,14 @@ from numpy.typing import ArrayLike, NDArray
 
 from stickslip.errors import ModelError, SolveError
 from stickslip.estimate import Doubt, Estimate, Status
+from stickslip.oscillator import Structure
 from stickslip.parameters import PARTS
 from stickslip.record.metadata import labelled_arrays
-from stickslip.solve.orbit import SteadyState, alike
 from stickslip.solve.periodic import steady_state
-from stickslip.solve.poincare import Table, extent, lap, tables
+from stickslip.solve.poincare import SteadyState, Table, alike, extent, lap, tables
 from stickslip.solve.simulate import opening
 from stickslip.solve.tables import Array, System
 from stickslip.solve.trajectory import Trajectory
-from stickslip.structure import Structure
 
 if TYPE_CHECKING:
     import xarray as xr

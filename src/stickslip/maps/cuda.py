@@ -11,8 +11,7 @@ from numba import cuda
 from numba.cuda.cudadrv.driver import CudaAPIError
 
 from stickslip.errors import ModelError, SolveError
-from stickslip.maps.block import run_block
-from stickslip.maps.crowd import rooms
+from stickslip.maps.crowd import rooms, run_block
 from stickslip.maps.measures import LOG
 from stickslip.maps.plan import Keep, Plan
 from stickslip.maps.watch import Counted, Given, watch_one

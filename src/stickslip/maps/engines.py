@@ -15,7 +15,7 @@ from logging import CRITICAL
 from typing import TYPE_CHECKING, Any
 
 from stickslip.errors import ModelError, SolveError
-from stickslip.maps.block import run_block
+from stickslip.maps.crowd import run_block
 from stickslip.maps.plan import Keep, Plan, required
 from stickslip.workers import processors, unheard
 

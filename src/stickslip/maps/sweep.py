@@ -22,12 +22,11 @@ from stickslip.maps.grid import Grid, apart, read_grid
 from stickslip.maps.measures import EVENTS, FAILED, REPEATS, Measure, Variable, read_measures, variables
 from stickslip.maps.plan import BLOCK, Arrays, Keep, Plan, assemble, blank, chunked, required
 from stickslip.maps.store import Store
-from stickslip.oscillator import Oscillator
+from stickslip.oscillator import Oscillator, Structure
 from stickslip.solve.poincare import BATCHES, tables
 from stickslip.solve.refusal import Endless
 from stickslip.solve.simulate import opening, simulate
 from stickslip.solve.tables import System
-from stickslip.structure import Structure
 
 if TYPE_CHECKING:
     from rich.console import Console

@@ -19,10 +19,10 @@ from numpy.typing import NDArray
 from stickslip.errors import RecordError
 from stickslip.record.channels import Channel
 from stickslip.record.clock import Clock, fit_clock
-from stickslip.record.log import Log
 from stickslip.record.metadata import (
     KEY,
     Digests,
+    Log,
     labelled_arrays,
     parse_metadata,
     require_version,

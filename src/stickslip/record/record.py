@@ -17,7 +17,7 @@ from stickslip.printing import html_table
 from stickslip.record import metadata
 from stickslip.record.channels import VOCABULARY, Channel, checked_name, described
 from stickslip.record.check import Fault, clock_cure, cure, find_faults
-from stickslip.record.log import Log
+from stickslip.record.metadata import Log
 from stickslip.units import parse_unit
 
 if TYPE_CHECKING:

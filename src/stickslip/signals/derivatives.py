@@ -1,24 +1,30 @@
-"""Velocity and acceleration from a noisy displacement, without delay, with the frequency response known.
+"""Velocity and acceleration from a noisy displacement, and filters: all without delay, with the response known.
 
-Two methods. The thesis's: a central difference followed by a five-point average (Appendix A). The better one: a
-smoothing spline on the samples, as wide as the record's own noise asks, followed by a five-point difference.
+Two methods of differentiation. The thesis's: a central difference followed by a five-point average (Appendix A). The
+better one: a smoothing spline on the samples, as wide as the record's own noise asks, followed by a five-point
+difference. The filters keep a band, take a mode out, or take a trend off; each is told in the history.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from stickslip.errors import EstimateError
+from stickslip.errors import EstimateError, RecordError
+from stickslip.record.record import Record, Step, require_record
 from stickslip.signals.noise import ROUGHNESS, checked_samples, end_modes, local_noise, penalised
 from stickslip.units import parse_value
 
 Array = NDArray[np.float64]
+
+ORDER = 4  # of Butterworth's filter, which runs forward and back: the gain at an edge is one half
+SETTLES = 3  # periods of the lowest edge that a record must last
+MOST_DEGREE = 6
 Method = Literal["smoother", "five-point"]
 METHODS: tuple[Method, ...] = ("smoother", "five-point")
 LEAST = 24  # samples
@@ -29,6 +35,160 @@ _DIFFERENCE = {  # five-point differences, exact for polynomials of degree four
     2: np.array([-1.0, 16.0, -30.0, 16.0, -1.0]) / 12,
 }
 _BEYOND = np.array([[6.0, -8.0, 3.0], [3.0, -3.0, 1.0]])  # two samples before the first three, on their parabola
+
+
+def keep_band(
+    record: Record, *, low: float | None = None, high: float | None = None, channels: Iterable[str] | None = None
+) -> Record:
+    r"""Keep what lies between two frequencies.
+
+    Butterworth's filter of fourth order forward and back (zero phase): the gain is :math:`1/(1 + (f/f_c)^8)` beside an
+    edge :math:`f_c`, one half at it. All channels are filtered alike unless some are named, so that forces still
+    balance between them.
+
+    Parameters
+    ----------
+    record : Record
+        With one clock.
+    low, high : float, optional
+        Edges of the band [Hz]; one that is left out is open.
+    channels : iterable of str, optional
+        Which ones; all where left out.
+
+    Returns
+    -------
+    Record
+        Its first and last periods of the lower edge hold the filter's settling.
+
+    Raises
+    ------
+    RecordError
+        No edge, edges out of order or beyond half the sampling rate, a record shorter than three periods of the lower
+        edge, or values that are not numbers.
+
+    Examples
+    --------
+    >>> t = np.arange(2000) / 1000
+    >>> record = Record.of({"x": np.sin(2 * np.pi * 5 * t) + np.sin(2 * np.pi * 100 * t)}, fs=1000)
+    >>> kept = keep_band(record, high=20)["x"][300:-300]
+    >>> bool(np.abs(kept - np.sin(2 * np.pi * 5 * t)[300:-300]).max() < 1e-3)
+    True
+    """
+    edges = [edge for edge in (low, high) if edge is not None]
+    if not edges or not all(0 < edge < record.fs / 2 for edge in edges) or (len(edges) == 2 and edges[0] >= edges[1]):
+        raise RecordError(
+            f"a band from {low} to {high} Hz of a record at {record.fs:g} Hz",
+            "edges lie between 0 and half the sampling rate, the lower first",
+            "state low=, high= or both, in Hz",
+        )
+    kind = "bandpass" if len(edges) == 2 else "highpass" if high is None else "lowpass"
+    between = " to ".join(f"{edge:g}" for edge in edges)
+    below, above = (f"kept below {high:g} Hz" if high else ""), (f"kept above {low:g} Hz" if low else "")
+    outcome = {"bandpass": f"kept {between} Hz", "highpass": above, "lowpass": below}[kind]
+    return _passed(record, channels, edges, kind, Step("keep_band", {"low": low, "high": high}, outcome))
+
+
+def remove_mode(
+    record: Record, *, frequency: float, width: float = 0.2, channels: Iterable[str] | None = None
+) -> Record:
+    """Take out one mode of vibration: what lies about its frequency, as the ringing of a mount or of a frame.
+
+    Parameters
+    ----------
+    record : Record
+        With one clock.
+    frequency : float
+        Of the mode [Hz].
+    width : float
+        How wide a band is taken out, over its frequency.
+    channels : iterable of str, optional
+        Which ones; all where left out.
+
+    Returns
+    -------
+    Record
+
+    Raises
+    ------
+    RecordError
+        A band that does not lie between 0 and half the sampling rate, or as of :func:`keep_band`.
+
+    Examples
+    --------
+    >>> t = np.arange(4000) / 1000
+    >>> slow, ringing = np.sin(2 * np.pi * 2 * t), 0.3 * np.sin(2 * np.pi * 60 * t)
+    >>> record = remove_mode(Record.of({"x": slow + ringing}, fs=1000), frequency=60)
+    >>> bool(np.abs(record["x"] - slow)[300:-300].max() < 1e-3), record.history[-1].outcome
+    (True, 'taken out 54 to 66 Hz')
+    """
+    edges = [frequency * (1 - width / 2), frequency * (1 + width / 2)]
+    if not (0 < width < 2 and edges[0] > 0 and edges[1] < record.fs / 2):
+        raise RecordError(
+            f"a mode at {frequency:g} Hz, {width:g} of it wide, at {record.fs:g} Hz",
+            "its band lies between 0 and half the sampling rate",
+            "correct the frequency [Hz] or width=",
+        )
+    outcome = f"taken out {edges[0]:g} to {edges[1]:g} Hz"
+    step = Step("remove_mode", {"frequency": frequency, "width": width}, outcome)
+    return _passed(record, channels, edges, "bandstop", step)
+
+
+def remove_trend(record: Record, *channels: str, degree: int = 1) -> Record:
+    """Take off a straight line (degree 0: the mean; up to 6) fitted to all samples by least squares.
+
+    What oscillates over few periods bends such a line: :func:`remove_drift` looks at means over whole periods.
+
+    Parameters
+    ----------
+    record : Record
+        With one clock.
+    *channels : str
+        Which ones; all where none is named.
+    degree : int
+        Of the polynomial.
+
+    Returns
+    -------
+    Record
+
+    Raises
+    ------
+    RecordError
+        A degree outside 0 to 6, or values that are not numbers.
+
+    Examples
+    --------
+    >>> record = remove_trend(Record.of({"load": [3.0, 4.0, 5.0, 6.0]}, fs=10.0))
+    >>> bool(np.abs(record["load"]).max() < 1e-12), record.history[-1].action
+    (True, 'remove_trend')
+    """
+    if not 0 <= degree <= MOST_DEGREE:
+        raise RecordError(f"degree = {degree}", f"a trend is a polynomial of degree 0 to {MOST_DEGREE}", "choose one")
+    names = _named(record, channels, "remove_trend", degree + 2)
+    rows = np.linspace(-1, 1, len(record))
+    off = {n: np.polynomial.Polynomial.fit(rows, record[n], degree)(rows) for n in names}
+    step = Step("remove_trend", {"channels": names, "degree": degree}, f"a polynomial of degree {degree} taken off")
+    return record.with_samples({**record.samples, **{n: record[n] - off[n] for n in names}}, step)
+
+
+def _named(record: Record, channels: Iterable[str] | None, asker: str, samples: int) -> list[str]:
+    require_record(record)
+    names = list(channels or record)
+    record.require_clean(*names, question=asker, samples=samples)
+    return names
+
+
+def _passed(record: Record, channels: Iterable[str] | None, edges: list[float], kind: str, step: Step) -> Record:
+    """Some channels, run through Butterworth's filter forward and back."""
+    from scipy.signal import butter, sosfiltfilt
+
+    names = _named(record, channels, step.action, int(np.ceil(SETTLES * record.fs / edges[0])) + 1)
+    sections = butter(ORDER, edges if len(edges) > 1 else edges[0], kind, fs=record.fs, output="sos")
+    most = len(record) - 1
+    settle = min(most, int(SETTLES * record.fs / edges[0]))
+    through: dict[str, Array] = {n: sosfiltfilt(sections, record[n], padlen=settle) for n in names}
+    described = Step(step.action, {**step.arguments, "channels": names}, step.outcome)
+    return record.with_samples({**record.samples, **through}, described, filtered=True)
 
 
 @dataclass(frozen=True)

@@ -1,19 +1,18 @@
-"""Values between samples, and in place of lost ones: band-limited where samples exist, autoregressive where not.
-
-Channels that lag what they measure: the stated delays taken out, before anything compares one with another.
-"""
+"""Channels between their samples, and two instruments on one clock, by the motion that both saw."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from stickslip.errors import RecordError
+from stickslip.errors import EstimateError, RecordError
+from stickslip.estimate import Estimate, Status
 from stickslip.record.flaws import runs_of
 from stickslip.record.record import Record, Step
+from stickslip.statistics import least_squares, student
 
 Array = NDArray[np.float64]
 
@@ -22,6 +21,12 @@ KAISER = 9.0  # window parameter: stop band below -90 dB
 SAME = 1e-9  # samples: distances that differ by less are one
 BLOCK = 4096  # samples found at a time
 ORDER = 32  # of the autoregression that bridges lost samples
+WIDTH = 3.0  # standard deviation of the smoothing kernel, in samples of the slower instrument
+REACH = 5.0  # the kernel's half length, in standard deviations: 1e-5 of its weight lies beyond
+LEAST_POWER = 0.05  # of the motion's mean power that an overlap must hold
+LEAST_OVERLAP = 0.25  # share of the shorter record that must lie within the other
+ALIKE = 0.9  # correlation from which two channels are taken to have seen one motion
+DERIVATIVE = {"m": ("m/s", 0), "m/s": ("m/s", 1), "rad": ("rad/s", 0), "rad/s": ("rad/s", 1)}
 
 
 def band_limited(values: Array, times: Array, *, cutoff: float = 1.0) -> Array:
@@ -233,3 +238,318 @@ def without_delays(record: Record, *channels: str, question: str = "taking delay
     result = record.with_samples(moved, step, start=record.start + first / record.fs)
     punctual = {name: replace(record.channels[name], delay=0.0) for name in delays}
     return replace(result, channels={**record.channels, **punctual})
+
+
+def clock_offset(a: Record, b: Record, *, on: str | tuple[str, str] | None = None) -> Estimate:
+    """How many seconds must be added to b's clock for it to agree with a's?
+
+    Both channels are smoothed by one Gaussian kernel, wide enough that neither rate matters any more, and a
+    displacement is differentiated by that kernel's derivative where the other instrument has the velocity. The
+    correlation over all lags gives a first offset; least squares of ``A(t) = g B(t - offset) + c`` refines it.
+    Smoothed signals are interpolated without losing noise between samples, so that nothing pulls the offset towards
+    half samples. The interval allows for correlated residuals.
+
+    Parameters
+    ----------
+    a, b : Record
+        Two records of one run, each with its own rate and start.
+    on : str or (str, str), optional
+        The channel both have, or a's and b's names for it: a displacement, a velocity, or one of each. Where left
+        out, x or v: of both, or one of each.
+
+    Returns
+    -------
+    Estimate
+        In seconds. Its checks hold residual, gain and the ratio of the rates; its status says if the motion repeats
+        so that other offsets fit as well, or if the clocks run at different rates.
+
+    Raises
+    ------
+    EstimateError
+        The channels do not look like one motion, or overlap too little.
+
+    Examples
+    --------
+    >>> t = np.arange(4000) / 1000
+    >>> a = Record.of({"x": np.sin(9 * t) + np.sin(23 * t)}, fs=1000.0)
+    >>> b = Record.of({"x": np.sin(9 * t + 0.9) + np.sin(23 * t + 2.3)}, fs=1000.0)
+    >>> round(clock_offset(a, b).value, 6)
+    0.1
+    """
+    return _match(a, b, on)[0]
+
+
+def clock_rate(a: Record, b: Record, *, on: str | tuple[str, str] | None = None) -> Estimate:
+    """How many seconds of a's clock pass in one second of b's?
+
+    The stretch between the two smoothed motions by least squares, about the middle of b's record.
+
+    Parameters
+    ----------
+    a, b : Record
+    on : str or (str, str), optional
+        As for :func:`clock_offset`, which tells where the rates differ.
+
+    Returns
+    -------
+    Estimate
+        Without unit; 1 for clocks of one rate.
+
+    Raises
+    ------
+    EstimateError
+        The channels do not look like one motion, or overlap too little.
+
+    Examples
+    --------
+    >>> t = np.arange(4000) / 1000
+    >>> a, b = (Record.of({"x": np.sin(9 * s) + np.sin(23 * s)}, fs=1000.0) for s in (t, 1.001 * t))
+    >>> round(clock_rate(a, b).value, 4)
+    1.001
+    """
+    return _match(a, b, on)[1]
+
+
+def synchronise(
+    a: Record,
+    b: Record,
+    *,
+    on: str | tuple[str, str] | None = None,
+    offset: float | Estimate | None = None,
+    rate: float | Estimate = 1.0,
+) -> Record:
+    """Bring b's channels onto a's clock: one record, over the time that both recorded.
+
+    Parameters
+    ----------
+    a, b : Record
+        Two records of one run; a's clock is kept.
+    on : str or (str, str), optional
+        The channels that saw the same motion, see :func:`clock_offset`.
+    offset : float or Estimate, optional
+        Seconds to add to b's clock; found with :func:`clock_offset` where left out.
+    rate : float or Estimate
+        Seconds of a's clock in one of b's, about the middle of b's record; see :func:`clock_rate`.
+
+    Returns
+    -------
+    Record
+        a's channels, and b's interpolated band-limited (b's name with ``_b`` behind where a has that name too).
+
+    Raises
+    ------
+    EstimateError
+        No offset can be found.
+    RecordError
+        The records do not overlap.
+
+    Examples
+    --------
+    >>> t = np.arange(4000) / 1000
+    >>> a = Record.of({"x": np.sin(9 * t) + np.sin(23 * t)}, fs=1000.0)
+    >>> b = Record.of({"v": 9 * np.cos(9 * t + 0.9) + 23 * np.cos(23 * t + 2.3)}, fs=1000.0)
+    >>> sorted(synchronise(a, b))
+    ['v', 'x']
+    """
+    a.require_clean(*a, question="synchronise")
+    b.require_clean(*b, question="synchronise")
+    names = _shared_motion(a, b, on) if offset is None or on is not None else None
+    estimate = clock_offset(a, b, on=names) if offset is None else offset
+    seconds = estimate.value if isinstance(estimate, Estimate) else float(estimate)
+    ratio = rate.value if isinstance(rate, Estimate) else float(rate)
+    middle = float(b.time[0]) + 0.5 * b.duration
+    rows = ((a.time - seconds - middle) / ratio + middle - b.start) * b.fs
+    shared = np.flatnonzero((rows >= 0) & (rows <= len(b) - 1))
+    if len(shared) < 2:
+        raise RecordError(
+            f"the records do not overlap with an offset of {seconds:g} s",
+            "only time that both recorded can be shared",
+            "check offset= and the records' starts",
+        )
+    part = a.rows(int(shared[0]), int(shared[-1]) + 1)
+    samples, channels = dict(part.samples), dict(a.channels)
+    cutoff = min(1.0, 0.9 * a.fs / b.fs)
+    for name in b:
+        mine = f"{name}_b" if name in samples else name
+        samples[mine] = band_limited(b[name], rows[shared], cutoff=cutoff)
+        channels[mine] = replace(b.channels[name], name=mine, noise=None)  # the filter took part of it
+    interval = list(estimate.interval) if isinstance(estimate, Estimate) else [seconds, seconds]
+    known = f"found on {' and '.join(dict.fromkeys(names))}" if names and offset is None else "given"
+    outcome = (
+        f"b's clock moved by {seconds:.6g} s ({known}; 95 %: {interval[0]:.6g} to {interval[1]:.6g}), "
+        f"{len(b)} samples at {b.fs:g} Hz interpolated onto {len(shared)} at {a.fs:g} Hz"
+    )
+    if isinstance(estimate, Estimate) and estimate.status != "ok":
+        outcome += f"; {estimate.status}"
+    step = Step("synchronise", {"on": names, "offset": seconds, "offset_interval": interval, "rate": ratio}, outcome)
+    theirs = tuple(Step(s.action, {**s.arguments, "record": "b"}, s.outcome) for s in b.history)
+    history, truth = (*part.history, *theirs, step), {**b.truth, **a.truth}
+    return Record(samples, channels, a.fs, part.start, history, None, truth, part.rig, a.log or b.log)
+
+
+def _shared_motion(a: Record, b: Record, on: str | tuple[str, str] | None) -> tuple[str, str]:
+    """The names of the motion that both saw, a's and b's."""
+    if on is not None:
+        return (on, on) if isinstance(on, str) else on
+    for names in (("x", "x"), ("v", "v"), ("x", "v"), ("v", "x")):
+        if names[0] in a and names[1] in b:
+            return names
+    raise RecordError(
+        f"the records have {', '.join(a)} and {', '.join(b)}",
+        "clocks are compared by a motion x or v that both recorded",
+        'name the channels that saw the same motion, a\'s and b\'s: on=("x", "plate")',
+    )
+
+
+def _match(a: Record, b: Record, on: str | tuple[str, str] | None) -> tuple[Estimate, Estimate]:
+    """Offset and rate of b's clock against a's."""
+    names = _shared_motion(a, b, on)
+    a.require_clean(names[0], question="clock_offset", samples=64)
+    b.require_clean(names[1], question="clock_offset", samples=64)
+    orders = _orders(a.channels[names[0]].unit, b.channels[names[1]].unit)
+    width = WIDTH / min(a.fs, b.fs)
+    mine, theirs = _smoothed(a, names[0], width, orders[0]), _smoothed(b, names[1], width, orders[1])
+    first, alike, others = _coarse(mine, theirs)
+    if alike < ALIKE:
+        raise EstimateError(
+            f"{names[0]} and {names[1]} correlate by {alike:.2f} at best",
+            f"two instruments on one motion correlate by {ALIKE} and more",
+            "name the channels that saw the same motion in on=, or pass offset= in seconds",
+        )
+    return _refined(mine, theirs, first, others)
+
+
+def _orders(unit_a: str, unit_b: str) -> tuple[int, int]:
+    """How often each channel is differentiated, so that both are the same quantity."""
+    if unit_a == unit_b:
+        return 0, 0
+    if unit_a in DERIVATIVE and unit_b in DERIVATIVE and DERIVATIVE[unit_a][0] == DERIVATIVE[unit_b][0]:
+        return 1 - DERIVATIVE[unit_a][1], 1 - DERIVATIVE[unit_b][1]
+    raise RecordError(
+        f"the channels are in {unit_a} and {unit_b}",
+        "the shared motion is one quantity, or a displacement and its velocity",
+        "name such channels in on=",
+    )
+
+
+@dataclass(frozen=True)
+class _Motion:
+    time: Array
+    values: Array
+
+    @property
+    def step(self) -> float:
+        return float(self.time[-1] - self.time[0]) / (len(self.time) - 1)
+
+
+def _smoothed(record: Record, name: str, width: float, order: int) -> _Motion:
+    """The channel, or its derivative, under a Gaussian kernel of `width` [s], without the ends it can not reach."""
+    from scipy.signal import oaconvolve
+
+    half = int(np.ceil(REACH * width * record.fs))
+    if len(record) < 4 * half:
+        raise EstimateError(
+            f"{len(record)} samples of {name}", f"an offset needs {4 * half} at this rate", "give a longer record"
+        )
+    along = np.arange(-half, half + 1) / record.fs
+    kernel = np.exp(-0.5 * (along / width) ** 2)
+    kernel /= kernel.sum()
+    if order:
+        kernel *= along / np.sum(kernel * along**2)
+    inside = slice(half, len(record) - half)
+    # removing the mean first leaves the convolution's rounding at the scale of the motion
+    mean = float(np.mean(record[name]))
+    values = oaconvolve(record[name] - mean, kernel[::-1], "valid") + (0.0 if order else mean)
+    return _Motion(np.asarray(record.time[inside]), values)
+
+
+def _coarse(a: _Motion, b: _Motion) -> tuple[float, float, list[float]]:
+    """Offset of the highest correlation, that correlation, and other offsets that correlate about as well.
+
+    Among nearly equal peaks, as a periodic motion has, the one with the longest overlap is taken.
+    """
+    from scipy.signal import correlate, find_peaks
+
+    grid = np.arange(b.time[0], b.time[-1], a.step)
+    x, y = a.values - a.values.mean(), np.interp(grid, b.time, b.values)
+    y -= y.mean()
+    one_x, one_y = np.ones_like(x), np.ones_like(y)
+
+    def sums(first: Array, second: Array) -> Array:
+        return np.asarray(correlate(first, second, "full", method="fft"), dtype=float)
+
+    count = np.maximum(np.round(sums(one_x, one_y)), 1)
+    sum_x, sum_y = sums(x, one_y), sums(one_x, y)
+    power_x, power_y = sums(x**2, one_y) - sum_x**2 / count, sums(one_x, y**2) - sum_y**2 / count
+    # where one of them hardly moves within the overlap, correlation says nothing
+    usable = (count >= LEAST_OVERLAP * min(len(x), len(y))) & (power_x > LEAST_POWER * count * np.mean(x**2))
+    usable &= power_y > LEAST_POWER * count * np.mean(y**2)
+    power = np.sqrt(np.where(usable, power_x * power_y, 1.0))
+    likeness = np.where(usable, (sums(x, y) - sum_x * sum_y / count) / power, 0.0)
+    best = int(np.argmax(likeness))
+    peaks = np.unique(np.append(find_peaks(likeness)[0], best))
+    near = peaks[likeness[peaks] > likeness[best] - max(0.002, 0.2 * (1 - likeness[best]))]
+    chosen = near[np.argmax(count[near])]
+    offsets = (np.arange(len(likeness)) - (len(y) - 1)) * a.step + (a.time[0] - grid[0])
+    return float(offsets[chosen]), float(likeness[chosen]), [float(offsets[k]) for k in near if k != chosen]
+
+
+def _refined(a: _Motion, b: _Motion, first: float, others: list[float]) -> tuple[Estimate, Estimate]:
+    from scipy.interpolate import CubicSpline
+
+    motion = CubicSpline(b.time, b.values)
+
+    def linearised(offset: float) -> tuple[Array, Array, Array]:
+        """Derivatives of ``g B(t - offset) + c`` by g, c and g offset; the data; the time about b's middle."""
+        inside = (a.time - offset >= b.time[0]) & (a.time - offset <= b.time[-1])
+        at = a.time[inside] - offset
+        design = np.column_stack([motion(at), np.ones_like(at), -motion(at, 1)])
+        return design, a.values[inside], at - 0.5 * (b.time[0] + b.time[-1])
+
+    offset = first
+    for _ in range(50):
+        design, data, along = linearised(offset)
+        (gain, _, shift), *_ = np.linalg.lstsq(design, data, rcond=None)
+        offset += float(np.clip(shift / gain, -2 * a.step, 2 * a.step))
+        if abs(shift / gain) < 1e-10:
+            break
+    design, data, along = linearised(offset)
+    fit = least_squares(design, data)
+    gain, residual = float(fit.coefficients[0]), fit.residual
+    estimate = Estimate.normal(
+        "clock offset",
+        offset,
+        sd=float(fit.sd[2]) / abs(gain),
+        quantile=student(float(fit.freedom[2])),
+        unit="s",
+        method="least squares between the smoothed motions",
+    )
+    stretch = least_squares(np.column_stack([design, design[:, 2] * along]), data)
+    rate = Estimate.normal(
+        "clock rate ratio",
+        1 + float(stretch.coefficients[3]) / gain,
+        sd=float(stretch.sd[3]) / abs(gain),
+        unit="1",
+        quantile=student(float(stretch.freedom[3])),
+        method="least squares of the stretch between the smoothed motions",
+    )
+    rest = float(np.std(residual) / np.std(data))
+    return _judged(estimate, gain, rest, rate, len(data) * a.step, others), rate
+
+
+def _judged(
+    offset: Estimate, gain: float, rest: float, rate: Estimate, overlap: float, others: list[float]
+) -> Estimate:
+    """The offset with what was checked, and in words why it may be wrong."""
+    doubts = []
+    if others:
+        nearest = ", ".join(f"{other:.4g} s" for other in sorted(others, key=abs)[:3])
+        doubts.append(f"the motion repeats: {nearest} fit about as well, and the longest overlap was taken")
+    if not rate.includes(1.0) and abs(rate.value - 1) * overlap > 4 * offset.sd:
+        doubts.append(f"the clocks run at different rates, {rate.value:.6f} to 1: pass rate=clock_rate(a, b)")
+    checks = (
+        f"residual {100 * rest:.2g} % of the motion over {overlap:.3g} s",
+        f"gain {gain:.4f}",
+        f"rate ratio {rate.value:.6f} (95 %: {rate.interval[0]:.6f} to {rate.interval[1]:.6f})",
+    )
+    return replace(offset, status=Status(*doubts), checks=checks)

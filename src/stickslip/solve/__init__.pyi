@@ -11,8 +11,8 @@ from stickslip.solve.energies import energy as energy
 from stickslip.solve.energies import energy_flow as energy_flow
 from stickslip.solve.energies import global_error as global_error
 from stickslip.solve.energies import statistics as statistics
-from stickslip.solve.orbit import SteadyState as SteadyState
 from stickslip.solve.periodic import attractors as attractors
+from stickslip.solve.poincare import SteadyState as SteadyState
 from stickslip.solve.poincare import lyapunov as lyapunov
 from stickslip.solve.self_excited import SteadySliding as SteadySliding
 from stickslip.solve.self_excited import steady_sliding as steady_sliding

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from stickslip.errors import ModelError
 from stickslip.laws.base import Mode
-from stickslip.oscillator import Oscillator
+from stickslip.oscillator import Oscillator, Structure
 from stickslip.solve.cells import DEGREE, cells_of, derivatives, derive
 from stickslip.solve.operations import stilled
 from stickslip.solve.settling import settled
@@ -34,7 +34,6 @@ from stickslip.solve.tables import (
     reached,
     systems_of,
 )
-from stickslip.structure import Structure
 
 Rows = NDArray[np.floating[Any]]
 

@@ -10,9 +10,8 @@ import numpy as np
 
 from stickslip.errors import ModelError
 from stickslip.parameters import find, places
-from stickslip.solve.orbit import SteadyState, alike, cycle_of
 from stickslip.solve.periodic import closed_orbit, judged
-from stickslip.solve.poincare import closes, derivative, extent, lap, tables
+from stickslip.solve.poincare import SteadyState, alike, closes, cycle_of, derivative, extent, lap, tables
 from stickslip.solve.simulate import opening
 from stickslip.solve.tables import Array, System
 

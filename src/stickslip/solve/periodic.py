@@ -15,10 +15,11 @@ from itertools import pairwise
 import numpy as np
 
 from stickslip.errors import ModelError, SolveError
-from stickslip.solve.orbit import SteadyState, alike
 from stickslip.solve.poincare import (
     CLOSED,
+    SteadyState,
     Table,
+    alike,
     beat,
     beats,
     carried_on,

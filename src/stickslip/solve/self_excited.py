@@ -21,8 +21,7 @@ from stickslip.laws.curved import CurvedLaw
 from stickslip.oscillator import Oscillator
 from stickslip.solve.curved import CurvedTrajectory
 from stickslip.solve.march import Dense
-from stickslip.solve.orbit import SteadyState
-from stickslip.solve.poincare import Table, closes, derivative, stretch
+from stickslip.solve.poincare import SteadyState, Table, closes, derivative, stretch
 from stickslip.solve.simulate import opening
 from stickslip.solve.tables import Array, System
 from stickslip.solve.tape import Tape

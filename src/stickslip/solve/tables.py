@@ -24,9 +24,8 @@ from stickslip.errors import ModelError
 from stickslip.laws.base import Exit, Law, Mode
 from stickslip.laws.curved import CurvedLaw, CurvedMode
 from stickslip.laws.filippov import with_sliding_modes
-from stickslip.oscillator import Oscillator
+from stickslip.oscillator import Oscillator, Structure
 from stickslip.solve.cells import Linear
-from stickslip.structure import Structure
 
 MOST = 4096  # joint modes; more would not fit a desk
 

@@ -16,12 +16,10 @@ from stickslip.errors import ModelError
 from stickslip.laws.base import Exit, Mode
 from stickslip.laws.curved import Creeping, CurvedMode
 from stickslip.laws.filippov import with_sliding_modes
-from stickslip.oscillator import Oscillator
+from stickslip.oscillator import Contact, Oscillator, Structure
 from stickslip.solve.operations import Bound, Form, Operations, Scaled, combined, flat, guards_of, stilled, sums_of
-from stickslip.solve.series import Nodes
 from stickslip.solve.tables import JointMode, System, by_value, mode_number, numbered, reached
-from stickslip.solve.taylor import Array, Exits, Guards, Sums
-from stickslip.structure import Contact, Structure
+from stickslip.solve.taylor import Array, Exits, Guards, Nodes, Sums
 
 DTYPES = (np.int64, np.float64)
 LEAST = 1e-13  # some hundred roundings of the motion's own speed: below it a velocity that falls can not be followed

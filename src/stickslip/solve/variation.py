@@ -18,9 +18,8 @@ from numpy.typing import NDArray
 
 from stickslip.oscillator import Oscillator
 from stickslip.solve.curved import CurvedTrajectory
-from stickslip.solve.series import Nodes
 from stickslip.solve.tape import Tape, tape
-from stickslip.solve.taylor import ASINH, EXP, LINEAR, LOG, POWER, PRODUCT, QUOTIENT, SQUARE, STILL, TANH, Array
+from stickslip.solve.taylor import ASINH, EXP, LINEAR, LOG, POWER, PRODUCT, QUOTIENT, SQUARE, STILL, TANH, Array, Nodes
 
 POINTS = 10  # of Gauss in a step, exact to order 20: the motion's own steps are of order 14 or 18
 ASIDE = 1e-30  # a step along the imaginary axis: the derivative is exact, since no difference is taken

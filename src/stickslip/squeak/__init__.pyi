@@ -3,6 +3,8 @@ from stickslip.squeak.bifurcation import Threshold as Threshold
 from stickslip.squeak.bifurcation import critical_value as critical_value
 from stickslip.squeak.bifurcation import limit_cycles as limit_cycles
 from stickslip.squeak.bifurcation import stability_map as stability_map
+from stickslip.squeak.bursts import Squeak as Squeak
+from stickslip.squeak.bursts import Squeaks as Squeaks
 from stickslip.squeak.couplings import Coupling as Coupling
 from stickslip.squeak.couplings import Pair as Pair
 from stickslip.squeak.couplings import coupling as coupling
@@ -22,8 +24,6 @@ from stickslip.squeak.spectra import Clip as Clip
 from stickslip.squeak.spectra import burst_clips as burst_clips
 from stickslip.squeak.spectra import burst_spectra as burst_spectra
 from stickslip.squeak.spectra import write_sound as write_sound
-from stickslip.squeak.squeaks import Squeak as Squeak
-from stickslip.squeak.squeaks import Squeaks as Squeaks
 from stickslip.squeak.stability import SlidingMode as SlidingMode
 from stickslip.squeak.stability import Stability as Stability
 

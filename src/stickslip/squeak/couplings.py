@@ -14,10 +14,9 @@ from stickslip.errors import EstimateError
 from stickslip.estimate import NORMAL_95, Doubt, Estimate, Plain, Result, Status, plain
 from stickslip.parameters import finite
 from stickslip.record.record import Record
-from stickslip.squeak.bursts import find_squeaks
+from stickslip.squeak.bursts import Squeak, Squeaks, find_squeaks
 from stickslip.squeak.hearing import filtered
 from stickslip.squeak.spectra import coherence_by_chance, stretches
-from stickslip.squeak.squeaks import Squeak, Squeaks
 from stickslip.statistics import student
 from stickslip.units import parse_value
 

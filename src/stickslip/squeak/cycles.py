@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from stickslip.drives.kinds import Belt
 from stickslip.errors import ModelError
+from stickslip.oscillator import Structure
 from stickslip.parameters import finite
 from stickslip.solve.energies import EnergyFlow, energy_flow
 from stickslip.solve.poincare import Table, stretch, tables
@@ -20,7 +21,6 @@ from stickslip.solve.self_excited import settled_cycle
 from stickslip.solve.simulate import opening
 from stickslip.solve.trajectory import Trajectory
 from stickslip.squeak.stability import Stability, System, stability
-from stickslip.structure import Structure
 
 Array = NDArray[np.float64]
 

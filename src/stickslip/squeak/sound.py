@@ -15,10 +15,10 @@ from numpy.typing import ArrayLike, NDArray
 from stickslip.drives.kinds import HarmonicBase
 from stickslip.errors import ModelError, RecordError
 from stickslip.laws.coulomb import LinearSlope
+from stickslip.oscillator import Contact, Structure
 from stickslip.parameters import finite
 from stickslip.record.channels import Channel, described
 from stickslip.record.record import Record, Step
-from stickslip.structure import Contact, Structure
 from stickslip.units import parse_constant
 
 if TYPE_CHECKING:

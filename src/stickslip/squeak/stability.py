@@ -18,9 +18,8 @@ from stickslip.drives.kinds import Belt
 from stickslip.errors import ModelError
 from stickslip.laws.base import Exit
 from stickslip.laws.curved import CurvedMode, lifted, symbol
-from stickslip.oscillator import Oscillator
+from stickslip.oscillator import Contact, Oscillator, Structure
 from stickslip.parameters import finite
-from stickslip.structure import Contact, Structure
 
 ROUNDING = 1e-11  # of the largest eigenvalue: growth below it is none
 STEPS = 30  # of Newton towards steady sliding under loads that grow with a power: a dozen reach it from no load

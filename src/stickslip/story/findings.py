@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import importlib
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -29,8 +29,14 @@ from stickslip.story.story import Line, Story, Table, logged
 from stickslip.story.words import Caution, interval_of, leading, number, value_of
 from stickslip.whole import whole_file
 
-# The file that tells findings which hold a result of this name; friction.py tells all others.
-FAMILIES = {"decay": "decay", "squeaks": "squeak", "joint": "joint", "tribometer": "tribometer"}
+# Which functions, of one record and of several, tell findings that hold a result of this name; others are friction's.
+FAMILIES = {
+    "decay": ("decay.of_findings", "decay.of_comparison"),
+    "squeaks": ("squeak.of_findings", "squeak.of_comparison"),
+    "joint": ("machines.of_joint", "machines.of_joints"),
+    "tribometer": ("machines.of_tribometer", "machines.of_tribometers"),
+}
+FRICTION = ("friction.of_findings", "friction.of_comparison")
 
 
 # What an engineer looks for first: these quantities lead the table, those without a value end it.
@@ -53,7 +59,7 @@ def _place(estimate: Estimate) -> tuple[bool, int]:
 def of_findings(findings: Findings, *, form: str = "") -> Story:
     """One record; in `form`, where one is named, its folder holds the record too."""
     record = findings.record
-    own: Story = _family(findings).of_findings(findings)
+    own: Story = _family(findings, several=False)(findings)
     if form:
         require_form(form)
         file = f"record.{form}"
@@ -87,7 +93,7 @@ def _headed(findings: Findings, sentences: Sequence[str]) -> list[str]:
 
 def of_comparison(comparison: Comparison) -> Story:
     """Several records side by side."""
-    own: Story = _family(comparison.findings[0]).of_comparison(comparison)
+    own: Story = _family(comparison.findings[0], several=True)(comparison)
     parts = [of_findings(finding) for finding in comparison.findings]
     estimates = comparison.estimates
 
@@ -98,9 +104,12 @@ def of_comparison(comparison: Comparison) -> Story:
     return replace(own, lines=[*map(Line.of, estimates), *own.lines], notes=comparison.notes, parts=parts, data=data)
 
 
-def _family(findings: Findings) -> Any:
-    file = next((file for name, file in FAMILIES.items() if name in findings.results), "friction")
-    return importlib.import_module(f"stickslip.story.{file}")
+def _family(findings: Findings, *, several: bool) -> Callable[..., Story]:
+    """What tells such findings, imported when it is needed."""
+    tellers = next((tellers for name, tellers in FAMILIES.items() if name in findings.results), FRICTION)
+    file, _, function = tellers[several].partition(".")
+    teller: Callable[..., Story] = getattr(importlib.import_module(f"stickslip.story.{file}"), function)
+    return teller
 
 
 def _data(findings: Findings, own: Story) -> dict[str, Any]:

@@ -18,9 +18,9 @@ from stickslip.errors import ModelError
 from stickslip.estimate import UNKNOWN, doubts_of
 from stickslip.figures.law import law_plates
 from stickslip.figures.style import Array
-from stickslip.law.drive import driving
 from stickslip.law.fit_curve import CurveFit
 from stickslip.law.law import LawFit
+from stickslip.law.stretch import driving
 from stickslip.law.verdict import LawComparison
 from stickslip.laws.export import export_law, toml_table
 from stickslip.laws.formula import quoted

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 from stickslip import __version__
 from stickslip.errors import ModelError, RecordError
 from stickslip.figures import style
-from stickslip.figures.plate import Plate
+from stickslip.figures.style import Plate
 from stickslip.files.write import whole
 from stickslip.printing import printable
 from stickslip.squeak.spectra import Clip

@@ -13,13 +13,12 @@ from stickslip.answers.frequencies import TimeFrequency
 from stickslip.answers.mistakes import hopeless
 from stickslip.balance.balance import Pull
 from stickslip.consistent.checks import Slip
-from stickslip.contact.mechanisms import UNTOLD
-from stickslip.cycle.before_slip import Presliding
-from stickslip.cycle.onset import Breakaway
+from stickslip.contact.ringing import UNTOLD
+from stickslip.cycle.onset import Breakaway, Presliding
 from stickslip.cycle.slips import SlipRinging
 from stickslip.estimate import Estimate, stands
 from stickslip.figures.friction import plates_of, plates_together
-from stickslip.figures.wavelet import plates_of_map
+from stickslip.figures.maps import plates_of_map
 from stickslip.record.record import RIG_UNITS
 from stickslip.story import scope
 from stickslip.story.story import Line, Story

@@ -10,7 +10,7 @@ import numpy as np
 
 from stickslip.figures.bifurcation import plot_basins, plot_bifurcation, plot_boundary, plot_dither
 from stickslip.figures.maps import plates_of
-from stickslip.figures.plate import Plate, plate
+from stickslip.figures.style import Plate, plate
 from stickslip.maps.basins import Basins
 from stickslip.maps.bifurcation import Bifurcation
 from stickslip.maps.boundaries import Boundary

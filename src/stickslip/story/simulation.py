@@ -14,7 +14,7 @@ import numpy as np
 from stickslip import scenarios
 from stickslip.errors import ModelError
 from stickslip.figures.animation import animate, require_writer
-from stickslip.figures.plate import Plate
+from stickslip.figures.style import Plate
 from stickslip.figures.trajectory import (
     contacts_of,
     cycle_of,
@@ -28,6 +28,7 @@ from stickslip.figures.trajectory import (
 )
 from stickslip.files.write import require_form, write_record
 from stickslip.laws.formula import Formula
+from stickslip.oscillator import Structure
 from stickslip.parameters import PARTS
 from stickslip.record.record import RIG_UNITS
 from stickslip.solve.curved import CurvedTrajectory
@@ -41,7 +42,6 @@ from stickslip.story.folder import check_folder
 from stickslip.story.scope import Scope
 from stickslip.story.scope import of_run as of_motion
 from stickslip.story.story import Story, Table
-from stickslip.structure import Structure
 from stickslip.systems.file import Case
 from stickslip.units import prefixed
 

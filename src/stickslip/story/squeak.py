@@ -12,9 +12,9 @@ from stickslip.answers.findings import Comparison, Findings
 from stickslip.answers.squeaks import Condition, trend_of
 from stickslip.estimate import Estimate, decimals, doubts_of
 from stickslip.figures.squeak import plates_of, plates_together
+from stickslip.squeak.bursts import WORDS, Squeak, Squeaks
 from stickslip.squeak.couplings import Coupling, Pair
 from stickslip.squeak.spectra import burst_clips
-from stickslip.squeak.squeaks import WORDS, Squeak, Squeaks
 from stickslip.story.story import Story, Table
 from stickslip.story.words import cautions, interval_of, number, value_of
 from stickslip.units import prefixed

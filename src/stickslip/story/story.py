@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from stickslip.errors import ModelError
-from stickslip.figures.plate import Plate, drawable
+from stickslip.figures.style import Plate, drawable
 from stickslip.printing import html_table
 from stickslip.story.words import Caution, flags, interval_of, value_of
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stickslip.errors import StickslipError
-from stickslip.law.drive import DriveFrom, driving
+from stickslip.law.stretch import DriveFrom, driving
 from stickslip.laws.compliant import CompliantContact
 from stickslip.laws.coulomb import LinearSlope
 from stickslip.laws.lugre import LuGre
@@ -184,7 +184,8 @@ class Belief:
     def oscillator(self) -> Oscillator:
         """With the law, and the constants as they are believed to be."""
         stated, values, law = self.stated, self.values, self.law
-        return stated.having(
+        return replace(  # thousands are made in a search, for which `having` looks up each name in the whole system
+            stated,
             law=law,
             mass=stated.mass * math.exp(values.get(MASS, 0.0)),
             stiffness=stated.stiffness * math.exp(values.get(SPRING, 0.0)),
@@ -365,7 +366,7 @@ class Belief:
         """The motion, from the first instant that x or another channel shows to the last."""
         last, late = (len(self.record) - 1) / self.record.fs, self.late
         off = [self.values[name] for name in DRIVE if name in self.values]
-        moved = self.oscillator.having(drive=self.drive(min(0.0, -late), last + max(0.0, -late), off))
+        moved = replace(self.oscillator, drive=self.drive(min(0.0, -late), last + max(0.0, -late), off))
         return simulate(moved, duration=last + abs(late), start=self.start, budget=EVENTS, rtol=FOLLOWED)
 
     def _written(self, sensors: Iterable[Sensor], run: Trajectory, rng: int | np.random.Generator) -> Record:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
 import math
+from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 
@@ -12,7 +14,7 @@ from numpy.typing import NDArray
 from stickslip.balance.motion import is_measured
 from stickslip.drives.kinds import HarmonicBase
 from stickslip.errors import EstimateError, StickslipError
-from stickslip.law.drive import DriveFrom, driving, measured_drive
+from stickslip.law.stretch import DriveFrom, driving, measured_drive
 from stickslip.laws.coulomb import LinearSlope
 from stickslip.oscillator import Oscillator
 from stickslip.record.flaws import saturated
@@ -235,9 +237,39 @@ def _asks_for(belief: Belief, name: str) -> bool:
 
 def _led_by(families: list[list[Belief]], record: Record, mapped: Map) -> list[Belief]:
     """The nearest of each family and others as near, over the whole record where its beginning allows them."""
-    nearest = [law for laws in mapped(partial(_nearest_of, record=record), families) for law in laws]
+    horizons = [record.rows(0, samples) for samples in _horizons(record)]
+    families = _further(families, partial(_over_first, record=horizons[0]), mapped)
+    families = _further([family[:STARTS] for family in families], partial(_tried, passes=1), mapped)
+    families = [family[: 1 if family[0].held else KEPT] for family in families]
+    families = _further(families, partial(_led_on, horizons=horizons), mapped)
+    nearest = [law for family in families for law in _ends(family)]
     least: float = min(_left(law) for law in nearest)
     return list(mapped(partial(_over, record=record), [law for law in nearest if _left(law) <= FAR * least]))
+
+
+def _further(families: list[list[Belief]], step: Callable[[Belief], Belief], mapped: Map) -> list[list[Belief]]:
+    """All families a step further, each with its nearest first; in one round, so that no process waits for another."""
+    moved = iter(mapped(step, [begun for family in families for begun in family]))
+    return [sorted(itertools.islice(moved, len(family)), key=_left) for family in families]
+
+
+def _over_first(begun: Belief, record: Record) -> Belief:
+    """The same over a record's first cycle, with what it leaves of it."""
+    begun = replace(begun, record=record)
+    _left(begun)
+    return begun
+
+
+def _led_on(begun: Belief, horizons: list[Record]) -> Belief:
+    """The nearest over ever more cycles, with a slope against speed where it was led without."""
+    led = _led(begun, horizons)
+    return led if SLOPE in led.values else _tried(led.at(**{SLOPE: 0.0}), STEPS)
+
+
+def _ends(family: list[Belief]) -> list[Belief]:
+    """Of one family's ends the nearest, and others as near."""
+    best, *others = family
+    return [best, *(other for other in others if _as_near(other, best) and not _same(other, best))]
 
 
 def _led_beside(begun: Belief, beside: Belief) -> Belief | None:
@@ -260,21 +292,6 @@ def _simplest(laws: list[Belief]) -> Belief:
 def _as_near(law: Belief, best: Belief) -> bool:
     """Whether a law leaves no more than chance would, were it the one that wrote the record."""
     return best.fit is not None and best.fit.freedom * math.log(_left(law) / _left(best)) < CLOSE
-
-
-def _nearest_of(starts: list[Belief], record: Record) -> list[Belief]:
-    """The nearest to a record's beginning of those that a family's starts lead to, and others as near."""
-    first, *longer = (record.rows(0, samples) for samples in _horizons(record))
-    starts = sorted((replace(begun, record=first) for begun in starts), key=_left)
-    kept = 1 if starts[0].held else KEPT
-    nearest = sorted((_tried(begun, 1) for begun in starts[:STARTS]), key=_left)[:kept]
-    best, *others = sorted((_with_slope(_led(begun, [first, *longer])) for begun in nearest), key=_left)
-    return [best, *(other for other in others if _as_near(other, best) and not _same(other, best))]
-
-
-def _with_slope(led: Belief) -> Belief:
-    """The nearest with a slope against speed, of a law that was led without."""
-    return led if SLOPE in led.values else _tried(led.at(**{SLOPE: 0.0}), STEPS)
 
 
 def _same(one: Belief, other: Belief) -> bool:
