@@ -99,7 +99,7 @@ def test_a_rough_surface_is_fitted_with_its_profile() -> None:
     rough = ss.laws.RoughSurface(CONTACT, share=0.03, length=2e-4, span=2e-3, seed=4)
     record = measured(rough, 8.7, 0.5)
     start = ss.Oscillator(law=ss.laws.CompliantContact(1.2, stiffness=150000, damping=15.0), **RIG)
-    found = ss.fit_law(record, start, surface="rough")
+    found = ss.fit_law(record, start, law=ss.laws.RoughSurface)
     assert found.surface == "rough"
     assert found.law.stiffness == pytest.approx(192000, rel=1e-2)
     kinetic = found.parameters["kinetic"]

@@ -9,10 +9,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 
 import stickslip as ss
+from stickslip.cli.program import main
 from stickslip.lab.drawn import catalog
 from stickslip.laws.base import Exit, Mode, Rigid
+from stickslip.laws.curved import CurvedMode, Sliding, either_side, symbol, tanh
 from stickslip.laws.export import FORMATS
 from stickslip.laws.guessing import RIGID, Hypothesis, Observed, registered
 from stickslip.parameters import parameter, parametric, unit
@@ -58,7 +61,28 @@ class AsymmetricCoulomb(Rigid):
         )
 
 
+@parametric
+class Knee(Sliding):
+    """A level in each direction, reached over a rounded knee; it says nothing of how it is searched."""
+
+    label = "Asymmetric, with a knee"
+    formula = "f = forward tanh(v/knee) while v > 0, back tanh(v/knee) while v < 0"
+
+    forward: float = parameter("N", "sliding friction forward", positive=True)
+    back: float = parameter("N", "sliding friction back", positive=True)
+    knee: float = parameter("m/s", "speed of the knee", positive=True)
+
+    def rates(self) -> tuple[CurvedMode, ...]:
+        """Slip on either side."""
+        rounded = tanh(symbol("v") / self.knee)
+        return tuple(
+            CurvedMode(name, "slip", side, (self.forward if side > 0 else self.back) * rounded, (turn,), {})
+            for name, side, turn in either_side()
+        )
+
+
 LAW = AsymmetricCoulomb(1.2, back=0.8)
+KNEE = Knee(1.2, 0.8, knee=5e-3)
 FILE = """
 system = { mass = 2.42, stiffness = 2310.0, damping = 0.12 }
 law = { name = "AsymmetricCoulomb", forward = "1.2 N", back = "800 mN" }
@@ -69,17 +93,18 @@ drive = { name = "HarmonicBase", amplitude = "1.1 mm", frequency = 8.7 }
 @pytest.fixture(autouse=True)
 def line_in_the_register(monkeypatch: pytest.MonkeyPatch) -> None:
     """What a line in ``laws/__init__.pyi`` does for a law of the package."""
-    monkeypatch.setitem(registered(), "AsymmetricCoulomb", AsymmetricCoulomb)
-    monkeypatch.setattr(ss.laws, "AsymmetricCoulomb", AsymmetricCoulomb, raising=False)
+    for law in (AsymmetricCoulomb, Knee):
+        monkeypatch.setitem(registered(), law.__name__, law)
+        monkeypatch.setattr(ss.laws, law.__name__, law, raising=False)
 
 
 def slider(law: Any = LAW) -> ss.Oscillator:
     return ss.Oscillator(law=law, drive=ss.drives.HarmonicBase(1.1e-3, frequency=8.7), **RIG)
 
 
-def measured() -> ss.Record:
+def measured(law: Any = LAW) -> ss.Record:
     rig = ss.Rig.perfect("x", "z", "load").having("x", white=1e-6).having("z", white=1e-6).having("load", white=2e-3)
-    return rig.measure(ss.simulate(slider(), duration=2.5, rtol=1e-9), fs=2500, rng=3, start=2.0)
+    return rig.measure(ss.simulate(slider(law), duration=2.5, rtol=1e-9), fs=2500, rng=3, start=2.0)
 
 
 def test_its_parameters_are_checked_and_told() -> None:
@@ -157,6 +182,46 @@ def test_one_that_says_nothing_of_itself_is_found_by_its_units(law: Any, values:
 def test_a_law_of_other_laws_needs_its_values() -> None:
     with pytest.raises(ss.errors.ModelError, match=r"InSeries of which no law is known.*give the law with its values"):
         ss.compare_laws(measured(), slider(), laws=["InSeries"])
+
+
+@pytest.mark.parametrize("law", [Knee, "Knee", Knee(1.0, 1.0, knee=1e-2)], ids=["class", "name", "instance"])
+def test_a_law_that_guesses_nothing_is_fitted(law: Any) -> None:
+    found = ss.fit_law(measured(KNEE), slider(ss.laws.Coulomb(1.0)), law=law, intervals=False)
+    assert max(found.misfit.values()) < 1.1
+    for name, true in vars(KNEE).items():
+        assert getattr(found.law, name) == pytest.approx(true, rel=1e-2)
+
+
+def test_a_law_that_guesses_nothing_is_compared_by_its_class() -> None:
+    found = ss.compare_laws(measured(KNEE), slider(ss.laws.Coulomb(1.0)), laws=["Coulomb", Knee])
+    assert (found.law, found.family) == ("Knee", "Knee")
+    assert found.fit.parameters["knee"].includes(KNEE.knee)
+
+
+def test_a_law_that_explains_nothing_more_does_not_lead_alone() -> None:
+    """Two levels where there is one, and a knee where there is none: the simpler law stays."""
+    told = measured(ss.laws.Coulomb(1.0))
+    for law in (Knee, AsymmetricCoulomb):
+        found = ss.compare_laws(told, slider(ss.laws.Coulomb(1.0)), laws=["Coulomb", law])
+        assert "Coulomb" in found.kept
+
+
+def test_it_is_fitted_and_tried_on_another_record_from_the_command_line(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    for name in ("one", "other"):
+        ss.write_record(measured(KNEE), f"{name}.csv")
+    constants = [word for name, value in RIG.items() for word in (f"--{name}", str(value))]
+    said = CliRunner().invoke(
+        main, ["fit", "one.csv", *constants, "--laws", "Coulomb, knee", "--output", "fit", "--json"]
+    )
+    assert said.exit_code == 0, said.output
+    assert json.loads(said.stdout)["law"] == "Knee"
+    said = CliRunner().invoke(main, ["predict", "fit", "other.csv", "--no-plain", "--json"])
+    assert said.exit_code == 0, said.output
+    predicted = ss.answers.predict(ss.read_record("other.csv"), ss.answers.read_fitted(Path("fit")), plain=False)
+    assert predicted.parts[0].follows["x"] > 99.5
 
 
 def test_it_is_read_and_written_in_every_form(tmp_path: Path) -> None:

@@ -42,8 +42,8 @@ from stickslip.files.read import read_blocks as read_blocks
 from stickslip.files.read import read_record as read_record
 from stickslip.files.write import write_record as write_record
 from stickslip.law.fit_curve import fit_curve as fit_curve
-from stickslip.law.law import fit_law as fit_law
 from stickslip.law.which_law import compare_laws as compare_laws
+from stickslip.law.which_law import fit_law as fit_law
 from stickslip.maps.basins import basins as basins
 from stickslip.maps.bifurcation import bifurcation as bifurcation
 from stickslip.maps.dither import dither as dither

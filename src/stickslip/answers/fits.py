@@ -15,10 +15,10 @@ from stickslip.drives.kinds import HarmonicBase, Release
 from stickslip.errors import UNNAMED, EstimateError, ModelError, RecordError, StickslipError
 from stickslip.estimate import Estimate, Result
 from stickslip.law.fit_curve import CurveFit, fit_curve
-from stickslip.law.law import LawFit, fit_law
+from stickslip.law.law import LawFit
 from stickslip.law.start import CALIBRATION
 from stickslip.law.verdict import LawComparison
-from stickslip.law.which_law import compare_laws
+from stickslip.law.which_law import compare_laws, fit_law
 from stickslip.laws.coulomb import Coulomb
 from stickslip.oscillator import Oscillator
 from stickslip.record.record import RIG_UNITS, Record

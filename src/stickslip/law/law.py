@@ -1,4 +1,4 @@
-"""A friction law fitted to records, with the exact engine in the loop."""
+"""What a fit of a friction law tells: its parameters, and how sure they are."""
 
 from __future__ import annotations
 
@@ -10,41 +10,37 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from stickslip.errors import EstimateError, ModelError
+from stickslip.errors import ModelError
 from stickslip.estimate import Estimate, Result, Status
-from stickslip.law.search import OF_SENSORS, SHARE, Knob, Point, Problem, Slopes, descend, rows_of, without_starts
+from stickslip.law.search import (
+    OF_SENSORS,
+    SHARE,
+    Knob,
+    Point,
+    Problem,
+    Slopes,
+    descend,
+    rows_of,
+    without_starts,
+)
 from stickslip.law.start import (
     Shown,
-    best_start,
-    better_start,
-    bounded,
-    free_names,
-    knob,
-    nuisance_knobs,
-    require_apart,
-    seen_damping,
-    seen_profile,
     thinned_out,
     too_few,
-    usual_nuisance,
     value_of,
 )
-from stickslip.law.stretch import Sensor, Stretch, channels_of
+from stickslip.law.stretch import Sensor
 from stickslip.laws.base import Law
 from stickslip.laws.curved import CurvedLaw
 from stickslip.oscillator import Oscillator
 from stickslip.parameters import named
 from stickslip.parameters import unit as unit_of
-from stickslip.record.record import Record, require_record
 from stickslip.statistics import mean_uncertainty, student
 
 Array = NDArray[np.float64]
 
+MISFIT = 1.2  # times its noise that a law may leave of any channel and yet explain it: readings alone stray by 1 or 2 %
 METHOD = "least squares of what the sensors read, the motion simulated"
-MISFIT = 1.2  # times its noise that a channel's residual may be
-STIFFEST = 1e-5  # of the stroke: what a contact gives way at least
-UNEVEN = 0.1  # of its mean, that a surface strays
-WORK = 24.0  # calls of progress after which most of a fit is taken to be done
 UNSURE = 0.25  # of a coordinate: a wider deviation is looked at by the likelihood itself
 REACH = (0.7, 1.6, 3.2, 7.0)  # steps of the coordinate that the look takes, to three decades away
 FAINT = 1e-12  # of the sharpest direction: below it a direction is not seen at all
@@ -97,7 +93,7 @@ class LawFit(Result):
     traces : tuple of Traces
         One for each record.
     surface : str
-        "even" or "rough", see :func:`fit_law`.
+        "even", or "rough" with the profile of a ``RoughSurface``.
     status : str
         "ok", or why the fit should not be trusted.
     checks : tuple of str
@@ -143,137 +139,6 @@ class LawFit(Result):
             "checks": list(self.checks),
             "estimates": [estimate.to_dict() for estimate in self.estimates],
         }
-
-
-def fit_law(
-    record: Record | Sequence[Record],
-    oscillator: Oscillator,
-    *,
-    free: Sequence[str] | None = None,
-    nuisance: Sequence[str] | None = None,
-    channels: Sequence[str] | None = None,
-    surface: str = "even",
-    intervals: bool = True,
-    progress: Callable[[float], object] | None = None,
-) -> LawFit:
-    r"""Which parameters of a friction law explain what the sensors read?
-
-    The oscillator is simulated exactly, its motion passed through the sensors as their channels state them (delay,
-    mount, inertia, discharge), and the parameters p are those for which
-
-    .. math:: \chi^2(p) = \sum_{c, t} \left(\frac{y_c(t) - \hat y_c(t; p)}{\sigma_c}\right)^2
-
-    is least over channels c and instants t, sigma the noise. Each record's displacement, velocity and memory at its
-    first slide are fitted with them, as are an offset of each channel and what its mount still rings with. Static
-    friction, Stribeck speed, contact stiffness and rate, in which chi squared has several valleys, are tried at values
-    spread over their range before the descent. The intervals are the sandwich's, which hold when what is left is
-    correlated; where a parameter is hardly seen they are the likelihood's, and may be open to one side.
-
-    Parameters
-    ----------
-    record : Record or sequence of Record
-        With x or v, and what else was measured: a, load, friction. The base's motion z drives the oscillator where it
-        was measured, or a periodic force; otherwise the oscillator's own drive does, from the first sample on.
-    oscillator : Oscillator
-        Mass, spring and damper; the law with values to start from.
-    free : sequence of str, optional
-        Parameters to fit, as :meth:`Oscillator.having` names them; all the law's that are not zero where left out.
-        Empty: only the starts are fitted, to predict another record.
-    nuisance : sequence of str, optional
-        What else is not known well: "mass", "stiffness", "damping", a sensor's "x.gain" or "x.delay". Where left out:
-        the damper, which may be anything from zero on, the spring and all gains, which are trusted to 0.5 %, and the
-        delay of x, to 50 us; with nothing free, nothing. Empty: all is as stated.
-    channels : sequence of str, optional
-        Channels to explain; all that were measured where left out.
-    surface : {"even", "rough"}
-        "even": the friction is the same everywhere. "rough": the friction forces are multiplied by a profile along the
-        surface, which is fitted too; the law is Coulomb's or the CompliantContact, and its sliding friction the mean of
-        the profile, as sure as that mean is for another part of the surface.
-    intervals : bool
-        Whether to ask how sure the parameters are; without, the fit is quicker.
-    progress : callable, optional
-        Called with the share of the work that is done, 0 to 1.
-
-    Returns
-    -------
-    LawFit
-
-    Raises
-    ------
-    RecordError
-        A channel is missing or broken.
-    EstimateError
-        No motion above the noise, no sliding, or sliding at one speed alone.
-    ModelError
-        A parameter that the oscillator does not have, or is named twice; a channel that is not fitted.
-
-    Examples
-    --------
-    >>> import stickslip as ss
-    >>> slider = ss.Oscillator(
-    ...     mass=2.42, stiffness=2310, law=ss.laws.Coulomb(1.1), drive=ss.drives.HarmonicBase(1.1e-3, frequency=8.7)
-    ... )
-    >>> rig = ss.Rig.perfect("x", "z").having("x", white=1e-6)
-    >>> record = rig.measure(ss.simulate(slider, cycles=20), fs=2000, rng=1)
-    >>> found = fit_law(record.rows(2000, len(record)), slider.having(kinetic=1.0))
-    >>> bool(abs(found.law.kinetic / 1.1 - 1) < 0.01)
-    True
-    """
-    require_record(record)
-    records = [record] if isinstance(record, Record) else list(record)
-    if not records:
-        raise EstimateError("no record", "a law is fitted to one record at least", "give one")
-    if surface not in ("even", "rough"):
-        raise ModelError(f"surface = '{surface}'", "a surface is 'even' or 'rough'", "choose one, or leave it out")
-    tell = teller(progress, WORK)
-    names = free_names(oscillator, free)
-    shown = [Shown.of(one, channels_of(one, channels), oscillator) for one in records]
-    if nuisance is None:
-        nuisance = usual_nuisance(oscillator, names, shown) if names else ()
-    require_apart(oscillator, names, nuisance, shown)
-    stretches = [_sliding_stretch(motion, number) for number, motion in enumerate(shown)]
-    fastest = max(motion.fastest for motion in shown)
-    oscillator, profile = better_start(oscillator, names, shown), None
-    if names:
-        dampers = [oscillator.damping, *([seen_damping(oscillator, shown).damping] if "damping" in nuisance else [])]
-        oscillator = best_start(oscillator, names, stretches, fastest, dampers, tell)
-    if surface == "rough":
-        profile = seen_profile(shown, value_of(oscillator, "kinetic"))
-        names = tuple(name for name in names if name != "kinetic")
-    knobs = [bounded(knob(oscillator, name), oscillator, stretches, STIFFEST) for name in names]
-    knobs += nuisance_knobs(oscillator, nuisance, stretches)
-    heights = enumerate(profile.values if profile else ())
-    knobs += [Knob(f"profile {j}", "profile", height, 0.01, prior=UNEVEN / 0.01) for j, height in heights]
-    problem = Problem.of(oscillator, stretches, knobs, profile)
-    point = _descended(problem, tell)
-    sure = surety(problem, point, tell) if intervals else None
-    if progress:
-        progress(1.0)
-    return answered(problem, point, sure, shown)
-
-
-def _sliding_stretch(motion: Shown, number: int) -> Stretch:
-    """A record from its first fast sliding to its end."""
-    motion.require_sliding()
-    return motion.stretch(number, (int(motion.slides()[0]), len(motion.record) - 1))
-
-
-def _descended(problem: Problem, tell: Callable[[], None]) -> Point:
-    """Where the search ends; that of a rough surface begins where one by a part of the readings ends."""
-    point = problem.begin(np.zeros(len(problem.knobs)))
-    if problem.profile:
-        few = thinned_out(problem)
-        first = descend(few, few.begin(point.u), tell=tell)
-        states = zip(first.starts, point.starts, strict=True)
-        point = problem.at(first.u, tuple(np.append(a, b[len(a) :]) for a, b in states))
-    point = descend(problem, point, tell=tell)
-    if not math.isfinite(point.chi2):
-        raise EstimateError(
-            f"{problem.oscillator.law!r} can not be simulated along this record",
-            "the search starts from a motion that exists",
-            "start from other values of the law",
-        )
-    return point
 
 
 def teller(progress: Callable[[float], object] | None, expected: float) -> Callable[[], None]:

@@ -166,13 +166,16 @@ class Problem:
         }
 
     def begin(self, u: Array) -> Point:
-        """The point with the starts as estimated."""
-        starts = []
+        """The point with the starts as estimated, the drive as measured."""
+        return self.at(u, self.own(self.begin_states()))
+
+    def begin_states(self) -> list[Array]:
+        """Displacement, velocity and memory at each stretch's start as estimated, as coordinates."""
+        states = []
         for stretch, entry, scale in zip(self.stretches, self.entries, self.scales, strict=True):
             memory = [float(value) for name, value in entry.items() if name != "mode"]
-            state = np.array([stretch.start["x"], stretch.start["v"], *memory]) / scale
-            starts.append(np.append(state, np.zeros(len(stretch.drive.unsure))))
-        return self.at(u, tuple(starts))
+            states.append(np.array([stretch.start["x"], stretch.start["v"], *memory]) / scale)
+        return states
 
     def own(self, starts: Sequence[Array]) -> tuple[Array, ...]:
         """Starts of the same stretches with another trust in the drive: the states alone, the drive as measured."""

@@ -405,18 +405,19 @@ def thinned_out(problem: Problem) -> Problem:
 
 
 def best_start(
-    oscillator: Oscillator,
+    systems: Sequence[Oscillator],
     names: Sequence[str],
     stretches: Sequence[Stretch],
-    fastest: float,
     dampers: Sequence[float],
     tell: Callable[[], None],
 ) -> Oscillator:
     """The values from which the search descends lowest, on a part of the readings; of the damper, where several are
-    given, it is turned too."""
+    given, it is turned too. Of one system its values are spread; of several they are."""
     few = [thinned(stretch) for stretch in stretches]
     looked: list[tuple[float, int, Problem, Point]] = []
-    begun = [trial for damping in dampers for trial in trials(oscillator.having(damping=damping), names, fastest)]
+    fastest = max(float(stretch.scales[1]) for stretch in stretches)
+    spread = systems if len(systems) > 1 else [*trials(systems[0], names, fastest)]
+    begun = [trial.having(damping=damping) for damping in dampers for trial in spread]
     for number, trial in enumerate(begun):
         tell()
         problem = Problem.of(trial, few, ())

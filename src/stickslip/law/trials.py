@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -19,7 +19,7 @@ from stickslip.law.search import Knob, Point, Problem, descend, rows_of
 from stickslip.law.start import Shown, bounded, free_names, knob, nuisance_knobs, thinned
 from stickslip.law.stretch import Motion, Sampled, Sensor, Stretch, as_driven, attempted, face_of
 from stickslip.law.verdict import Evidence, Key, independent
-from stickslip.laws.guessing import LEAST_EXCESS, STIFF, STIFFEST, Observed
+from stickslip.laws.guessing import LEAST_EXCESS, STIFF, STIFFEST, Hypothesis, Observed
 from stickslip.oscillator import Oscillator
 from stickslip.record.record import Record
 
@@ -31,6 +31,7 @@ LOOKS, FINALISTS = 4, 2  # starts that are looked at, and that are followed
 ROUGHLY = 0.1  # of the misfit, lowered by less in a step before all that is unsure is turned
 ENOUGH = 1e-3  # of the misfit: what a step lowers it less by tells no law from another
 CONTENDING = 100.0  # times the least misfit of the others: a law beyond is not followed to its end
+NO_WORSE = 1.01  # times a law's misfit, that one which contains it may end with: a descent settles within that
 PASSES, LAST_PASSES = 12, 3  # of a descent: of a law, and of one that stands near its end
 TURNS = 24  # of the motion, after which a record tells laws apart no better
 DETUNED = (0.01, 0.0025)  # steps in which a mount is tried, against what is stated
@@ -199,6 +200,95 @@ def resumed(trial: Trial, stretches: Sequence[Stretch], least: float, passes: in
     return replace(trial, problem=problem, point=point) if math.isfinite(point.chi2) else None
 
 
+@dataclass(frozen=True, eq=False)
+class Search:
+    """What stays the same while laws are searched.
+
+    Attributes
+    ----------
+    kinds : sequence of (Hypothesis, list)
+        The laws, the simplest first, and the values to start from where they are given.
+    seen : sequence of (Oscillator, Seen)
+        What the records show, by each damper that may be.
+    known : sequence of str
+        What is fitted beside each law.
+    calibration : float
+        By what part gains and the spring may be wrong.
+    tell : callable
+        Called as the work goes on.
+    """
+
+    kinds: Sequence[tuple[Hypothesis, list[Any]]]
+    seen: Sequence[tuple[Oscillator, Seen]]
+    known: Sequence[str]
+    calibration: float
+    tell: Tell
+
+    def stretch(self, evidence: Evidence | None) -> Callable[[Shown, int], Stretch]:
+        """How a record is weighed: by its noise and calibration, and by evidence where there is some."""
+        return lambda shown, number: weighed(shown, number, self.calibration, evidence)
+
+    def tried(
+        self, shown: Sequence[Shown], evidence: Evidence | None, passes: int, before: Mapping[str, Trial]
+    ) -> dict[str, Trial]:
+        """Every law searched, or its search taken up again; none ends above a law that it contains."""
+        stretches = [self.stretch(evidence)(motion, number) for number, motion in enumerate(shown)]
+        trials: dict[str, Trial] = {}
+        for kind, given in self.kinds:
+            name = kind.name
+            least = min((one.point.chi2 for one in {**before, **trials}.values()), default=math.inf)
+            trial = resumed(before[name], stretches, least, passes, self.tell) if name in before else None
+            if trial is None:
+                begun = [replace(one, law=law) for one, seen in self.seen for law in given or kind.guesses(seen)]
+                begun += _continued(kind, trials)
+                trial = searched(name, begun, stretches, self.known, self.calibration, least, passes, self.tell)
+            trial = self._no_worse(kind, trial, trials, passes)
+            if trial is not None:
+                trials[name] = trial
+        return trials
+
+    def _no_worse(
+        self, kind: Hypothesis, trial: Trial | None, before: Mapping[str, Trial], passes: int
+    ) -> Trial | None:
+        """The trial, or where it is above a law that it contains, one that begins where that one ends."""
+        inner = min((before[name] for name in kind.contains if name in before), key=_misfit, default=None)
+        if inner is None or (trial is not None and trial.point.chi2 <= NO_WORSE * inner.point.chi2):
+            return trial
+        ends = [extended(kind.name, inner, law, self.known, passes, self.tell) for law in kind.continued(before)]
+        return min((one for one in (trial, *ends) if one is not None), key=_misfit, default=None)
+
+
+def _misfit(trial: Trial) -> float:
+    return trial.point.chi2
+
+
+def _continued(kind: Hypothesis, before: Mapping[str, Trial]) -> list[Oscillator]:
+    """Where else a search begins: at the ends of simpler laws' searches, with the damper of the one that left least."""
+    if not before:
+        return []
+    nearest = min(before.values(), key=_misfit)
+    stated = nearest.problem.oscillator.having(damping=nearest.system.damping)
+    return [replace(stated, law=law) for law in kind.continued(before)]
+
+
+def extended(name: str, simpler: Trial, law: Any, known: Sequence[str], passes: int, tell: Tell) -> Trial | None:
+    """A law searched from where a simpler one ends: its motions, dampers, springs and gains; None where it can not be.
+
+    From the stated ones a richer law may descend into another valley than the one that the simpler law has found.
+    """
+    before = simpler.problem
+    kept = [j for j, turned in enumerate(before.knobs) if turned.name in known]
+    oscillator = replace(before.oscillator, law=law)
+    own = [_knob(oscillator, one, before.stretches) for one in free_names(oscillator, None)]
+    problem = Problem.of(oscillator, before.stretches, (*own, *(before.knobs[j] for j in kept)))
+    starts = []
+    for start, scale, now in zip(simpler.point.starts, before.scales, problem.begin_states(), strict=True):
+        starts.append(np.concatenate([start[:2], now[2:], start[len(scale) :]]))
+    point = problem.at(np.append(np.zeros(len(own)), simpler.point.u[kept]), tuple(starts))
+    point = descend(problem, point, passes=passes, share=ENOUGH, tell=tell)
+    return Trial(name, problem, point) if math.isfinite(point.chi2) else None
+
+
 def with_static(trial: Trial, excess: float) -> Trial:
     """The law whose static friction exceeds the kinetic by what the releases tell, turned no more.
 
@@ -336,6 +426,19 @@ class Seen(Observed):
         excess, turns = _excess(speed, friction, level, around), float(np.std(speed)) / way
         slip, step = np.concatenate(slips), np.concatenate(steps)
         return cls(slip, speed, friction, step, level, excess, turns, oscillator.mass, around)
+
+
+def seen_by(records: Sequence[Record], systems: Sequence[Oscillator]) -> list[tuple[Oscillator, Seen]]:
+    """What the records show by each of several dampers; one that leaves no friction is none."""
+    seen, refused = [], None
+    for system in systems:
+        try:
+            seen.append((system, Seen.of(records, system)))
+        except EstimateError as error:
+            refused = error
+    if refused and not seen:
+        raise refused
+    return seen
 
 
 def _excess(speed: Array, friction: Array, level: float, rests: Rests) -> float:

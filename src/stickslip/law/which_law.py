@@ -1,9 +1,9 @@
-"""Which friction law is it: several laws fitted to the same records, and what the records say of each."""
+"""One friction law fitted to records, the exact engine in the loop; several, and what the records say of each."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -12,17 +12,34 @@ from numpy.typing import NDArray
 
 from stickslip.errors import EstimateError, ModelError
 from stickslip.estimate import NORMAL_95, Doubt, Estimate
-from stickslip.law.law import LawFit, answered, surety, teller
-from stickslip.law.search import descend
-from stickslip.law.start import CALIBRATION, Shown, require_apart, seen_damping, too_few, usual_nuisance
+from stickslip.law.law import MISFIT, LawFit, answered, surety, teller
+from stickslip.law.search import Knob, Point, Problem, Profile, descend, rows_of
+from stickslip.law.start import (
+    CALIBRATION,
+    Shown,
+    best_start,
+    better_start,
+    bounded,
+    free_names,
+    knob,
+    nuisance_knobs,
+    require_apart,
+    seen_damping,
+    seen_profile,
+    thinned_out,
+    too_few,
+    usual_nuisance,
+    value_of,
+)
 from stickslip.law.stretch import Stretch, channels_of
 from stickslip.law.trials import (
     PASSES,
+    Search,
     Seen,
     Trial,
     evidence_of,
     resumed,
-    searched,
+    seen_by,
     squares,
     tuned,
     unexplained,
@@ -45,19 +62,210 @@ from stickslip.law.verdict import (
     undescribed,
     unexplained_part,
 )
-from stickslip.laws.guessing import Hypothesis, hypotheses, hypothesis_of
+from stickslip.laws.guessing import Hypothesis, contained, hypotheses, hypothesis_of
+from stickslip.laws.rough import RoughSurface
 from stickslip.oscillator import Oscillator
 from stickslip.record.record import Record, require_record
 from stickslip.units import dimensions
 
 Array = NDArray[np.float64]
 
+STIFFEST = 1e-5  # of the stroke: what a contact gives way at least
+UNEVEN = 0.1  # of its mean, that a surface strays
+WORK = 24.0  # calls of progress after which most of a fit is taken to be done
 CALLS = 40.0  # of progress that the trial of a law is taken for
 LOOK = 2  # passes of a descent after which it is seen how the sensors' mounts swing
 RETUNED = 8  # times that mounts and law are found in turn
 # times as wide as chance, by unit: so 95 % of intervals held on the first 39 rigs of `benchmarks/servo_laws.py --first
 # 6000`, of a contact's damping on the first 59
 STRAY, STRAYS = 1.25, {"N s/m": 2.5, "m/s": 4.0, "s/m": 4.0}
+
+
+def fit_law(
+    record: Record | Sequence[Record],
+    oscillator: Oscillator,
+    *,
+    free: Sequence[str] | None = None,
+    nuisance: Sequence[str] | None = None,
+    channels: Sequence[str] | None = None,
+    law: Any = None,
+    intervals: bool = True,
+    progress: Callable[[float], object] | None = None,
+) -> LawFit:
+    r"""Which parameters of a friction law explain what the sensors read?
+
+    The oscillator is simulated exactly, its motion passed through the sensors as their channels state them (delay,
+    mount, inertia, discharge), and the parameters p are those for which
+
+    .. math:: \chi^2(p) = \sum_{c, t} \left(\frac{y_c(t) - \hat y_c(t; p)}{\sigma_c}\right)^2
+
+    is least over channels c and instants t, sigma the noise. Each record's displacement, velocity and memory at its
+    first slide are fitted with them, as are an offset of each channel and what its mount still rings with. Static
+    friction, Stribeck speed, contact stiffness and rate, in which chi squared has several valleys, are tried at values
+    spread over their range before the descent. The intervals are the sandwich's, which hold when what is left is
+    correlated; where a parameter is hardly seen they are the likelihood's, and may be open to one side.
+
+    Parameters
+    ----------
+    record : Record or sequence of Record
+        With x or v, and what else was measured: a, load, friction. The base's motion z drives the oscillator where it
+        was measured, or a periodic force; otherwise the oscillator's own drive does, from the first sample on.
+    oscillator : Oscillator
+        Mass, spring and damper; the law with values to start from.
+    free : sequence of str, optional
+        Parameters to fit, as :meth:`Oscillator.having` names them; all the law's that are not zero where left out.
+        Empty: only the starts are fitted, to predict another record.
+    nuisance : sequence of str, optional
+        What else is not known well: "mass", "stiffness", "damping", a sensor's "x.gain" or "x.delay". Where left out:
+        the damper, which may be anything from zero on, the spring and all gains, which are trusted to 0.5 %, and the
+        delay of x, to 50 us; with nothing free, nothing. Empty: all is as stated.
+    channels : sequence of str, optional
+        Channels to explain; all that were measured where left out.
+    law : str, type or law, optional
+        The law to fit: its name, its class, or an instance with the values to start from; the oscillator's own where
+        left out. ``RoughSurface``: the oscillator's own on a surface whose friction is not the same everywhere: its
+        forces are multiplied by a profile along the surface, which is fitted too; it is Coulomb's or the
+        CompliantContact, and its sliding friction the mean of the profile, as sure as that mean is for another part of
+        the surface.
+    intervals : bool
+        Whether to ask how sure the parameters are; without, the fit is quicker.
+    progress : callable, optional
+        Called with the share of the work that is done, 0 to 1.
+
+    Returns
+    -------
+    LawFit
+
+    Raises
+    ------
+    RecordError
+        A channel is missing or broken.
+    EstimateError
+        No motion above the noise, no sliding, or sliding at one speed alone.
+    ModelError
+        A law that is not known or whose start can not be guessed; a parameter that the oscillator does not have, or is
+        named twice; a channel that is not fitted.
+
+    Examples
+    --------
+    >>> import stickslip as ss
+    >>> slider = ss.Oscillator(
+    ...     mass=2.42, stiffness=2310, law=ss.laws.Coulomb(1.1), drive=ss.drives.HarmonicBase(1.1e-3, frequency=8.7)
+    ... )
+    >>> rig = ss.Rig.perfect("x", "z").having("x", white=1e-6)
+    >>> record = rig.measure(ss.simulate(slider, cycles=20), fs=2000, rng=1)
+    >>> found = fit_law(record.rows(2000, len(record)), slider.having(kinetic=1.0))
+    >>> bool(abs(found.law.kinetic / 1.1 - 1) < 0.01)
+    True
+    """
+    require_record(record)
+    records = [record] if isinstance(record, Record) else list(record)
+    if not records:
+        raise EstimateError("no record", "a law is fitted to one record at least", "give one")
+    tell = teller(progress, WORK)
+    shown = [Shown.of(one, channels_of(one, channels), oscillator) for one in records]
+    rough = law is RoughSurface
+    begun = _begun(None if rough else law, oscillator, records)
+    names = free_names(begun[0], free)
+    if nuisance is None:
+        nuisance = usual_nuisance(begun[0], names, shown) if names else ()
+    require_apart(begun[0], names, nuisance, shown)
+    stretches = [_sliding_stretch(motion, number) for number, motion in enumerate(shown)]
+    start = better_start(begun[0], names, shown)
+    if names:
+        dampers = [oscillator.damping, *([seen_damping(oscillator, shown).damping] if "damping" in nuisance else [])]
+        start = best_start([start, *begun[1:]], names, stretches, dampers, tell)
+    problem = _posed(
+        start, names, nuisance, stretches, seen_profile(shown, value_of(start, "kinetic")) if rough else None
+    )
+    point = _descended(problem, tell)
+    if free is None and not rough and not _explains(problem, point):
+        problem, point = _from_simpler(problem, point, records, shown, tell)
+    sure = surety(problem, point, tell) if intervals else None
+    if progress:
+        progress(1.0)
+    return answered(problem, point, sure, shown)
+
+
+def _begun(law: Any, oscillator: Oscillator, records: Sequence[Record]) -> list[Oscillator]:
+    """The oscillator with the law's values where the search begins: as given, or as the friction suggests them."""
+    if law is None:
+        return [oscillator]
+    kind = hypothesis_of(law)
+    guesses = kind.guesses(Seen.of(records, oscillator)) if isinstance(law, str | type) else [law]
+    return [replace(oscillator, law=guess) for guess in guesses]
+
+
+def _posed(
+    oscillator: Oscillator,
+    names: Sequence[str],
+    nuisance: Sequence[str],
+    stretches: Sequence[Stretch],
+    profile: Profile | None = None,
+) -> Problem:
+    """What is turned, from the oscillator's values; on a rough surface its profile in place of its level."""
+    names = [name for name in names if profile is None or name != "kinetic"]
+    knobs = [bounded(knob(oscillator, name), oscillator, stretches, STIFFEST) for name in names]
+    knobs += nuisance_knobs(oscillator, nuisance, stretches)
+    heights = enumerate(profile.values if profile else ())
+    knobs += [Knob(f"profile {j}", "profile", height, 0.01, prior=UNEVEN / 0.01) for j, height in heights]
+    return Problem.of(oscillator, stretches, knobs, profile)
+
+
+def _explains(problem: Problem, point: Point) -> bool:
+    """Whether no channel is left with more than noise."""
+    return all(
+        math.sqrt(float(np.mean(values[rows] ** 2))) <= MISFIT
+        for stretch, values in zip(problem.stretches, point.residuals, strict=True)
+        for rows in rows_of(stretch.sensors)
+    )
+
+
+def _from_simpler(
+    problem: Problem, point: Point, records: Sequence[Record], shown: Sequence[Shown], tell: Callable[[], None]
+) -> tuple[Problem, Point]:
+    """Where a search ends that begins at those of the simpler laws which the law contains, where that is lower.
+
+    A law next to rigid, or with a curve that is next to none, has valleys of its own: a compliant contact left 6 times
+    the noise of a record of another compliant contact, bristles 32 times that of a rigid one, which they contain.
+    """
+    known = hypotheses()
+    kind = hypothesis_of(problem.oscillator.law)
+    inner = [one for name, one in known.items() if name in contained(kind)]
+    nuisance = [turned.name for turned in problem.knobs if turned.name not in free_names(problem.oscillator, None)]
+    nuisance = list(dict.fromkeys(nuisance))
+    stated = [problem.oscillator, *([seen_damping(problem.oscillator, shown)] if "damping" in nuisance else [])]
+    search = Search([(one, []) for one in (*inner, kind)], seen_by(records, stated), nuisance, CALIBRATION, tell)
+    trial = search.tried(shown, None, PASSES, {}).get(kind.name)
+    if trial is None or type(trial.law) is not type(problem.oscillator.law):
+        return problem, point
+    other = _posed(trial.system, free_names(trial.system, None), nuisance, problem.stretches)
+    end = descend(other, other.begin(np.zeros(len(other.knobs))), tell=tell)
+    return (other, end) if end.chi2 < point.chi2 else (problem, point)
+
+
+def _sliding_stretch(motion: Shown, number: int) -> Stretch:
+    """A record from its first fast sliding to its end."""
+    motion.require_sliding()
+    return motion.stretch(number, (int(motion.slides()[0]), len(motion.record) - 1))
+
+
+def _descended(problem: Problem, tell: Callable[[], None]) -> Point:
+    """Where the search ends; that of a rough surface begins where one by a part of the readings ends."""
+    point = problem.begin(np.zeros(len(problem.knobs)))
+    if problem.profile:
+        few = thinned_out(problem)
+        first = descend(few, few.begin(point.u), tell=tell)
+        states = zip(first.starts, point.starts, strict=True)
+        point = problem.at(first.u, tuple(np.append(a, b[len(a) :]) for a, b in states))
+    point = descend(problem, point, tell=tell)
+    if not math.isfinite(point.chi2):
+        raise EstimateError(
+            f"{problem.oscillator.law!r} can not be simulated along this record",
+            "the search starts from a motion that exists",
+            "start from other values of the law",
+        )
+    return point
 
 
 def compare_laws(
@@ -138,7 +346,7 @@ def compare_laws(
     require_apart(oscillator, (), nuisance or (), shown)
     known = tuple(nuisance) if nuisance is not None else usual_nuisance(oscillator, (), shown)
     systems = [oscillator, *([seen_damping(oscillator, shown)] if "damping" in known else [])]
-    search = _Search(kinds, _seen(records, systems), known, calibration, teller(progress, CALLS * len(kinds)))
+    search = _Search(kinds, seen_by(records, systems), known, calibration, teller(progress, CALLS * len(kinds)))
     trials, looked = search.trials(shown)
     rests = search.seen[-1][1].rests  # of the balance with the likelier damper
     misfits = [
@@ -176,36 +384,8 @@ class _Looked(NamedTuple):
     worries: tuple[str, ...]
 
 
-class _Search(NamedTuple):
-    """What stays the same while laws are searched: their starts, what is fitted beside them, and who is told."""
-
-    kinds: Sequence[tuple[Hypothesis, list[Any]]]
-    seen: Sequence[tuple[Oscillator, Seen]]
-    known: Sequence[str]
-    calibration: float
-    tell: Callable[[], None]
-
-    def stretch(self, evidence: Evidence | None) -> Callable[[Shown, int], Stretch]:
-        """How a record is weighed: by its noise and calibration, and by evidence where there is some."""
-        return lambda shown, number: weighed(shown, number, self.calibration, evidence)
-
-    def tried(
-        self, shown: Sequence[Shown], evidence: Evidence | None, passes: int, before: Mapping[str, Trial]
-    ) -> dict[str, Trial]:
-        """Every law searched, or its search taken up again."""
-        stretches = [self.stretch(evidence)(motion, number) for number, motion in enumerate(shown)]
-        trials: dict[str, Trial] = {}
-        for kind, given in self.kinds:
-            name = kind.name
-            least = min((one.point.chi2 for one in {**before, **trials}.values()), default=math.inf)
-            trial = resumed(before[name], stretches, least, passes, self.tell) if name in before else None
-            if trial is None:
-                begun = [replace(system, law=law) for system, seen in self.seen for law in given or kind.guesses(seen)]
-                begun += _continued(kind, trials)
-                trial = searched(name, begun, stretches, self.known, self.calibration, least, passes, self.tell)
-            if trial is not None:
-                trials[name] = trial
-        return trials
+class _Search(Search):
+    """Laws searched, the likeliest looked at more closely and fitted."""
 
     def trials(self, shown: Sequence[Shown]) -> tuple[dict[str, Trial], _Looked]:
         """Every law at the end of its search; a first look tells which channels count, how much, and their mounts."""
@@ -250,19 +430,6 @@ class _Search(NamedTuple):
         whole = [weighed(motion, number, self.calibration, whole=True) for number, motion in enumerate(shown)]
         fit = _fit(best, shown, whole, self.tell)
         return fit if best.name != "static" or rigid is None else _with_static(fit, rigid)
-
-
-def _seen(records: Sequence[Record], systems: Sequence[Oscillator]) -> list[tuple[Oscillator, Seen]]:
-    """What the records show by each of several dampers; one that leaves no friction is none."""
-    seen, refused = [], None
-    for system in systems:
-        try:
-            seen.append((system, Seen.of(records, system)))
-        except EstimateError as error:
-            refused = error
-    if refused and not seen:
-        raise refused
-    return seen
 
 
 def _excess(fit: LawFit) -> Estimate:
@@ -349,15 +516,6 @@ def _widened(estimate: Estimate, share: float, times: float) -> Estimate:
     below, above = (times * math.hypot(end, NORMAL_95 * more) for end in ends)
     interval = (max(min(0.0, low), estimate.value - below), estimate.value + above)
     return replace(estimate, interval=interval, sd=times * math.hypot(estimate.sd, more))
-
-
-def _continued(kind: Hypothesis, before: Mapping[str, Trial]) -> list[Oscillator]:
-    """Where else a search begins: at the ends of simpler laws' searches, with the damper of the one that left least."""
-    if not before:
-        return []
-    nearest = min(before.values(), key=lambda trial: trial.point.chi2)
-    stated = nearest.problem.oscillator.having(damping=nearest.system.damping)
-    return [replace(stated, law=law) for law in kind.continued(before)]
 
 
 def _kinds(laws: Sequence[Any] | None) -> list[tuple[Hypothesis, list[Any]]]:

@@ -71,7 +71,11 @@ class CompliantContact:
     @classmethod
     def hypotheses(cls) -> tuple[Hypothesis, ...]:
         """A contact that gives way."""
-        return (Hypothesis("compliant", Family("compliant", "that of a compliant contact"), guesses, _from_coulomb),)
+        return (
+            Hypothesis(
+                "compliant", Family("compliant", "that of a compliant contact"), guesses, _from_coulomb, ("Coulomb",)
+            ),
+        )
 
     def own_formula(self) -> str:
         """The formula, with how the contact moves in slip by this rule."""

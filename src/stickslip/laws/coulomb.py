@@ -51,6 +51,7 @@ class Coulomb(Rigid):
                 RIGID,
                 lambda seen: [_exceeding(seen.level, excess) for excess in (seen.excess, *EXCESSES)],
                 lambda simpler: [_exceeding(simpler["Coulomb"].law.kinetic, LITTLE)] if "Coulomb" in simpler else [],
+                ("Coulomb",),
                 holds=lambda law: law.static is not None,
             ),
         )

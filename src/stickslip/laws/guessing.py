@@ -128,6 +128,8 @@ class Hypothesis(NamedTuple):
         Where its search begins, from friction as it was observed.
     continued : callable
         Where else: at the end of the search of a simpler law that it contains, what it adds hardly felt.
+    contains : tuple of str
+        Those simpler laws, by name: it never leaves more than they do.
     holds : callable
         Whether a law of the class is this one, by its values.
     """
@@ -136,6 +138,7 @@ class Hypothesis(NamedTuple):
     family: Family
     guesses: Callable[[Observed], list[Any]]
     continued: Callable[[Mapping[str, Searched]], list[Any]] = nothing
+    contains: tuple[str, ...] = ()
     holds: Callable[[Any], bool] = always
 
 
@@ -242,6 +245,13 @@ def hypothesis_of(law: Any) -> Hypothesis:
         raise ModelError(f"law {law!r}", "a law has modes or rates", "give a law's name, its class, or one with values")
     held = [hypothesis for hypothesis in asked_for(kind) if law is kind or hypothesis.holds(law)]
     return held[0] if law is kind else held[-1]
+
+
+def contained(kind: Hypothesis) -> set[str]:
+    """The simpler laws that a law contains, and those that these contain."""
+    known = hypotheses()
+    own = {name for name in kind.contains if name in known}
+    return own.union(*(contained(known[name]) for name in own))
 
 
 def _plain(name: str) -> str:

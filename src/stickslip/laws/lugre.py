@@ -72,7 +72,11 @@ class LuGre(Sliding):
     @classmethod
     def hypotheses(cls) -> tuple[Hypothesis, ...]:
         """Bristles."""
-        return (Hypothesis("LuGre", Family("LuGre", "that of bristles (LuGre)"), _guesses, _from_simpler),)
+        return (
+            Hypothesis(
+                "LuGre", Family("LuGre", "that of bristles (LuGre)"), _guesses, _from_simpler, ("compliant", "Stribeck")
+            ),
+        )
 
     @property
     def memory(self) -> Mapping[str, Row]:
@@ -124,18 +128,19 @@ def _guesses(seen: Observed) -> list[LuGre]:
 
 
 def _from_simpler(simpler: Mapping[str, Searched]) -> list[LuGre]:
-    """The Stribeck curve with bristles next to rigid, where the contact is; else the contact with a steep curve."""
+    """The contact with a steep curve, where it gives way; and the Stribeck curve with bristles next to rigid."""
     contact, curve = simpler.get("compliant"), simpler.get("Stribeck")
+    begun = []
     if contact is not None and not contact.stiff:
         bristle, speed = contact.law, FALLS[-1] * float(contact.scales[:, 1].max())
         static = (1 + LITTLE) * bristle.kinetic
-        return [LuGre(bristle.kinetic, static, speed=speed, stiffness=bristle.stiffness, damping=bristle.damping)]
-    if contact is None or curve is None:
-        return []
-    law = curve.law
-    stiffness = 2 * law.kinetic / (STIFF * float(curve.scales[:, 0].min()))
-    damping = 0.2 * math.sqrt(stiffness * curve.mass)
-    return [LuGre(law.kinetic, law.static, speed=law.speed, stiffness=stiffness, damping=damping)]
+        begun.append(LuGre(bristle.kinetic, static, speed=speed, stiffness=bristle.stiffness, damping=bristle.damping))
+    if curve is not None:
+        law = curve.law
+        stiffness = 2 * law.kinetic / (STIFF * float(curve.scales[:, 0].min()))
+        damping = 0.2 * math.sqrt(stiffness * curve.mass)
+        begun.append(LuGre(law.kinetic, law.static, speed=law.speed, stiffness=stiffness, damping=damping))
+    return begun
 
 
 def _bristles(seen: Observed, stiffness: Array, speed: Array, excess: Array) -> Array:

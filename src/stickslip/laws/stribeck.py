@@ -92,7 +92,7 @@ class Stribeck(Rigid):
     @classmethod
     def hypotheses(cls) -> tuple[Hypothesis, ...]:
         """Friction that falls with the speed."""
-        return (Hypothesis("Stribeck", RIGID, _guesses, _from_static),)
+        return (Hypothesis("Stribeck", RIGID, _guesses, _from_static, ("static",)),)
 
     def _curve(self, speed: Expression) -> Expression:
         return stribeck_curve(self, speed) + self.viscous * speed
