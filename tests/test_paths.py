@@ -59,6 +59,8 @@ def test_short_paths_curves_and_words_stay() -> None:
     assert compact(marker) == '<path d="M 0 3 C 0.79 3 1.55 2.68 2.12 2.12 z"/>'
     curve = "M 0 0 " + "C 1 0 2 1 3 1 C 4 0 5 1 6 1 " * (LONG // 20) + "z"
     assert compact(f'<path d="{curve}"/>').startswith('<path d="m0 0c1 0 2 1 3 1c1-1 2 0 3 0'), "from where one ended"
+    curve = "M 0 0 " + "C 0.4 -0.4 0.6 -1 0.6 -1.6 C 0.6 -1 0.4 -0.4 0 0 " * (LONG // 30) + "z"
+    assert compact(f'<path d="{curve}"/>').startswith('<path d="m0 0c.4-.4.6-1 .6-1.6'), "-1 .6 is not -1.6"
     words = "<text style=\"font-size: 8px; font-family: 'DejaVu Sans', sans-serif; fill: red\">a  b</text>"
     assert compact(f"<svg x='1'>{words}\n  {words}</svg>") == (
         "<svg font-family=\"'DejaVu Sans', sans-serif\" x='1'>"

@@ -381,11 +381,17 @@ def _line(across: int, down: int) -> str:
 
 
 def _joined(numbers: list[int]) -> str:
-    """Numbers with a blank between two only where they would run together."""
-    joined = ""
+    """Numbers with a blank between two only where they would run together.
+
+    Examples
+    --------
+    >>> _joined([4, -4, 6, -10, 6, -16])
+    '.4-.4.6-1 .6-1.6'
+    """
+    joined, before = "", ""
     for number in map(_tenths, numbers):
-        alone = not joined or number[0] == "-" or (number[0] == "." and "." in joined[joined.rfind(" ") + 1 :])
-        joined += number if alone else f" {number}"
+        alone = not before or number[0] == "-" or (number[0] == "." and "." in before)
+        joined, before = joined + (number if alone else f" {number}"), number
     return joined
 
 

@@ -303,14 +303,23 @@ def _run_tables(tour: Tour) -> list[Table]:
 
 def _runs(tour: Tour) -> Table:
     """Every run in a row."""
-    names = ("sliding friction", "stuck share of the time", "contact stiffness", "static over sliding friction")
+    names = ("sliding friction", "stuck share of the time", "contact stiffness")
     rows = []
     for finding, run in zip(tour.comparison.findings, tour.runs, strict=True):
-        cells = [value_of(one) if (one := _of(tuple(finding.estimates), name)) else "–" for name in names]
+        estimates = tuple(finding.estimates)
+        cells = [value_of(one) if (one := _of(estimates, name)) else "–" for name in names]
+        cells.append(_excess(_of(estimates, "static over sliding friction")))
         rows.append([f"{run.frequency:g} Hz", f"{1e3 * run.amplitude:g} mm", run.why, *cells])
     heads = ("base", "amplitude", "what for", "sliding friction", "stuck", "contact stiffness", "static over sliding")
     note = "Each run has its own section below, with intervals and figures; –: not asked, or not told by that run."
     return Table("What the runs tell", heads, rows, note)
+
+
+def _excess(ratio: Estimate | None) -> str:
+    """Static over sliding friction; where it may be 1, what it lies below."""
+    if ratio is None or not ratio.known:
+        return "–"
+    return value_of(ratio) if ratio.interval[0] > 1 else f"below {ratio.interval[1]:.3g}"
 
 
 def _next(tour: Tour) -> Table:
