@@ -39,7 +39,7 @@ def moved(section: str, name: str) -> dict[str, dict[str, float]]:
 @functools.cache
 def numbers(chapter: str) -> printed.Ours:
     """Ours, of what the thesis prints."""
-    found: printed.Ours = page.module_of(chapter).numbers(printed.given())
+    found: printed.Ours = page.CHAPTERS[chapter].numbers(printed.given())
     return found
 
 
@@ -65,7 +65,7 @@ def test_every_number_of_a_chapter_is_shown(chapter: str) -> None:
 @pytest.mark.parametrize("chapter", MOVED)
 def test_numbers_follow_from_the_parameters(chapter: str) -> None:
     section, name, number = MOVED[chapter]
-    before, after = numbers(chapter)[number], page.module_of(chapter).numbers(moved(section, name))[number]
+    before, after = numbers(chapter)[number], page.CHAPTERS[chapter].numbers(moved(section, name))[number]
     assert abs(np.ravel(after)[-1] / np.ravel(before)[-1] - 1) > 1e-4
 
 

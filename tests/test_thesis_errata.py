@@ -11,7 +11,7 @@ import pytest
 import stickslip as ss
 from stickslip.decay import extremes as ex
 from stickslip.signals.derivatives import five_point_response
-from stickslip_thesis import beyond, chapter2, chapter3, chapter4, chapter6, chapter7, flange, readings
+from stickslip_thesis import beyond, chapter2, chapter3, chapter4, chapter6, chapter7
 from stickslip_thesis.printed import given
 
 GIVEN = given()
@@ -119,23 +119,23 @@ def test_the_accelerometer_leads_so_it_is_read_late() -> None:
 def test_the_flange_explains_47_hz() -> None:
     told = GIVEN["rig"]
     for share in (0.15, 0.2, 0.3, 0.5):
-        slow, fast = flange.coupled({**told, "mounting_share": share})
+        slow, fast = chapter2.coupled({**told, "mounting_share": share})
         assert 46.95 < slow < 47.55
         assert fast == pytest.approx(250.0)
-    part = flange.Flange.of(told)
+    part = chapter2.Flange.of(told)
     assert 1 / (1 / part.contact + 1 / part.mounting) == pytest.approx(told["stiffness"])
     with pytest.raises(ss.errors.ModelError, match="larger share"):
-        flange.coupled({**told, "mounting_share": 0.1})
+        chapter2.coupled({**told, "mounting_share": 0.1})
 
 
 def test_what_the_cell_passes_on_is_the_force_on_the_slider() -> None:
     """Without faults of sensors the computed friction and the cell's less the flange's inertia are one force."""
     told, case = {**GIVEN["rig"], "damping_ratio": 0.0}, 0
     drive = ss.drives.HarmonicBase(told["base"][case], frequency=told["frequency"][case])
-    run = ss.simulate(flange.slider(told, drive), duration=2.0)
+    run = ss.simulate(chapter2.with_flange(told, drive), duration=2.0)
     times = np.linspace(0.5, 2.0, 4001)
     x, _, a, of_flange, friction, z = run.sample(times, ("x", "a", "friction", "z"))[0]
-    mass = flange.Flange.of(told).mass
+    mass = chapter2.Flange.of(told).mass
     computed = told["spring"] * (z - x) - told["mass"] * a
     assert friction + mass * of_flange - mass * a == pytest.approx(computed, abs=1e-8)
 
@@ -225,14 +225,14 @@ def test_the_printed_micro_slips_follow_under_one_reading() -> None:
     told, mean = GIVEN["stick_slip"], GIVEN["stick_slip"]["stiffness"]
     table = {
         (reading.factor, reading.coupled): [
-            readings.counts(told, reading, stiffness=mean, kinetic=kinetic) for kinetic in (1.06, 1.10, 1.24, 1.28)
+            chapter4.counts(told, reading, stiffness=mean, kinetic=kinetic) for kinetic in (1.06, 1.10, 1.24, 1.28)
         ]
-        for reading in readings.READINGS
+        for reading in chapter4.READINGS
     }
     assert (0, 2) in table.pop((4.0, True)), "at 1.24 N"
     assert (0, 2) not in [pair for pairs in table.values() for pair in pairs]
     orbits = [chapter4.stick_slip(GIVEN, told[name]) for name in ("case1", "case2")]
-    assert [readings.micro_slips(orbit) for orbit in orbits] == [0, 2]
+    assert [chapter4.micro_slips(orbit) for orbit in orbits] == [0, 2]
 
 
 @pytest.mark.parametrize(("kinetic", "counts"), [(1.06, [2, 2, 2, 0]), (1.10, [2, 2, 2, 0]), (1.28, [2, 1, 1, 0])])
@@ -241,8 +241,6 @@ def test_micro_slips_go_with_damping(kinetic: float, counts: list[int]) -> None:
 
     def counted(damping: float) -> int:
         law = ss.laws.CompliantContact(kinetic, stiffness=told["stiffness"], damping=damping)
-        return readings.micro_slips(
-            readings.stick_slip(law, told["base"], told["frequency"], told["mass"], told["spring"])
-        )
+        return chapter4.micro_slips(chapter4.steady(told["mass"], told["spring"], law, told["base"], told["frequency"]))
 
     assert [counted(damping) for damping in (76.0, 80.0, 130.0, 400.0)] == counts

@@ -9,7 +9,7 @@ import pytest
 from matplotlib.figure import Figure
 
 import stickslip as ss
-from stickslip_thesis import beyond, chapter7, drawing, page, printed, small
+from stickslip_thesis import beyond, chapter7, drawing, page, printed
 
 Sketch = Callable[[printed.Given], Figure]
 
@@ -18,7 +18,7 @@ OURS = {"4": 1, "6": 1, "7": 2, "beyond": 8}  # figures that the thesis does not
 
 @pytest.mark.parametrize("chapter", page.CHAPTERS)
 def test_every_figure_is_drawn(chapter: str) -> None:
-    plates = list(page.module_of(chapter).plates(printed.given()))
+    plates = list(page.CHAPTERS[chapter].plates(printed.given()))
     drawn = {plate.title.removeprefix("Figure ") for plate in plates}
     wanted = {
         number
@@ -53,7 +53,7 @@ def test_a_dither_for_what_was_identified_serves_others_with_a_margin() -> None:
 
 def test_more_damping_leaves_fewer_micro_slips_whatever_the_geometry() -> None:
     given = printed.given()
-    maps = {geometry: small.counted(given, geometry) for geometry in small.GEOMETRIES}
+    maps = {geometry: beyond.counted(given, geometry) for geometry in beyond.GEOMETRIES}
     for counts in maps.values():
         assert np.mean(counts[0]) > np.mean(counts[-1]) == 0
     assert np.ptp(maps["flat"], axis=1).max() == 0, "loads and motions in proportion, and so everything"
@@ -62,12 +62,12 @@ def test_more_damping_leaves_fewer_micro_slips_whatever_the_geometry() -> None:
 
 def test_micro_slips_are_heard() -> None:
     given = printed.given()
-    assert 3 < small.level(small.sound(given, "case2")) - small.level(small.sound(given, "case1")) < 6
+    assert 3 < beyond.level(beyond.sound(given, "case2")) - beyond.level(beyond.sound(given, "case1")) < 6
 
 
 def test_a_lag_behind_the_contact_s_spring_rounds_what_falls() -> None:
     """The peak where sliding begins comes late, and friction is less where the motion slows down."""
-    at_once, late = (small.delayed(printed.given(), lag) for lag in (0.0, 0.003))
+    at_once, late = (beyond.delayed(printed.given(), lag) for lag in (0.0, 0.003))
     slowing = (at_once["v"] > 2e-3) & (at_once["v"] < 8e-3) & (at_once["a"] < 0)
     assert np.mean(late["friction"][slowing]) < np.mean(at_once["friction"][slowing]) - 0.02
 

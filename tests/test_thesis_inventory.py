@@ -12,21 +12,21 @@ import pytest
 
 import stickslip as ss
 from stickslip.cli.program import main
-from stickslip_thesis import inventory, printed
+from stickslip_thesis import printed
 
 ROOT = Path(__file__).parent.parent
 PAGE = ROOT / "docs" / "thesis_inventory.md"
 
 
-def by_item(item: inventory.Item) -> str:
+def by_item(item: printed.Item) -> str:
     return f"{item.section} {item.what}"
 
 
-ITEMS = pytest.mark.parametrize("item", inventory.items(), ids=by_item)
+ITEMS = pytest.mark.parametrize("item", printed.items(), ids=by_item)
 
 
 @ITEMS
-def test_its_commands_and_functions_exist(item: inventory.Item) -> None:
+def test_its_commands_and_functions_exist(item: printed.Item) -> None:
     for name in item.by:
         kind, *path = name.split(" ") if name.startswith("stickslip ") else name.split(".")
         assert kind in ("stickslip", "ss"), name
@@ -40,23 +40,23 @@ def test_its_commands_and_functions_exist(item: inventory.Item) -> None:
 
 
 @ITEMS
-def test_its_test_exists(item: inventory.Item) -> None:
+def test_its_test_exists(item: printed.Item) -> None:
     if item.test:
         file, _, name = item.test.partition("::")
         assert re.search(rf"^def {name}\(", (ROOT / "tests" / f"{file}.py").read_text("utf-8"), re.MULTILINE), item.test
-    assert bool(item.test) == (item.state != inventory.MISSING)
-    assert bool(item.seen) == (item.state != inventory.MISSING)
+    assert bool(item.test) == (item.state != printed.MISSING)
+    assert bool(item.seen) == (item.state != printed.MISSING)
 
 
 def test_every_figure_of_the_thesis_is_in_it() -> None:
-    assert {figure for item in inventory.items() for figure in item.figures} == set(printed.captions())
+    assert {figure for item in printed.items() for figure in item.figures} == set(printed.captions())
 
 
 def test_the_page_has_the_table() -> None:
-    assert PAGE.read_text("utf-8").endswith(inventory.table(inventory.items()) + "\n"), (
-        f"write it anew: python -m stickslip_thesis.inventory > {PAGE}"
+    assert PAGE.read_text("utf-8").endswith(printed.inventory(printed.items()) + "\n"), (
+        f"below its first paragraph {PAGE} holds: print(printed.inventory(printed.items()))"
     )
 
 
 def test_the_examples_run() -> None:
-    assert not doctest.testmod(inventory).failed
+    assert not doctest.testmod(printed).failed

@@ -21,15 +21,12 @@ from stickslip_thesis import (
     beyond,
     chapter2,
     chapter3,
+    chapter4,
     chapter6,
     chapter7,
-    flange,
-    inventory,
-    observations,
+    measures,
     page,
     printed,
-    readings,
-    small,
 )
 
 HERE = Path(__file__).parent
@@ -43,14 +40,14 @@ def numbers() -> dict[str, Any]:
     given = printed.given()
     chapters = [page.run_chapter(name, draw=False) for name in page.CHAPTERS]
     verdicts = page.results(chapters)["verdicts"]
-    states = Counter(item.state for item in inventory.items())
-    expected = [one.why == "" for one in observations.observations()]
+    states = Counter(item.state for item in printed.items())
+    expected = [one.why == "" for one in measures.observations()]
     return {
         "version": ss.__version__,
         "verdicts": {name: count for name, count in verdicts.items() if count},
         "meanings": printed.MEANINGS,
         "total": sum(verdicts.values()),
-        "items": len(inventory.items()),
+        "items": len(printed.items()),
         "states": states,
         "observations": len(expected),
         "seen": sum(expected),
@@ -63,8 +60,8 @@ def numbers() -> dict[str, Any]:
         **_readings(given),
         **_squeal(given),
         **_small(given),
-        "unseen": [one for one in observations.observations() if one.why],
-        "parts": [item for item in inventory.items() if item.state == "in part"],
+        "unseen": [one for one in measures.observations() if one.why],
+        "parts": [item for item in printed.items() if item.state == "in part"],
     }
 
 
@@ -88,11 +85,11 @@ def _identity(given: printed.Given) -> dict[str, Any]:
 
 
 def _flange(given: printed.Given) -> dict[str, Any]:
-    slow, fast = flange.coupled(given["rig"])
+    slow, fast = chapter2.coupled(given["rig"])
     told = given["rig"]
     records = [chapter2.rubbing(given, case) for case in range(3)]
     return {
-        "flange_mass": flange.Flange.of(told).mass,
+        "flange_mass": chapter2.Flange.of(told).mass,
         "flange_slow": slow,
         "flange_fast": fast,
         "one_mass": math.sqrt((told["spring"] + told["stiffness"]) / told["mass"]) / (2 * math.pi),
@@ -155,14 +152,14 @@ def _limits(given: printed.Given) -> dict[str, Any]:
 def _readings(given: printed.Given) -> dict[str, Any]:
     """Micro-slips of both cases under each reading of the damping ratio, least and most over the frictions printed."""
     told, rows = given["stick_slip"], []
-    for reading in readings.READINGS:
+    for reading in chapter4.READINGS:
         pairs = [
-            readings.counts(told, reading, stiffness=told["stiffness"], kinetic=kinetic)
-            for kinetic in readings.FRICTIONS
+            chapter4.counts(told, reading, stiffness=told["stiffness"], kinetic=kinetic)
+            for kinetic in chapter4.FRICTIONS
         ]
-        agreeing = [kinetic for kinetic, pair in zip(readings.FRICTIONS, pairs, strict=True) if pair == readings.COUNTS]
+        agreeing = [kinetic for kinetic, pair in zip(chapter4.FRICTIONS, pairs, strict=True) if pair == chapter4.COUNTS]
         rows.append((reading.formula, *zip(*pairs, strict=True), agreeing))
-    return {"readings": rows, "counts": readings.COUNTS}
+    return {"readings": rows, "counts": chapter4.COUNTS}
 
 
 def _squeal(given: printed.Given) -> dict[str, Any]:
@@ -186,8 +183,8 @@ def _small(given: printed.Given) -> dict[str, Any]:
     period = 1 / designed.frequency
     left = {times: beyond.tried(given, times) for times in (1.0, beyond.STRONGER)}
     return {
-        "loud": small.level(small.sound(given, "case2")),
-        "silent": small.level(small.sound(given, "case1")),
+        "loud": beyond.level(beyond.sound(given, "case2")),
+        "silent": beyond.level(beyond.sound(given, "case1")),
         "ring": ring,
         "dither": 1e6 * designed.amplitude.value,
         "dither_frequency": designed.frequency,
@@ -195,7 +192,7 @@ def _small(given: printed.Given) -> dict[str, Any]:
         "failed": [name for name, (_, after) in left[1.0].items() if after > period],
         "failed_with_more": [name for name, (_, after) in left[beyond.STRONGER].items() if after > period],
         "more": 100 * (beyond.STRONGER - 1),
-        "steel": small.ring(
+        "steel": beyond.ring(
             given, ss.laws.pair("steel on steel").stiffness(given["beyond"]["load"], radius=given["beyond"]["radius"])
         ),
         "radius": 1e3 * given["beyond"]["radius"],

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import json
 import re
 import tomllib
 from collections.abc import Iterable, Mapping, Sequence
@@ -68,6 +69,32 @@ def _parsed(text: str, *, source: str) -> dict[str, Any]:
             "a number is written with at most a few hundred",
             "correct it",
         ) from error
+
+
+def toml_value(value: Any) -> str:
+    r"""A number, a text, a list or an inline table as TOML writes it.
+
+    Examples
+    --------
+    >>> print(toml_value({"name": 'a sieve of 6"', "forces": (0.5, 1)}))
+    { name = "a sieve of 6\"", forces = [0.5, 1] }
+    """
+    if isinstance(value, Mapping):
+        return f"{{ {', '.join(f'{toml_key(key)} = {toml_value(inner)}' for key, inner in value.items())} }}"
+    if isinstance(value, list | tuple):
+        return f"[{', '.join(map(toml_value, value))}]"
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, int | float):
+        return repr(value)
+    # a text of JSON is one of TOML, which takes no sign of deletion
+    return json.dumps(str(value), ensure_ascii=False).replace("\x7f", "\\u007f")
+
+
+def toml_key(key: str) -> str:
+    """A key, in quotes where TOML wants them."""
+    bare = key.replace("_", "").replace("-", "").isalnum() and key.isascii()
+    return key if bare else toml_value(key)
 
 
 def checked(

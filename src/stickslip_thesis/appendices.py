@@ -20,18 +20,18 @@ STARTS_FROM = ("rig", "discharge")  # sections of given.toml
 
 def numbers(given: Given) -> Ours:
     """The appendices' numbers."""
-    fs, told = given["rig"]["fs"], given["discharge"]
+    fs, section = given["rig"]["fs"], given["discharge"]
     zero = brentq(lambda frequency: float(five_point_response(frequency, fs)), 0.15 * fs, 0.25 * fs)
-    lost = 1 - math.exp(-told["hold"] / told["constant"])
+    lost = 1 - math.exp(-section["hold"] / section["constant"])
     return {
         "folding frequency": fs / 2e3,
         "phase kept up to": float(zero),
         "left after the constant": 100 * math.exp(-1),
         "lost in a tenth": 100 * (1 - math.exp(-0.1)),
-        "tenth of the constant": 0.1 * told["constant"],
-        "share of the constant": 100 * told["hold"] / told["constant"],
+        "tenth of the constant": 0.1 * section["constant"],
+        "share of the constant": 100 * section["hold"] / section["constant"],
         "lost while held": 100 * lost,
-        "drift": lost * told["friction"],
+        "drift": lost * section["friction"],
     }
 
 

@@ -1,19 +1,26 @@
-"""Chapter 2: friction measured two ways, by a load cell and from the forces that balance it."""
+"""Chapter 2: friction measured two ways, by a load cell and from the forces that balance it.
+
+The flange before the cell is a mass of its own: section 2.4 takes its inertia off the cell's reading, so that it stands
+between contact and cell; section 2.5 gives the cell with its mounting 250 Hz. Contact and mounting are two springs in
+series, and in series they have the stiffness of section 3.5. What the cell feels is then the force on the slider, and
+the flange shakes the slider: its 250 Hz are heard in the acceleration too.
+"""
 
 from __future__ import annotations
 
 import functools
 import math
 from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 import stickslip as ss
+from stickslip.errors import ModelError
 from stickslip.figures.style import BLUE, GREEN, INK, ORANGE, PURPLE, Plate, envelope, styled
 from stickslip.signals.derivatives import five_point_average
-from stickslip_thesis import flange
 from stickslip_thesis.drawing import apparatus, figure, panels, tag
 from stickslip_thesis.printed import Given, Ours
 
@@ -28,13 +35,14 @@ CELL_BAND = (180.0, 400.0)  # Hz: around the load cell's 250 Hz
 
 def numbers(given: Given) -> Ours:
     """The chapter's numbers."""
-    told, free = given["rig"], free_vibration(given)
+    section, free = given["rig"], free_vibration(given)
     lines = {
-        each.name: each.frequency.value for each in ss.balance.impact_test(impact(given), mass=told["mass"]).resonances
+        each.name: each.frequency.value
+        for each in ss.balance.impact_test(impact(given), mass=section["mass"]).resonances
     }
     return {
         "damping ratio": ss.decay.log_decrement(free).damping_ratio.value,
-        "natural frequency": math.sqrt(told["spring"] / told["mass"]),
+        "natural frequency": math.sqrt(section["spring"] / section["mass"]),
         "phase": lead(given, free),
         "contact": lines["coupled contact"],
         "accelerometer": lines["mount of the accelerometer"],
@@ -72,7 +80,7 @@ def plates(given: Given) -> Iterator[Plate]:
             f"rings from {HEARD[0]:g} to {HEARD[1]:g} Hz F2 has {heard:.2f} of F1; from {CELL_BAND[0]:g} to "
             f"{CELL_BAND[1]:g} Hz {ringing:.2f}, where the accelerometer on its mount of 125 Hz hears less, too.",
         )
-    slow, fast = flange.coupled(given["rig"])
+    slow, fast = coupled(given["rig"])
     yield figure(
         "2.11",
         _impact(given),
@@ -100,11 +108,11 @@ def _sensors(given: Given) -> dict[str, float]:
 
     It is late by its own mount; and where the motion decays, the acceleration leads by twice the damping ratio anyhow.
     """
-    told = given["rig"]
+    section = given["rig"]
     mount = next(sensor.mount for sensor in ss.Rig().sensors if sensor.channel == "a")
     assert mount is not None
     late = mount.damping / (math.pi * mount.frequency)
-    return {"fs": told["fs"], "lag": (told["phase"] - 2 * told["damping_ratio"]) / told["natural"] + late}
+    return {"fs": section["fs"], "lag": (section["phase"] - 2 * section["damping_ratio"]) / section["natural"] + late}
 
 
 def lead(given: Given, free: ss.Record) -> float:
@@ -114,13 +122,82 @@ def lead(given: Given, free: ss.Record) -> float:
     return float(np.angle(np.sum(window * free["a"]) / np.sum(window * -free["x"])))
 
 
+@dataclass(frozen=True)
+class Flange:
+    """Mass [kg] of the flange, stiffness [N/m] of the contact before it and of the cell's mounting behind it."""
+
+    mass: float
+    contact: float
+    mounting: float
+
+    @classmethod
+    def of(cls, section: Mapping[str, Any]) -> Flange:
+        """From the series stiffness, the share of its give that is the mounting's, and the frequency when engaged.
+
+        At w the pencil of slider and flange is singular, a quadratic in the flange's mass; the lighter one is meant.
+
+        Raises
+        ------
+        ModelError
+            No flange rings so low, or a share that is none.
+        """
+        if not 0 < section["mounting_share"] < 1:
+            raise ModelError(
+                f"mounting_share = {section['mounting_share']}", "a share is between 0 and 1", "correct it"
+            )
+        contact = section["stiffness"] / (1 - section["mounting_share"])
+        mounting = section["stiffness"] / section["mounting_share"]
+        square = (2 * math.pi * section["mounting_frequency"]) ** 2
+        slider, flange = section["spring"] + mounting - square * section["mass"], mounting + contact
+        roots = np.roots([square**2, square * (slider - flange), mounting**2 - slider * flange])
+        if np.iscomplex(roots).any():
+            raise ModelError(
+                f"mounting_share = {section['mounting_share']:g} at {section['mounting_frequency']:g} Hz",
+                "no flange on so stiff a mounting rings so low",
+                "give the mounting a larger share",
+            )
+        return cls(float(np.min(roots.real)), contact, mounting)
+
+
+def with_flange(section: Mapping[str, Any], drive: Any) -> ss.Structure:
+    """Slider and flange on the air track, the friction contact at the flange, the base on the slider's spring."""
+    flange = Flange.of(section)
+    track = 2 * section["damping_ratio"] * math.sqrt(section["mass"] * section["spring"])
+    lost = section["contact_damping"] * (flange.contact / section["stiffness"]) ** 2  # in series, what the slider feels
+    law = ss.laws.CompliantContact(section["kinetic"], stiffness=flange.contact, damping=lost)
+    between = 2 * section["mounting_damping"] * math.sqrt(flange.mounting * flange.mass)
+    link = np.array([[1.0, -1.0], [-1.0, 1.0]])
+    return ss.Structure(
+        np.diag([section["mass"] - flange.mass, flange.mass]),
+        np.diag([track, 0.0]) + between * link,
+        np.diag([section["spring"], 0.0]) + flange.mounting * link,
+        contacts=[ss.Contact(law, [0, 1])],
+        drive=drive,  # moves both alike: the link between them does not feel it
+    )
+
+
+def coupled(section: Mapping[str, Any]) -> tuple[float, float]:
+    """Frequencies [Hz] of slider and flange with the contact engaged."""
+    flange, system = Flange.of(section), with_flange(section, ss.drives.Release())
+    stiffness = np.asarray(system.stiffness) + np.diag([0.0, flange.contact])
+    squares = np.sort(np.linalg.eigvals(np.linalg.solve(np.asarray(system.mass), stiffness)).real)
+    slow, fast = np.sqrt(squares) / (2 * math.pi)
+    return float(slow), float(fast)
+
+
+def felt_by_cell(section: Mapping[str, Any], rig: ss.Rig) -> ss.Rig:
+    """A rig whose cell feels the friction and the flange's inertia, its mounting being the structure's own."""
+    mount = ss.rig.Mount(math.inf, 0.0, mass=Flange.of(section).mass, on="a2")
+    return rig.having("load", of="friction", mount=mount).having("x", of="x1").having("a", of="a1")
+
+
 def slider(given: Given, *, drive: Any = None) -> ss.Oscillator:
     """Mass and spring on the air track, the friction contact taken off."""
-    told = given["rig"]
-    damping = 2 * told["damping_ratio"] * math.sqrt(told["mass"] * told["spring"])
+    section = given["rig"]
+    damping = 2 * section["damping_ratio"] * math.sqrt(section["mass"] * section["spring"])
     drive = {} if drive is None else {"drive": drive}
     return ss.Oscillator(
-        mass=told["mass"], stiffness=told["spring"], damping=damping, law=ss.laws.Coulomb(0.0), **drive
+        mass=section["mass"], stiffness=section["spring"], damping=damping, law=ss.laws.Coulomb(0.0), **drive
     )
 
 
@@ -131,66 +208,66 @@ def free_vibration(given: Given) -> ss.Record:
 
 def forced(given: Given, case: int) -> ss.Record:
     """Figures 2.4 to 2.6: the base moves, without friction; settled."""
-    told = given["rig"]
-    drive = _driven(told["forced_base"][case], told["forced"][case])
+    section = given["rig"]
+    drive = _driven(section["forced_base"][case], section["forced"][case])
     return _measured(slider(given, drive=drive), 0.0, SETTLED, 1.0, **_sensors(given))
 
 
 def rubbing(given: Given, case: int) -> ss.Record:
     """Figures 2.7 to 2.10: with friction at the flange, as the sensors read."""
-    told = given["rig"]
-    drive = _driven(told["base"][case], told["frequency"][case])
+    section = given["rig"]
+    drive = _driven(section["base"][case], section["frequency"][case])
     sensors = _sensors(given)
-    return _rubbing(_constants(told), drive, **sensors)
+    return _rubbing(_constants(section), drive, **sensors)
 
 
-def _constants(told: Mapping[str, Any]) -> tuple[tuple[str, float], ...]:
+def _constants(section: Mapping[str, Any]) -> tuple[tuple[str, float], ...]:
     """The rig's numbers without what differs from case to case, as a key."""
-    return tuple(sorted((name, value) for name, value in told.items() if not isinstance(value, list)))
+    return tuple(sorted((name, value) for name, value in section.items() if not isinstance(value, list)))
 
 
 @functools.lru_cache(16)
 def _rubbing(constants: tuple[tuple[str, float], ...], drive: Any, *, fs: float, lag: float) -> ss.Record:
-    told = dict(constants)
-    run = ss.simulate(flange.slider(told, drive), duration=SETTLED + 2.0)
-    rig = flange.sensors(told, ss.Rig().having("x", lag=lag).having("z", lag=lag))
+    section = dict(constants)
+    run = ss.simulate(with_flange(section, drive), duration=SETTLED + 2.0)
+    rig = felt_by_cell(section, ss.Rig().having("x", lag=lag).having("z", lag=lag))
     return rig.stated(rig.measure(run, fs=fs, rng=2, start=SETTLED))
 
 
 def balanced(given: Given, case: int) -> ss.Record:
     """The same by the package's own balance, which takes the stated delays out."""
-    told = given["rig"]
-    return ss.friction_force(rubbing(given, case), mass=told["mass"], stiffness=told["spring"])
+    section = given["rig"]
+    return ss.friction_force(rubbing(given, case), mass=section["mass"], stiffness=section["spring"])
 
 
 def impact(given: Given) -> ss.Record:
     """Figure 2.11: the base held but for a half sine of 2 ms, which acts on the mass as a blow through the spring."""
-    told = given["rig"]
+    section = given["rig"]
     fs = 20_000.0
     time = np.arange(round(0.6 * fs)) / fs
-    blow = np.where((time > 0.1) & (time < 0.102), told["blow"] * np.sin(math.pi * (time - 0.1) / 2e-3), 0.0)
-    return _struck(_constants(told), tuple(blow / told["spring"]), fs)
+    blow = np.where((time > 0.1) & (time < 0.102), section["blow"] * np.sin(math.pi * (time - 0.1) / 2e-3), 0.0)
+    return _struck(_constants(section), tuple(blow / section["spring"]), fs)
 
 
 @functools.lru_cache(2)
 def _struck(constants: tuple[tuple[str, float], ...], base: tuple[float, ...], fs: float) -> ss.Record:
-    told = dict(constants)
-    run = ss.simulate(flange.slider(told, ss.drives.Recorded(base, fs=fs)), duration=(len(base) - 1) / fs)
-    return flange.sensors(told, ss.Rig()).measure(run, fs=4000, rng=4)
+    section = dict(constants)
+    run = ss.simulate(with_flange(section, ss.drives.Recorded(base, fs=fs)), duration=(len(base) - 1) / fs)
+    return felt_by_cell(section, ss.Rig()).measure(run, fs=4000, rng=4)
 
 
 def delayed(given: Given, values: Array, sign: int = 1) -> Array:
     """S(t - tau), tau = phi / omega_n; with `sign` -1 S(t + tau)."""
-    told = given["rig"]
-    time = np.arange(len(values)) / told["fs"]
-    return np.interp(time - sign * told["phase"] / told["natural"], time, values)
+    section = given["rig"]
+    time = np.arange(len(values)) / section["fs"]
+    return np.interp(time - sign * section["phase"] / section["natural"], time, values)
 
 
 def forces(given: Given, record: ss.Record, sign: int = 1) -> dict[str, Array]:
     """Spring, inertial and excitation force of section 2.3, from the sensors as they read."""
-    told = given["rig"]
-    found = {"spring": told["spring"] * record["x"], "inertia": told["mass"] * delayed(given, record["a"], sign)}
-    return found | ({"excitation": told["spring"] * record["z"]} if "z" in record else {})
+    section = given["rig"]
+    found = {"spring": section["spring"] * record["x"], "inertia": section["mass"] * delayed(given, record["a"], sign)}
+    return found | ({"excitation": section["spring"] * record["z"]} if "z" in record else {})
 
 
 def resultant(given: Given, record: ss.Record, sign: int = 1) -> Array:

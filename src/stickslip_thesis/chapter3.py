@@ -41,16 +41,16 @@ CASES = (0, 1, 2)  # 5.61, 8.7 and 11.1 Hz
 
 def numbers(given: Given) -> Ours:
     """The chapter's numbers."""
-    told = given["sliding"]
+    section = given["sliding"]
     orbits = [sliding(given, case) for case in CASES]
     slopes = [slopes_of_sticks(measured(given, case)) for case in CASES]
     speeds = [ss.contact.transition_speed(measured(given, case)).turns for case in CASES]
     return {
         "stiffness": [float(np.mean(each)) / 1e4 for each in slopes],
         "stiffness scatter": [float(np.std(each, ddof=1)) / 1e4 for each in slopes],
-        "mean stiffness": float(np.mean(told["stiffness"])),
+        "mean stiffness": float(np.mean(section["stiffness"])),
         "amplitude": [1e3 * orbit.amplitude for orbit in orbits],
-        "speed by equation": [equation_3_4(told, case) for case in CASES],
+        "speed by equation": [equation_3_4(section, case) for case in CASES],
         "speed read off": [float(np.mean(each)) for each in speeds],
         "speed scatter": [float(np.std(each, ddof=1)) for each in speeds],
         "base": [1e3 * base_for(given, case) for case in CASES],
@@ -102,19 +102,19 @@ def plates(given: Given) -> Iterator[Plate]:
 
 def contact(given: Given, case: int) -> ss.laws.CompliantContact:
     """The contact of one of the three cases, with the damping ratio that the thesis states, of m and k + K_y."""
-    told = given["sliding"]
-    stiffness = told["stiffness"][case]
-    whole = math.sqrt(told["mass"] * (told["spring"] + stiffness))
+    section = given["sliding"]
+    stiffness = section["stiffness"][case]
+    whole = math.sqrt(section["mass"] * (section["spring"] + stiffness))
     return ss.laws.CompliantContact(
-        told["kinetic"][case], stiffness=stiffness, damping=2 * told["damping_ratio"] * whole
+        section["kinetic"][case], stiffness=stiffness, damping=2 * section["damping_ratio"] * whole
     )
 
 
 def sliding(given: Given, case: int, *, base: float | None = None) -> ss.solve.SteadyState:
     """The steady motion at a base amplitude [m], that of Table 3.3 if none is told."""
-    told = given["sliding"]
-    base = told["base"][case] if base is None else base
-    return _steady(told["mass"], told["spring"], contact(given, case), base, told["frequency"][case])
+    section = given["sliding"]
+    base = section["base"][case] if base is None else base
+    return _steady(section["mass"], section["spring"], contact(given, case), base, section["frequency"][case])
 
 
 @functools.lru_cache(256)
@@ -125,18 +125,18 @@ def _steady(mass: float, spring: float, law: Any, base: float, frequency: float)
 
 def base_for(given: Given, case: int) -> float:
     """The base amplitude [m] under which the model moves as far as the experiment of Table 3.2."""
-    told = given["sliding"]
+    section = given["sliding"]
     found = brentq(
-        lambda base: sliding(given, case, base=base).amplitude - told["amplitude"][case],
-        0.98 * told["base"][case], 1.15 * told["base"][case], xtol=1e-9,
+        lambda base: sliding(given, case, base=base).amplitude - section["amplitude"][case],
+        0.98 * section["base"][case], 1.15 * section["base"][case], xtol=1e-9,
     )  # fmt: skip
     return float(found)
 
 
-def equation_3_4(told: Mapping[str, Any], case: int) -> float:
+def equation_3_4(section: Mapping[str, Any], case: int) -> float:
     """V_s [m/s] of equation 3.4, from the entries of Table 3.2."""
-    give = told["kinetic"][case] / told["stiffness"][case]
-    return 4 * math.pi * told["frequency"][case] * math.sqrt(told["amplitude"][case] * give - give**2)
+    give = section["kinetic"][case] / section["stiffness"][case]
+    return 4 * math.pi * section["frequency"][case] * math.sqrt(section["amplitude"][case] * give - give**2)
 
 
 @functools.lru_cache(8)
@@ -150,9 +150,9 @@ def _measured(mass: float, spring: float, law: Any, base: float, frequency: floa
 
 def measured(given: Given, case: int, *, surface: int = 4) -> ss.Record:
     """What the virtual rig makes of one of the three cases: two seconds, with friction, on one of many surfaces."""
-    told = given["sliding"]
-    law = ss.laws.RoughSurface(contact(given, case), share=told["roughness"], length=2e-4, span=2e-3, seed=surface)
-    return _measured(told["mass"], told["spring"], law, base_for(given, case), told["frequency"][case])
+    section = given["sliding"]
+    law = ss.laws.RoughSurface(contact(given, case), share=section["roughness"], length=2e-4, span=2e-3, seed=surface)
+    return _measured(section["mass"], section["spring"], law, base_for(given, case), section["frequency"][case])
 
 
 def slopes_of_sticks(record: ss.Record) -> Array:

@@ -1,10 +1,16 @@
-"""Chapter 4: the same contact where it sticks, and laws with a memory."""
+"""Chapter 4: the same contact where it sticks, and laws with a memory.
+
+The thesis gives the damping of the contact as a ratio and not of what, and no friction for the motion at 2.5 Hz; it
+prints two micro-slips in each sticking interval at the smaller ratio and none at the larger one (sections 4.3, 5.3). A
+`Reading` is what the ratio may be of; the chapters start from the one that gives these numbers.
+"""
 
 from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -12,8 +18,7 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 import stickslip as ss
-from stickslip.figures.style import BLUE, GREEN, INK, ORANGE, PURPLE, Plate, styled
-from stickslip_thesis import readings
+from stickslip.figures.style import BLUE, FAINT, GREEN, INK, ORANGE, PURPLE, Plate, styled
 from stickslip_thesis.drawing import around, characteristics, contact_with_inertia, figure, panels, responses, tag
 from stickslip_thesis.printed import Given, Ours
 
@@ -21,19 +26,23 @@ Array = NDArray[np.float64]
 
 TITLE = "The same contact where it sticks, and laws with a memory"
 STARTS_FROM = ("stick_slip", "state_variable", "inertial")  # sections of given.toml
+FRICTIONS = tuple(float(level) for level in np.round(np.arange(1.06, 1.33, 0.02), 2))  # N: from Table 3.2's least on
+LARGEST = 1.28  # N: Table 3.2's
+STIFFNESSES = (181e3, 192e3, 201e3)  # N/m: the least, the mean and the largest of Table 3.1
+COUNTS = (0, 2)  # micro-slips printed for case 1 and case 2
 
 
 def numbers(given: Given) -> Ours:
     """The chapter's numbers."""
-    told, inertial = given["stick_slip"], given["inertial"]
+    section, inertial = given["stick_slip"], given["inertial"]
     time, _, friction = free_vibration(given)
     orbits = [inertial_contact(given, case) for case in (0, 1)]
     return {
-        "coupled frequency": math.sqrt((told["spring"] + told["stiffness"]) / told["mass"]) / (2 * math.pi),
+        "coupled frequency": math.sqrt((section["spring"] + section["stiffness"]) / section["mass"]) / (2 * math.pi),
         "free frequency": strongest(time, friction),
-        "bases of stick-slip": [1e3 * told["base"], 1e3 * given["state_variable"]["base"][0], math.nan],
+        "bases of stick-slip": [1e3 * section["base"], 1e3 * given["state_variable"]["base"][0], math.nan],
         "base of the state variable": [base_of_state_variable(given, case) for case in (1, 2)],
-        "micro-slips": [readings.micro_slips(stick_slip(given, told[name])) for name in ("case1", "case2")],
+        "micro-slips": [micro_slips(stick_slip(given, section[name])) for name in ("case1", "case2")],
         "abnormal stops": orbits[0].stops[1] / 2,
         "static deflection": inertial["kinetic"] / inertial["stiffness"],
     }
@@ -42,13 +51,13 @@ def numbers(given: Given) -> Ours:
 def plates(given: Given) -> Iterator[Plate]:
     """The chapter's figures."""
     yield from _experiments(given)
-    told = given["stick_slip"]
+    section = given["stick_slip"]
     for time, loops, name in (("4.4", "4.5", "case1"), ("4.6", "4.7", "case2")):
-        orbit = stick_slip(given, told[name])
-        slips = readings.micro_slips(orbit)
+        orbit = stick_slip(given, section[name])
+        slips = micro_slips(orbit)
         words = (
-            f"Steady motion, exactly solved, with the damping ratio {told[name]} and f_k = {told['kinetic']:g} N, read "
-            f"as c = {told['critical']:g} ζ √(m (k + K_y)): in each sticking interval the contact slips "
+            f"Steady motion, exactly solved, of damping ratio {section[name]} and f_k = {section['kinetic']:g} N, "
+            f"read as c = {section['critical']:g} ζ √(m (k + K_y)): in each sticking interval the contact slips "
             f"{slips or 'no'} time{'s' * (slips != 1)}{', and the ringing dies away' * (slips == 0)}."
         )
         yield figure(time, responses(*around(orbit, cycles=2)), words)
@@ -59,7 +68,7 @@ def plates(given: Given) -> Iterator[Plate]:
         )
     yield figure(
         "micro-slips",
-        readings.drawn(given),
+        _readings(given),
         "Not in the thesis: micro-slips in each sticking interval of case 1 (.0558) and case 2 (.0174), one before the "
         "other, by what the damping ratio is of, the contact's stiffness (Table 3.1's least, mean and largest) and the "
         "friction, which is not printed (shaded: Table 3.2's range). Bold: none and two, as printed.",
@@ -81,29 +90,97 @@ def plates(given: Given) -> Iterator[Plate]:
     yield from _inertial(given)
 
 
+@dataclass(frozen=True)
+class Reading:
+    """What a damping ratio may be of: ``c = factor ζ sqrt(m s)``, s the spring, with the contact's or without."""
+
+    factor: float
+    coupled: bool
+
+    @property
+    def formula(self) -> str:
+        """As the page writes it."""
+        return f"{self.factor:g}ζ√(m{'(k + K_y)' if self.coupled else 'k'})"
+
+    def damping(self, ratio: float, *, mass: float, spring: float, stiffness: float) -> float:
+        """The contact's damping [N s/m]."""
+        return self.factor * ratio * math.sqrt(mass * (spring + stiffness * self.coupled))
+
+
+READINGS = tuple(Reading(factor, coupled) for factor in (2.0, 4.0) for coupled in (False, True))
+
+
+def damping(given: Given, ratio: float) -> float:
+    """The contact's damping under the reading from which the chapters start [N s/m]."""
+    section = given["stick_slip"]
+    reading = Reading(section["critical"], coupled=True)
+    return reading.damping(ratio, mass=section["mass"], spring=section["spring"], stiffness=section["stiffness"])
+
+
+@functools.lru_cache(2048)
+def steady(mass: float, spring: float, law: Any, base: float, frequency: float) -> ss.solve.SteadyState:
+    """The steady motion of a mass on its spring, the base moving as a cosine."""
+    drive = ss.drives.HarmonicBase(base, frequency=frequency)
+    return ss.steady_state(ss.Oscillator(mass=mass, stiffness=spring, law=law, drive=drive))
+
+
+def micro_slips(orbit: ss.solve.SteadyState) -> int:
+    """Slips within a macroscopic sticking interval: one less than its microsticks, of which a cycle has two sets."""
+    return orbit.orbit.event_counts()["microstick"] // 2 - 1
+
+
+def counts(section: Mapping[str, Any], reading: Reading, *, stiffness: float, kinetic: float) -> tuple[int, int]:
+    """Micro-slips in case 1 and case 2 under a reading."""
+    mass, spring = section["mass"], section["spring"]
+
+    def slips(ratio: float) -> int:
+        damping = reading.damping(ratio, mass=mass, spring=spring, stiffness=stiffness)
+        law = ss.laws.CompliantContact(kinetic, stiffness=stiffness, damping=damping)
+        return micro_slips(steady(mass, spring, law, section["base"], section["frequency"]))
+
+    return slips(section["case1"]), slips(section["case2"])
+
+
+@styled
+def _readings(given: Given) -> Any:
+    """Counts of both cases against friction, for each reading and contact stiffness."""
+    section = given["stick_slip"]
+    rows = [(reading, stiffness) for reading in READINGS for stiffness in STIFFNESSES]
+    sheet, ax = panels(1, height=4.4)
+    ax.axvspan(FRICTIONS[0], LARGEST, color=FAINT, alpha=0.25, linewidth=0)
+    for place, (reading, stiffness) in enumerate(rows):
+        for kinetic in FRICTIONS:
+            pair = counts(section, reading, stiffness=stiffness, kinetic=kinetic)
+            as_printed = pair == COUNTS
+            ax.text(
+                kinetic, place, f"{pair[0]}·{pair[1]}", ha="center", va="center", fontsize=7,
+                color=BLUE if as_printed else INK, fontweight="bold" if as_printed else "normal",
+            )  # fmt: skip
+        label = f"{reading.formula}, {stiffness / 1e3:g} kN/m"
+        ax.text(FRICTIONS[0] - 0.02, place, label, ha="right", va="center", fontsize=7)
+    ax.set(xlabel="friction f_k [N]", xlim=(FRICTIONS[0] - 0.12, FRICTIONS[-1] + 0.02), ylim=(len(rows) - 0.4, -0.6))
+    ax.set(yticks=[], xticks=[1.06, 1.1, 1.15, 1.2, 1.25, 1.3])
+    ax.grid(visible=False)
+    return sheet
+
+
 def stick_slip(given: Given, ratio: float) -> ss.solve.SteadyState:
     """The motion of section 4.3 with a damping ratio in the contact."""
-    told = given["stick_slip"]
-    return _steady(told["mass"], told["spring"], _contact(given, ratio), told["base"], told["frequency"])
+    section = given["stick_slip"]
+    return steady(section["mass"], section["spring"], _contact(given, ratio), section["base"], section["frequency"])
 
 
 def _contact(given: Given, ratio: float) -> ss.laws.CompliantContact:
-    told = given["stick_slip"]
-    return ss.laws.CompliantContact(
-        told["kinetic"], stiffness=told["stiffness"], damping=readings.damping(given, ratio)
-    )
-
-
-def _steady(mass: float, spring: float, law: Any, base: float, frequency: float) -> ss.solve.SteadyState:
-    return readings.stick_slip(law, base, frequency, mass, spring)
+    section = given["stick_slip"]
+    return ss.laws.CompliantContact(section["kinetic"], stiffness=section["stiffness"], damping=damping(given, ratio))
 
 
 def state_variable(given: Given, case: int, *, base: float | None = None) -> ss.solve.SteadyState:
     """The motion of section 4.4 at 2.5, 5.61 or 8.7 Hz."""
-    told, slider = given["state_variable"], given["stick_slip"]
-    law = ss.laws.SmoothStateVariable(told["kinetic"][case], rate=told["rate"], steepness=told["steepness"])
-    base = told["base"][case] if base is None else base
-    return _steady(slider["mass"], slider["spring"], law, base, told["frequency"][case])
+    section, slider = given["state_variable"], given["stick_slip"]
+    law = ss.laws.SmoothStateVariable(section["kinetic"][case], rate=section["rate"], steepness=section["steepness"])
+    base = section["base"][case] if base is None else base
+    return steady(slider["mass"], slider["spring"], law, base, section["frequency"][case])
 
 
 def base_of_state_variable(given: Given, case: int) -> float | None:
@@ -133,15 +210,15 @@ def _free(*released: Any) -> ss.Record:
 
 def turns_of_release(given: Given) -> list[float]:
     """Where [m] the released mass turns: the release, and where each microstick begins."""
-    told = given["stick_slip"]
-    run = _released(told["mass"], told["spring"], _contact(given, told["case2"]), told["release"])
-    return [told["release"], *(piece.state["x"] for piece in run.pieces if piece.mode == "microstuck")]
+    section = given["stick_slip"]
+    run = _released(section["mass"], section["spring"], _contact(given, section["case2"]), section["release"])
+    return [section["release"], *(piece.state["x"] for piece in run.pieces if piece.mode == "microstuck")]
 
 
 def free_vibration(given: Given) -> tuple[Array, Array, Array]:
     """Figure 4.2: time, smoothed acceleration and friction as the load cell feels it, of a released mass."""
-    told = given["stick_slip"]
-    record = _free(told["mass"], told["spring"], _contact(given, told["case2"]), told["release"])
+    section = given["stick_slip"]
+    record = _free(section["mass"], section["spring"], _contact(given, section["case2"]), section["release"])
     smooth = np.convolve(record["a"], np.full(5, 0.2), mode="same")
     return record.time, smooth, record["load"]
 
@@ -173,8 +250,10 @@ def _measured(mass: float, spring: float, law: Any, base: float, frequency: floa
 
 def measured(given: Given) -> ss.Record:
     """What the virtual rig makes of case 2: two seconds, with friction."""
-    told = given["stick_slip"]
-    return _measured(told["mass"], told["spring"], _contact(given, told["case2"]), told["base"], told["frequency"])
+    section = given["stick_slip"]
+    return _measured(
+        section["mass"], section["spring"], _contact(given, section["case2"]), section["base"], section["frequency"]
+    )
 
 
 def _experiments(given: Given) -> Iterator[Plate]:
@@ -213,9 +292,9 @@ def _free_vibration(given: Given) -> Any:
 
 def inertial_contact(given: Given, case: int) -> ss.solve.SteadyState:
     """z of equation 4.7 at its steady state, with the friction's sign set-valued at rest."""
-    told = given["inertial"]
-    alpha = told["amplitude"][case] * told["stiffness"] / told["kinetic"] * (told["ratio"] ** 2 - 1)
-    return _normalised(alpha, told["ratio"])
+    section = given["inertial"]
+    alpha = section["amplitude"][case] * section["stiffness"] / section["kinetic"] * (section["ratio"] ** 2 - 1)
+    return _normalised(alpha, section["ratio"])
 
 
 @functools.lru_cache(8)
@@ -226,9 +305,9 @@ def _normalised(alpha: float, ratio: float) -> ss.solve.SteadyState:
 
 def of_contact(given: Given, case: int, *, cycles: int = 1) -> tuple[Array, dict[str, Array]]:
     """tau, and z, z', y, y' (of the contact: y = z f_k/k + X_m cos Omega tau)."""
-    told = given["inertial"]
+    section = given["inertial"]
     tau, motion = around(inertial_contact(given, case), cycles=cycles, names=("x", "v"))
-    give, ratio, amplitude = told["kinetic"] / told["stiffness"], told["ratio"], told["amplitude"][case]
+    give, ratio, amplitude = section["kinetic"] / section["stiffness"], section["ratio"], section["amplitude"][case]
     y = give * motion["x"] + amplitude * np.cos(ratio * tau)
     return tau, {
         "z": motion["x"],
@@ -278,14 +357,14 @@ def _inertial_motion(given: Given, case: int) -> Any:
 @styled
 def _boundaries(given: Given) -> Any:
     """Figure 4.17: the macroscopic sticking boundary and the microscopic one, case 2."""
-    told, orbit = given["inertial"], inertial_contact(given, 1)
+    section, orbit = given["inertial"], inertial_contact(given, 1)
     tau, motion = of_contact(given, 1)
-    imposed = told["amplitude"][1] * np.cos(told["ratio"] * tau)
+    imposed = section["amplitude"][1] * np.cos(section["ratio"] * tau)
     drawn, axes = panels(2, height=5.0)
     for side in (-1, 1):
         axes[0].plot(
             tau,
-            side * orbit.amplitude * told["kinetic"] / told["stiffness"] + imposed,
+            side * orbit.amplitude * section["kinetic"] / section["stiffness"] + imposed,
             color=ORANGE,
             linestyle="--",
             linewidth=0.9,
@@ -293,7 +372,7 @@ def _boundaries(given: Given) -> Any:
         )
     axes[0].plot(tau, motion["y"], color=BLUE, linewidth=1.0, label="y")
     axes[0].set(xlabel="τ", ylabel="y")
-    slope = -told["amplitude"][1] * told["ratio"] * np.sin(told["ratio"] * tau)
+    slope = -section["amplitude"][1] * section["ratio"] * np.sin(section["ratio"] * tau)
     axes[1].plot(tau, slope, color=ORANGE, linestyle="--", linewidth=0.9, label="boundary")
     axes[1].plot(tau, motion["y'"], color=BLUE, linewidth=1.0, label="y'")
     axes[1].set(xlabel="τ", ylabel="y'")

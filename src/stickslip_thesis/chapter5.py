@@ -26,10 +26,10 @@ CYCLES = 4
 
 def numbers(given: Given) -> Ours:
     """The chapter's numbers."""
-    told, case1 = given["wavelet"], accelerations(given, "case1")
-    near = (0.5 * told["transition"], 2 * told["transition"])
-    peaks = ss.signals.local_maxima(ss.wavelet_map(case1, "a", frequencies=near, wavelet_frequency=told["centre"]))
-    slow = ss.wavelet_map(case1, "a", frequencies=(1.6, 8.0), wavelet_frequency=told["centre"])
+    section, case1 = given["wavelet"], accelerations(given, "case1")
+    near = (0.5 * section["transition"], 2 * section["transition"])
+    peaks = ss.signals.local_maxima(ss.wavelet_map(case1, "a", frequencies=near, wavelet_frequency=section["centre"]))
+    slow = ss.wavelet_map(case1, "a", frequencies=(1.6, 8.0), wavelet_frequency=section["centre"])
     strongest = np.unravel_index(int(np.argmax(np.abs(slow.values))), slow.shape)[0]
     return {
         "local maximum": float(np.median([peak.frequency for peak in peaks])),
@@ -42,10 +42,10 @@ def numbers(given: Given) -> Ours:
 
 def plates(given: Given) -> Iterator[Plate]:
     """The chapter's figures."""
-    told = given["wavelet"]
+    section = given["wavelet"]
     yield figure(
         "5.1",
-        _wavelet(told["shown_centre"]),
+        _wavelet(section["shown_centre"]),
         "As equation 5.3 prints it, the phase of h runs backwards and H has its peak at -ω_c; drawn is the wavelet "
         "to which equation 5.4 belongs.",
     )
@@ -82,17 +82,17 @@ def signals() -> tuple[ss.Record, ss.Record]:
 
 def accelerations(given: Given, kind: str) -> ss.Record:
     """A stick-slip acceleration of chapter 4, some cycles of the steady motion sampled at 4 kHz."""
-    told = given["stick_slip"]
+    section = given["stick_slip"]
     if kind == "measured":
         record = chapter4.measured(given)
-        return ss.Record.of({"a": record["a"][: round(CYCLES / told["frequency"] * record.fs)]}, fs=record.fs)
+        return ss.Record.of({"a": record["a"][: round(CYCLES / section["frequency"] * record.fs)]}, fs=record.fs)
     if kind == "coulomb":
-        drive = ss.drives.HarmonicBase(told["base"], frequency=told["frequency"])
-        orbit = _coulomb(told["mass"], told["spring"], told["kinetic"], drive)
+        drive = ss.drives.HarmonicBase(section["base"], frequency=section["frequency"])
+        orbit = _coulomb(section["mass"], section["spring"], section["kinetic"], drive)
     elif kind == "state variable":
         orbit = chapter4.state_variable(given, 0)
     else:
-        orbit = chapter4.stick_slip(given, told[kind])
+        orbit = chapter4.stick_slip(given, section[kind])
     fs = given["wavelet"]["fs"]
     times = np.arange(round(orbit.period * fs)) / fs
     values = orbit.orbit.sample(times, ("a",))[0][0]

@@ -30,21 +30,21 @@ WORKED = {("rate", 1), ("rate", 3), ("rate", 5), ("dry", 1)}  # equations 6.20 t
 def numbers(given: Given) -> Ours:
     """The chapter's numbers."""
     true = extremes(given)
-    found: dict[str, Any] = {"extremes": true, **_taken_back(true), "beta": _beta(given["decay"])}
+    values: dict[str, Any] = {"extremes": true, **_taken_back(true), "beta": _beta(given["decay"])}
     for kind in KINDS:
         measured = measured_extremes(given, kind)
         columns = [table_column(given, kind, m) for m in given["errors"]["steps"]]
-        found |= {f"{kind}.{key}": [column[key] for column in columns] for key in columns[0]}
-        found[f"{kind}.measured"] = measured
-        found[f"{kind}.errors"] = np.round(true, 5) - measured
-    found |= {f"{kind}.largest": np.max(np.abs(found[f"{kind}.errors"])) for kind in ("random", "sampling")}
-    found |= {
-        f"random.{key}, m = {m}": found[f"random.{key}"][k]
+        values |= {f"{kind}.{key}": [column[key] for column in columns] for key in columns[0]}
+        values[f"{kind}.measured"] = measured
+        values[f"{kind}.errors"] = np.round(true, 5) - measured
+    values |= {f"{kind}.largest": np.max(np.abs(values[f"{kind}.errors"])) for kind in ("random", "sampling")}
+    values |= {
+        f"random.{key}, m = {m}": values[f"random.{key}"][k]
         for key in ("rate", "dry")
         for k, m in enumerate(given["errors"]["steps"])
         if (key, m) in WORKED
     }
-    return {**found, **_of_paper(given), **_of_bearing(given)}
+    return {**values, **_of_paper(given), **_of_bearing(given)}
 
 
 def plates(given: Given) -> Iterator[Plate]:
@@ -65,11 +65,11 @@ def plates(given: Given) -> Iterator[Plate]:
     for number, kind, case in (("6.4", "dry", 1), ("6.5", "dry", 2), ("6.6", "viscous", 1), ("6.7", "viscous", 2)):
         alone = ss.analyze_decay(on_paper(given, case, kind), method="thesis").decay
         yield figure(number, plot_decay(alone), made_with)
-    found = {case: ss.analyze_decay(on_paper(given, case, "both"), method="thesis").decay for case in (1, 2)}
-    yield figure("6.8", plot_decay(found[1]), made_with)
-    yield figure("6.9", plot_differences(found[1].thesis), made_with)
-    yield figure("6.10", plot_identified(found[2]), made_with)
-    yield figure("6.11", plot_differences(found[2].thesis), made_with)
+    decays = {case: ss.analyze_decay(on_paper(given, case, "both"), method="thesis").decay for case in (1, 2)}
+    yield figure("6.8", plot_decay(decays[1]), made_with)
+    yield figure("6.9", plot_differences(decays[1].thesis), made_with)
+    yield figure("6.10", plot_identified(decays[2]), made_with)
+    yield figure("6.11", plot_differences(decays[2].thesis), made_with)
     yield figure("6.12", system_ii(given), "Drawn from the parameters of section 6.5.")
     bearing = ss.analyze_decay(on_bearing(given), method="thesis").decay
     made_with = "The virtual rig with section 6.5's mass, spring, damping and friction; the release is ours."
@@ -104,13 +104,13 @@ def extremes(given: Given) -> Array:
 
 def measured_extremes(given: Given, kind: str) -> Array:
     """As Tables 6.3, 6.5 and 6.7 have them: with noise, counted, or the largest of a few samples."""
-    told = given["errors"]
+    section = given["errors"]
     if kind == "random":
-        return np.array(told["random"])
+        return np.array(section["random"])
     if kind == "quantisation":
-        return np.round(extremes(given) / told["quantum"]) * told["quantum"]
+        return np.round(extremes(given) / section["quantum"]) * section["quantum"]
     run = motion(given)
-    times = np.arange(told["first_sample"], run.duration, told["sampling"])
+    times = np.arange(section["first_sample"], run.duration, section["sampling"])
     samples, turns = run.sample(times, ("x",))[0][0], run.starts[:COUNT]
     signs = (-1.0) ** np.arange(COUNT)
     reach = math.pi / 8 * math.sqrt(given["decay"]["mass"] / given["decay"]["stiffness"]) * 2
@@ -127,8 +127,8 @@ def table_column(given: Given, kind: str, m: int) -> dict[str, float]:
     x_k is from the printed, rounded rate; errors of the random and sampling tables are between printed numbers, those
     of the quantisation table are not rounded before.
     """
-    told, x = given["errors"], measured_extremes(given, kind)
-    bound, true_rate, true_dry = told["bounds"][kind], told["rate"], told["dry"]
+    section, x = given["errors"], measured_extremes(given, kind)
+    bound, true_rate, true_dry = section["bounds"][kind], section["rate"], section["dry"]
     beta = ex.rate(x, i=FIRST, m=m)
     printed = round(beta, 4)
     dry = float(ex.dry(x, printed)[FIRST - 1])
@@ -169,29 +169,29 @@ def _taken_back(true: Array) -> dict[str, float]:
 
 def on_paper(given: Given, case: int, kind: str) -> ss.Record:
     """What the LVDT of system I would have written: "dry" (MKF), "viscous" (MKC) or "both" (MKCF)."""
-    told = given["paper"]
+    section = given["paper"]
     return _paper_record(
-        told["mass"],
-        told["stiffness"],
-        told[f"case{case}"]["damping_ratio"] * (kind != "dry"),
-        told["stiffness"] * told[f"case{case}"]["dry"] * (kind != "viscous"),
-        told["release"],
-        told["resolution"],
-        told["fs"],
+        section["mass"],
+        section["stiffness"],
+        section[f"case{case}"]["damping_ratio"] * (kind != "dry"),
+        section["stiffness"] * section[f"case{case}"]["dry"] * (kind != "viscous"),
+        section["release"],
+        section["resolution"],
+        section["fs"],
     )
 
 
 def on_bearing(given: Given) -> ss.Record:
     """The same of system II."""
-    told = given["bearing"]
+    section = given["bearing"]
     return _paper_record(
-        told["mass"],
-        told["stiffness"],
-        told["damping_ratio"],
-        told["kinetic"],
-        told["release"],
+        section["mass"],
+        section["stiffness"],
+        section["damping_ratio"],
+        section["kinetic"],
+        section["release"],
         given["paper"]["resolution"],
-        told["fs"],
+        section["fs"],
     )
 
 
@@ -209,7 +209,7 @@ def _paper_record(
 
 def _of_paper(given: Given) -> Ours:
     """Table 6.2: what twins of system I give back, and the errors between its printed values."""
-    told = [given["paper"][f"case{case}"] for case in (1, 2)]
+    section = [given["paper"][f"case{case}"] for case in (1, 2)]
     both = [ss.decrement(on_paper(given, case, "both")) for case in (1, 2)]
     viscous = [ss.decay.log_decrement(on_paper(given, case, "viscous")) for case in (1, 2)]
     dry = [ss.decay.linear_decrement(on_paper(given, case, "dry")) for case in (1, 2)]
@@ -219,8 +219,8 @@ def _of_paper(given: Given) -> Ours:
         "paper.zeta of both": [found.damping_ratio.value for found in both],
         "paper.dry of both": [1e3 * found.dry_displacement.value for found in both],
         **{f"paper.{key}": values for key, values in _scatters(given).items()},
-        "paper.zeta off": [100 * abs(1 - each["estimated_ratio"] / each["damping_ratio"]) for each in told],
-        "paper.dry off": [100 * abs(1 - each["estimated_dry"] / each["dry"]) for each in told],
+        "paper.zeta off": [100 * abs(1 - each["estimated_ratio"] / each["damping_ratio"]) for each in section],
+        "paper.dry off": [100 * abs(1 - each["estimated_dry"] / each["dry"]) for each in section],
     }
 
 
@@ -241,31 +241,34 @@ def _scatters(given: Given) -> dict[str, list[float]]:
 
 def _of_bearing(given: Given) -> Ours:
     """Section 6.5."""
-    told, found = given["bearing"], ss.decrement(on_bearing(given))
+    section, found = given["bearing"], ss.decrement(on_bearing(given))
     zeta = found.damping_ratio.value
     return {
         "bearing.zeta": zeta,
         "bearing.beta": zeta / math.sqrt(1 - zeta**2),
         "bearing.zeta scatter": float(np.std(found.scatter.damping_ratio)),
-        "bearing.friction scatter": told["stiffness"] * float(np.std(found.scatter.dry_displacement)),
-        "bearing.friction": told["stiffness"] * found.dry_displacement.value,
-        "bearing.coefficient": told["kinetic"] / (told["mass"] * told["gravity"]),
+        "bearing.friction scatter": section["stiffness"] * float(np.std(found.scatter.dry_displacement)),
+        "bearing.friction": section["stiffness"] * found.dry_displacement.value,
+        "bearing.coefficient": section["kinetic"] / (section["mass"] * section["gravity"]),
     }
 
 
 @styled
 def _of_errors(given: Given, number: str, kind: str) -> Plate:
     """Figures 6.16 to 6.18: the response as it would be measured, and the error within it."""
-    run, told = motion(given), given["errors"]
+    run, section = motion(given), given["errors"]
     fine = np.linspace(0, run.duration, 4001)
     x = run.sample(fine, ("x",))[0][0]
     if kind == "random":
-        measured, words = x + told["bounds"]["random"] * np.random.default_rng(1).uniform(-1, 1, len(x)), "with noise"
+        measured, words = (
+            x + section["bounds"]["random"] * np.random.default_rng(1).uniform(-1, 1, len(x)),
+            "with noise",
+        )
         times = fine
     elif kind == "quantisation":
-        measured, words, times = np.round(x / told["quantum"]) * told["quantum"], "counted", fine
+        measured, words, times = np.round(x / section["quantum"]) * section["quantum"], "counted", fine
     else:
-        times = np.concatenate([[0.0], np.arange(told["first_sample"], run.duration, told["sampling"])])
+        times = np.concatenate([[0.0], np.arange(section["first_sample"], run.duration, section["sampling"])])
         measured, words = run.sample(times, ("x",))[0][0], "sampled"
     drawn, (whole, detail) = panels(2, height=5.0)
     sampled = kind == "sampling"

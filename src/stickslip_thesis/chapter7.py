@@ -138,9 +138,9 @@ def room(given: Given, count: int) -> Array:
 
 def rig_of(given: Given, surface: str, load: str) -> ss.Structure:
     """The virtual squeak rig, its base moving as far as the mass alone needs for the amplitude."""
-    told = given["squeak"]
-    rig = ss.squeak.squeak_rig(surface, told[load])
-    return rig.having(amplitude=base_for(rig, told["amplitude"]))
+    section = given["squeak"]
+    rig = ss.squeak.squeak_rig(surface, section[load])
+    return rig.having(amplitude=base_for(rig, section["amplitude"]))
 
 
 def base_for(rig: ss.Structure, amplitude: float) -> float:
@@ -174,16 +174,16 @@ def record_of(given: Given, surface: str, load: str) -> ss.Record:
 @functools.lru_cache(8)
 def _record(surface: str, load: str, constants: tuple[tuple[str, float], ...]) -> ss.Record:
     given = {"squeak": dict(constants)}
-    told = given["squeak"]
+    section = given["squeak"]
     run = ss.simulate(rig_of(given, surface, load), cycles=SETTLED + KEPT)
     heard = ss.squeak.squeak_record(
-        run, fs=told["fs"], snr=60, rng=1, area=told["radiator"], distance=told["microphone"], baffled=True
+        run, fs=section["fs"], snr=60, rng=1, area=section["radiator"], distance=section["microphone"], baffled=True
     )
-    beam = ss.rig.Mount(told["reflector"], told["reflector_damping"])
-    laser = ss.Rig((ss.rig.Sensor("torsion_velocity", of="v3", mount=beam),)).measure(run, fs=told["fs"])
+    beam = ss.rig.Mount(section["reflector"], section["reflector_damping"])
+    laser = ss.Rig((ss.rig.Sensor("torsion_velocity", of="v3", mount=beam),)).measure(run, fs=section["fs"])
     record = heard.with_channel("torsion_velocity", laser["torsion_velocity"][: len(heard)], unit="rad/s")
     record = record.with_channel("sound", record["sound"] + room(given, len(record)), unit="Pa")
-    return record.between(SETTLED / told["frequency"], (SETTLED + KEPT) / told["frequency"])
+    return record.between(SETTLED / section["frequency"], (SETTLED + KEPT) / section["frequency"])
 
 
 def squeaks(given: Given, surface: str, load: str) -> bool:
@@ -194,12 +194,14 @@ def squeaks(given: Given, surface: str, load: str) -> bool:
 
 def merging(given: Given) -> tuple[float, float]:
     """Frequencies [Hz] of bending and torsion of the wet rig where it begins to squeal."""
-    told = given["squeak"]
+    section = given["squeak"]
 
     def at(load: float) -> ss.Structure:
         return ss.squeak.squeak_rig("wet", load)
 
-    critical = ss.squeak.critical_value(at(told["heavy"]), at, between=(told["light"], told["heavy"]), speed=-0.1)
+    critical = ss.squeak.critical_value(
+        at(section["heavy"]), at, between=(section["light"], section["heavy"]), speed=-0.1
+    )
     high = sorted(mode.frequency for mode in ss.stability(at(critical.value), speed=-0.1).modes)[-2:]
     return high[0], high[1]
 

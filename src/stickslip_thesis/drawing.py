@@ -138,7 +138,7 @@ def _kilo(value: float) -> str:
 @styled
 def apparatus(given: Given) -> Any:
     """Figure 2.1."""
-    told = given["rig"]
+    section = given["rig"]
     x, _, a, load = Rig.air_track().sensors
     assert a.mount is not None
     assert load.mount is not None
@@ -146,8 +146,8 @@ def apparatus(given: Given) -> Any:
     _wall(ax, (0.3, 1.5), 10.4)
     ax.text(9.1, 1.05, "air track", fontsize=8, ha="center")
     _block(ax, (0.6, 1.6), 1.1, 1.1, "base")
-    _spring(ax, (1.7, 2.15), (4.2, 2.15), f"k = {_kilo(told['spring'])}")
-    _block(ax, (4.2, 1.6), 2.0, 1.1, f"m = {told['mass']:g} kg")
+    _spring(ax, (1.7, 2.15), (4.2, 2.15), f"k = {_kilo(section['spring'])}")
+    _block(ax, (4.2, 1.6), 2.0, 1.1, f"m = {section['mass']:g} kg")
     _arrow(ax, (0.75, 3.0), (1.65, 3.0), "z(t)")
     _arrow(ax, (4.3, 3.0), (5.2, 3.0), "x(t)")
     ax.plot([6.2, 8.3], [2.15, 2.15], color=INK, linewidth=3)  # the strip that is rubbed
@@ -164,30 +164,30 @@ def apparatus(given: Given) -> Any:
         ax, (9.27, 2.45), (9.2, 4.3),
         f"load cell, discharge {load.discharge:g} s,\nbehind a flange of {load.mount.frequency:g} Hz",
     )  # fmt: skip
-    _told(ax, (7.4, 1.84), (7.0, 0.5), f"friction contact, f = {told['kinetic']:g} N", colour=ORANGE)
-    ax.text(2.6, 4.3, f"natural frequency {told['natural']:g} rad/s", fontsize=8, ha="center")
+    _told(ax, (7.4, 1.84), (7.0, 0.5), f"friction contact, f = {section['kinetic']:g} N", colour=ORANGE)
+    ax.text(2.6, 4.3, f"natural frequency {section['natural']:g} rad/s", fontsize=8, ha="center")
     return drawn
 
 
 @styled
 def massless_contact(given: Given) -> Any:
     """Figure 3.1."""
-    told = given["sliding"]
+    section = given["sliding"]
     drawn, ax = _sheet(11, 4.9)
-    ratio = 2 * told["damping_ratio"] * math.sqrt(told["mass"] * (told["spring"] + told["stiffness"][1]))
+    ratio = 2 * section["damping_ratio"] * math.sqrt(section["mass"] * (section["spring"] + section["stiffness"][1]))
     _wall(ax, (0.6, 1.9), 1.6, upright=True)
     _arrow(ax, (0.3, 4.0), (1.3, 4.0), "z(t)")
-    _spring(ax, (0.6, 2.7), (3.6, 2.7), f"k = {_kilo(told['spring'])}")
-    _block(ax, (3.6, 2.0), 2.0, 1.4, f"m = {told['mass']:g} kg")
+    _spring(ax, (0.6, 2.7), (3.6, 2.7), f"k = {_kilo(section['spring'])}")
+    _block(ax, (3.6, 2.0), 2.0, 1.4, f"m = {section['mass']:g} kg")
     _arrow(ax, (4.0, 3.7), (5.2, 3.7), "x(t)")
-    _contact(ax, 5.6, f"K_y = {_kilo(told['stiffness'][1])}", f"c = {ratio:.3g} N s/m")
+    _contact(ax, 5.6, f"K_y = {_kilo(section['stiffness'][1])}", f"c = {ratio:.3g} N s/m")
     _block(ax, (8.5, 1.75), 0.35, 1.8, colour=ORANGE)
     _wall(ax, (7.6, 1.55), 3.0)
     ax.plot([8.68, 8.68], [1.55, 1.75], color=INK, linewidth=1.2)
     _arrow(ax, (7.6, 4.0), (8.6, 4.0), "x(t) - y(t)", colour=ORANGE)
-    _told(ax, (8.68, 1.75), (9.7, 2.5), f"massless,\nf_k = {told['kinetic'][1]:g} N", colour=ORANGE)
-    ax.text(1.6, 0.7, f"at {told['frequency'][1]:g} Hz: the base moves by {1e3 * told['base'][1]:g} mm, "
-            f"the contact gives way by f_k / K_y = {1e6 * told['kinetic'][1] / told['stiffness'][1]:.2f} µm",
+    _told(ax, (8.68, 1.75), (9.7, 2.5), f"massless,\nf_k = {section['kinetic'][1]:g} N", colour=ORANGE)
+    ax.text(1.6, 0.7, f"at {section['frequency'][1]:g} Hz: the base moves by {1e3 * section['base'][1]:g} mm, "
+            f"the contact gives way by f_k / K_y = {1e6 * section['kinetic'][1] / section['stiffness'][1]:.2f} µm",
             fontsize=8, ha="left")  # fmt: skip
     return drawn
 
@@ -201,41 +201,41 @@ def _contact(ax: Axes, x: float, spring: str, damper: str) -> None:
 @styled
 def contact_with_inertia(given: Given) -> Any:
     """Figure 4.14."""
-    told = given["inertial"]
+    section = given["inertial"]
     drawn, ax = _sheet(11, 4.4)
     _wall(ax, (0.8, 1.6), 1.9, upright=True)
-    _spring(ax, (0.8, 2.5), (4.2, 2.5), f"k = {told['stiffness']:g}")
+    _spring(ax, (0.8, 2.5), (4.2, 2.5), f"k = {section['stiffness']:g}")
     _block(ax, (4.2, 1.9), 1.9, 1.2, "contact, m")
     _arrow(ax, (4.6, 3.4), (5.7, 3.4), "y(t)")
     _block(ax, (3.0, 1.3), 6.4, 0.6, "slider", colour=FAINT)
     _arrow(ax, (8.0, 2.3), (9.2, 2.3), "x(t) = X_m cos ωt", colour=ORANGE)
-    _told(ax, (5.1, 1.9), (7.2, 3.1), f"f = ±{told['kinetic']:g}", colour=ORANGE)
-    cases = " and ".join(f"{each:g}" for each in told["amplitude"])
-    ax.text(5.5, 0.6, f"X_m = {cases}, Ω = ω √(m/k) = {told['ratio']:g}", fontsize=8, ha="center")
+    _told(ax, (5.1, 1.9), (7.2, 3.1), f"f = ±{section['kinetic']:g}", colour=ORANGE)
+    cases = " and ".join(f"{each:g}" for each in section["amplitude"])
+    ax.text(5.5, 0.6, f"X_m = {cases}, Ω = ω √(m/k) = {section['ratio']:g}", fontsize=8, ha="center")
     return drawn
 
 
 @styled
 def system_i(given: Given) -> Any:
     """Figure 6.3."""
-    told = given["paper"]
+    section = given["paper"]
     drawn, ax = _sheet(11, 5.4)
     _wall(ax, (0.6, 1.6), 1.8, upright=True)
-    _spring(ax, (0.6, 2.5), (3.8, 2.5), f"k = {_kilo(told['stiffness'])}")
+    _spring(ax, (0.6, 2.5), (3.8, 2.5), f"k = {_kilo(section['stiffness'])}")
     _wall(ax, (0.4, 1.6), 10.2)
     ax.text(1.9, 1.15, "air track", fontsize=8, ha="center")
-    _block(ax, (3.8, 1.7), 2.2, 1.5, f"m = {told['mass']:g} kg")
+    _block(ax, (3.8, 1.7), 2.2, 1.5, f"m = {section['mass']:g} kg")
     _damper(ax, (6.0, 2.7), (9.9, 2.7), "")
     _wall(ax, (9.9, 1.6), 1.8, upright=True, side=1)
     ax.plot([6.0, 8.4], [2.0, 2.0], color=INK, linewidth=3)
     for y, sign in ((2.05, 1), (1.95, -1)):
         _block(ax, (7.2, y - 0.2 * (sign < 0)), 0.5, 0.2, colour=ORANGE)
-    cases = [told["case1"], told["case2"]]
+    cases = [section["case1"], section["case2"]]
     _told(ax, (7.9, 2.9), (8.2, 4.4), "damper, switched on: ζ = "
           + " or ".join(f"{each['damping_ratio']:g}" for each in cases))  # fmt: skip
     _told(ax, (7.45, 1.75), (7.6, 0.5), "paper, switched on: f_k = "
-          + " or ".join(f"{told['stiffness'] * each['dry']:.3f} N" for each in cases), colour=ORANGE)  # fmt: skip
-    _moves(ax, (4.4, 3.5), 1.0, (2.6, 4.4), told["resolution"])
+          + " or ".join(f"{section['stiffness'] * each['dry']:.3f} N" for each in cases), colour=ORANGE)  # fmt: skip
+    _moves(ax, (4.4, 3.5), 1.0, (2.6, 4.4), section["resolution"])
     return drawn
 
 
@@ -248,7 +248,7 @@ def _moves(ax: Axes, start: Place, length: float, words: Place, resolution: floa
 @styled
 def system_ii(given: Given) -> Any:
     """Figure 6.12."""
-    told = given["bearing"]
+    section = given["bearing"]
     drawn, ax = _sheet(11, 4.9)
     _wall(ax, (0.4, 1.3), 10.2)
     ax.plot([0.8, 10.2], [1.75, 1.75], color=INK, linewidth=2.2)  # the rail
@@ -256,12 +256,12 @@ def system_ii(given: Given) -> Any:
         ax.plot([x, x], [1.3, 1.75], color=INK, linewidth=2.2)
     for x in (4.3, 6.3):
         _block(ax, (x, 1.55), 0.9, 0.4, colour=ORANGE)
-    _block(ax, (3.9, 1.95), 3.6, 1.0, f"table, m = {told['mass']:g} kg")
+    _block(ax, (3.9, 1.95), 3.6, 1.0, f"table, m = {section['mass']:g} kg")
     for y in (2.15, 2.45, 2.75):
         _spring(ax, (0.8, y), (3.9, y), "", coils=9)
     _wall(ax, (0.8, 1.75), 1.4, upright=True)
-    ax.text(2.5, 3.3, f"three springs, k = {_kilo(told['stiffness'])} together", fontsize=8, ha="center")
-    friction = f"ζ = {told['damping_ratio']:g}, f_k = {told['kinetic']:g} N"
+    ax.text(2.5, 3.3, f"three springs, k = {_kilo(section['stiffness'])} together", fontsize=8, ha="center")
+    friction = f"ζ = {section['damping_ratio']:g}, f_k = {section['kinetic']:g} N"
     _told(ax, (6.75, 1.65), (8.0, 0.6), f"two linear bearings: {friction}", colour=ORANGE)
     _moves(ax, (5.2, 3.25), 1.1, (3.6, 4.2), given["paper"]["resolution"])
     return drawn
@@ -270,10 +270,10 @@ def system_ii(given: Given) -> Any:
 @styled
 def transducers(given: Given) -> Any:
     """Figure 7.7."""
-    told = given["squeak"]
+    section = given["squeak"]
     drawn, ax = _sheet(11, 6.0)
     _wall(ax, (0.4, 1.0), 10.2)
-    _block(ax, (1.0, 1.1), 5.4, 0.9, "mass on the linear bearing, driven at " + f"{told['frequency']:g} Hz")
+    _block(ax, (1.0, 1.1), 5.4, 0.9, "mass on the linear bearing, driven at " + f"{section['frequency']:g} Hz")
     ax.plot([1.2, 6.2], [2.05, 2.05], color=INK, linewidth=3)
     _told(ax, (1.7, 2.1), (1.7, 3.2), "steel strip,\ndry or wet", colour=INK)
     for x in (3.5, 4.5):
@@ -282,7 +282,7 @@ def transducers(given: Given) -> Any:
     _block(ax, (3.85, 2.72), 0.3, 1.9, colour=FAINT)
     _wall(ax, (3.2, 4.62), 1.6, side=1)
     _told(ax, (4.0, 4.0), (2.2, 4.3), "beam: bends\nand twists", colour=INK)
-    _told(ax, (4.6, 2.3), (6.3, 2.75), f"rubber, {told['heavy']:g} or {told['light']:g} N", colour=ORANGE)
+    _told(ax, (4.6, 2.3), (6.3, 2.75), f"rubber, {section['heavy']:g} or {section['light']:g} N", colour=ORANGE)
     _block(ax, (4.3, 2.72), 0.35, 0.3, colour=GREEN)
     _told(ax, (4.5, 3.02), (6.5, 3.7), "accelerometer, normal: ÿ", colour=GREEN)
     _block(ax, (8.6, 4.2), 1.2, 0.5, "laser", colour=SHADE)
@@ -294,7 +294,7 @@ def transducers(given: Given) -> Any:
     _told(ax, (5.9, 2.0), (7.9, 1.7), "accelerometer: ẍ", colour=BLUE)
     _block(ax, (0.5, 1.25), 0.5, 0.6, colour=GREEN)
     ax.text(0.75, 0.5, "load cell: f", color=GREEN, fontsize=8, ha="center")
-    ax.text(6.3, 0.5, f"sampled at {told['fs'] / 1e3:g} kHz", fontsize=8, ha="center")
+    ax.text(6.3, 0.5, f"sampled at {section['fs'] / 1e3:g} kHz", fontsize=8, ha="center")
     return drawn
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import stickslip as ss
-from stickslip_thesis import chapter2, chapter3, chapter4, chapter5, chapter6, chapter7, readings
+from stickslip_thesis import chapter2, chapter3, chapter4, chapter5, chapter6, chapter7
 from stickslip_thesis.drawing import around
 from stickslip_thesis.printed import Given, Ours, read
 
@@ -49,9 +49,9 @@ class Observation:
     figures: tuple[str, ...]
     says: str
     measure: str
-    above: float
-    below: float
-    why: str
+    above: float = -np.inf
+    below: float = np.inf
+    why: str = ""
 
     def shown(self, values: Sequence[float]) -> bool:
         """Do all of its numbers lie where they should?
@@ -87,26 +87,17 @@ class Seen:
         """
         bounds = [("above", self.observation.above), ("below", self.observation.below)]
         wanted = " and ".join(f"{word} {bound:g}" for word, bound in bounds if np.isfinite(bound))
-        told = ", ".join(f"{value:.3g}" for value in self.values)
+        numbers = ", ".join(f"{value:.3g}" for value in self.values)
         if len(self.values) > MOST_TOLD:
-            told = f"{min(self.values):.3g} to {max(self.values):.3g}"
-        return f"{self.observation.measure}: {told}, {wanted}"
+            numbers = f"{min(self.values):.3g} to {max(self.values):.3g}"
+        return f"{self.observation.measure}: {numbers}, {wanted}"
 
 
 @functools.cache
 def observations() -> tuple[Observation, ...]:
     """All of them, in the order of the text."""
     return tuple(
-        Observation(
-            entry["section"].partition(".")[0],
-            entry["section"],
-            tuple(entry.get("figures", ())),
-            entry["says"],
-            entry["measure"],
-            entry.get("above", -np.inf),
-            entry.get("below", np.inf),
-            entry.get("why", ""),
-        )
+        Observation(entry["section"].partition(".")[0], **{**entry, "figures": tuple(entry.get("figures", ()))})
         for entry in read("observations.toml")["observation"]
     )
 
@@ -199,7 +190,7 @@ def _over_sides(record: ss.Record, name: str, frequency: float) -> float:
 
 def of_chapter_3(given: Given) -> Ours:
     """Of the compliant contact in sliding."""
-    told, soft = given["sliding"], given["schematic"]
+    section, soft = given["sliding"], given["schematic"]
     orbits = [chapter3.sliding(given, case) for case in chapter3.CASES]
     slopes = [float(np.mean(chapter3.slopes_of_sticks(chapter3.measured(given, case)))) for case in chapter3.CASES]
     read = [
@@ -217,12 +208,12 @@ def of_chapter_3(given: Given) -> Ours:
         "peak over sliding friction": np.max(np.abs(over["friction"])),
         "harmonics over the fundamental, power": sum(1 / harmonics.ratio(n) ** 2 for n in (2, 3, 4, 5)),
         "spread of the slopes": (max(slopes) - min(slopes)) / float(np.mean(slopes)),
-        "V_s read off over equation 3.4": [v / chapter3.equation_3_4(told, case) for case, v in enumerate(read)],
+        "V_s read off over equation 3.4": [v / chapter3.equation_3_4(section, case) for case, v in enumerate(read)],
         "V_s read off, over that at the next lower frequency": [b / a for a, b in pairwise(read)],
         "V_s simulated, over that at the next lower frequency": [b / a for a, b in pairwise(simulated)],
-        "V_s simulated over equation 3.4": [_over_equation(told, case, orbit) for case, orbit in enumerate(orbits)],
+        "V_s simulated over equation 3.4": [_over_equation(section, case, orbit) for case, orbit in enumerate(orbits)],
         "rise by the contact's damping up to V_s, over the whole": [
-            chapter3.contact(given, case).damping * orbit.transition_speed / (2 * told["kinetic"][case])
+            chapter3.contact(given, case).damping * orbit.transition_speed / (2 * section["kinetic"][case])
             for case, orbit in enumerate(orbits)
         ],
         "friction at the largest speed over its peak": _fall(chapter3.stribeck_behind_a_spring(soft)[2]),
@@ -238,22 +229,22 @@ def _fall(motion: dict[str, Array]) -> float:
     return float(motion["friction"][np.argmax(motion["v"])] / np.max(motion["friction"]))
 
 
-def _over_equation(told: Any, case: int, orbit: ss.solve.SteadyState) -> float:
+def _over_equation(section: Any, case: int, orbit: ss.solve.SteadyState) -> float:
     """By the simulated amplitude, as equation 3.4 has it."""
-    give = told["kinetic"][case] / told["stiffness"][case]
+    give = section["kinetic"][case] / section["stiffness"][case]
     return orbit.transition_speed / (
-        4 * math.pi * told["frequency"][case] * math.sqrt(orbit.amplitude * give - give**2)
+        4 * math.pi * section["frequency"][case] * math.sqrt(orbit.amplitude * give - give**2)
     )
 
 
 def of_chapter_4(given: Given) -> Ours:
     """Of sticks, their ringing, and the state-variable law."""
-    told, record = given["stick_slip"], chapter4.measured(given)
+    section, record = given["stick_slip"], chapter4.measured(given)
     time, acceleration, friction = chapter4.free_vibration(given)
-    cases = [chapter4.stick_slip(given, told[name]) for name in ("case1", "case2")]
+    cases = [chapter4.stick_slip(given, section[name]) for name in ("case1", "case2")]
     late = [chapter4.state_variable(given, case) for case in range(3)]
     turns = [_turn(orbit) for orbit in late]
-    give = [1.5 * kinetic / told["stiffness"] for kinetic in given["state_variable"]["kinetic"]]
+    give = [1.5 * kinetic / section["stiffness"] for kinetic in given["state_variable"]["kinetic"]]
     rings = ss.contact.transition(record)
     return {
         "transition oscillation [Hz]": rings.frequency.value,
@@ -261,11 +252,11 @@ def of_chapter_4(given: Given) -> Ours:
         "frequency in acceleration over in friction": chapter4.strongest(time, acceleration)
         / chapter4.strongest(time, friction),
         "frequency over that of m, k and K_y": chapter4.strongest(time, friction)
-        / (math.sqrt((told["spring"] + told["stiffness"]) / told["mass"]) / (2 * math.pi)),
+        / (math.sqrt((section["spring"] + section["stiffness"]) / section["mass"]) / (2 * math.pi)),
         "reversals before the stick": _reversals(given),
         "swings of friction within a stick": _swings(cases[1]),
-        "micro-slips, case 1": readings.micro_slips(cases[0]),
-        "micro-slips, case 2": readings.micro_slips(cases[1]),
+        "micro-slips, case 1": chapter4.micro_slips(cases[0]),
+        "micro-slips, case 2": chapter4.micro_slips(cases[1]),
         "way to half of the friction, over that of the contact": [
             way / own for (way, _), own in zip(turns, give, strict=True)
         ],
@@ -292,9 +283,9 @@ def _step(orbit: ss.solve.SteadyState) -> float:
 
 def _reversals(given: Given) -> int:
     """Turns of the released mass before it sticks for good, each farther from the one before than a contact gives."""
-    told = given["stick_slip"]
+    section = given["stick_slip"]
     turns = chapter4.turns_of_release(given)
-    far = 4 * told["kinetic"] / told["stiffness"]
+    far = 4 * section["kinetic"] / section["stiffness"]
     return sum(abs(b - a) > far for a, b in pairwise(turns))
 
 
@@ -311,10 +302,10 @@ def _swings(orbit: ss.solve.SteadyState) -> float:
 
 def of_chapter_5(given: Given) -> Ours:
     """Of the wavelet maps."""
-    told = given["wavelet"]
+    section = given["wavelet"]
     impulse, tone = chapter5.signals()
-    spike = ss.wavelet_map(impulse, "a", frequencies=(32.0, 256.0), wavelet_frequency=told["centre"])
-    band = ss.wavelet_map(tone, "a", frequencies=(4.0, 64.0), wavelet_frequency=told["centre"])
+    spike = ss.wavelet_map(impulse, "a", frequencies=(32.0, 256.0), wavelet_frequency=section["centre"])
+    band = ss.wavelet_map(tone, "a", frequencies=(4.0, 64.0), wavelet_frequency=section["centre"])
     early = np.abs(band.values[:, 400:600]).mean(axis=1)
     maps = {kind: chapter5.accelerations(given, kind) for kind in ("coulomb", "state variable", "case1", "case2")}
     measured = chapter5.accelerations(given, "measured")

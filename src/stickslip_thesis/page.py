@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import functools
-import importlib
 import re
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -19,6 +17,7 @@ from stickslip.figures.style import Plate
 from stickslip.story.folder import check_folder, results_folder, templates, write_figures
 from stickslip.units import prefixed, spelled
 from stickslip.workers import processors, workers
+from stickslip_thesis import appendices, beyond, chapter2, chapter3, chapter4, chapter5, chapter6, chapter7
 from stickslip_thesis.drawing import caption_of
 from stickslip_thesis.measures import Seen, seen
 from stickslip_thesis.printed import CHANGED as CHANGED
@@ -65,8 +64,8 @@ def starts(given: Given) -> list[Start]:
     notes = remarks()
     return [
         Start(_words(name), notes.get((name, ""), ""), tuple(
-            (words, value, notes.get((name, key), "")) for key, held in values.items()
-            for words, value in _entries(name, key, held, contact="spring" in values)
+            (words, value, notes.get((name, key), "")) for key, value in values.items()
+            for words, value in _entries(name, key, value, contact="spring" in values)
         ))
         for name, values in given.items()
     ]  # fmt: skip
@@ -85,7 +84,7 @@ def _told(section: str, key: str, value: float | Sequence[float]) -> str:
     unit = "1" if section in WITHOUT_UNITS else UNITS.get(key, "1")
     values = np.atleast_1d(np.asarray(value, dtype=float))
     factor, name = prefixed(values, unit)
-    return ", ".join(f"{each:.7g}" for each in factor * values) + ("" if name == "1" else f" {spelled(name)}")
+    return ", ".join(f"{number:.7g}" for number in factor * values) + ("" if name == "1" else f" {spelled(name)}")
 
 
 def _words(key: str) -> str:
@@ -96,7 +95,7 @@ def _words(key: str) -> str:
 @functools.cache
 def remarks() -> Mapping[tuple[str, str], str]:
     """The remarks of given.toml by section and key; that of a section by an empty key."""
-    found, section, above = {}, "", ""
+    notes, section, above = {}, "", ""
     for line in (HERE / "given.toml").read_text("utf-8").splitlines():
         code, _, remark = (part.strip() for part in line.partition("#"))
         key = re.match(r"\[?(\w+)", code)
@@ -105,21 +104,21 @@ def remarks() -> Mapping[tuple[str, str], str]:
             continue
         if code.startswith("["):
             section = key[1]
-        found[section, "" if code.startswith("[") else key[1]] = "; ".join(part for part in (remark, above) if part)
+        notes[section, "" if code.startswith("[") else key[1]] = "; ".join(part for part in (remark, above) if part)
         above = ""
-    return found
+    return notes
 
 
 CHAPTERS = {
-    "2": "chapter2",
-    "3": "chapter3",
-    "4": "chapter4",
-    "5": "chapter5",
-    "6": "chapter6",
-    "7": "chapter7",
-    "appendices": "appendices",
-    "beyond": "beyond",
-}  # scripts
+    "2": chapter2,
+    "3": chapter3,
+    "4": chapter4,
+    "5": chapter5,
+    "6": chapter6,
+    "7": chapter7,
+    "appendices": appendices,
+    "beyond": beyond,
+}
 VERDICTS = (*MEANINGS, CHANGED)
 TEMPLATE = "thesis.html.jinja"
 
@@ -181,7 +180,7 @@ class Chapter:
 
 def run_chapter(name: str, *, start: Given | None = None, draw: bool = True, tell: Tell | None = None) -> Chapter:
     """A chapter's numbers and verdicts and, if asked, its figures."""
-    module, start = module_of(name), given() if start is None else start
+    module, start = CHAPTERS[name], given() if start is None else start
     ours: Ours = module.numbers(start)
     plates = []
     for drawn in module.plates(start) if draw else ():
@@ -191,11 +190,6 @@ def run_chapter(name: str, *, start: Given | None = None, draw: bool = True, tel
     verdicts = tuple((table, judged(table, ours)) for table in tables() if table.chapter == name)
     begins = {section: start[section] for section in module.STARTS_FROM}
     return Chapter(name, module.TITLE, begins, verdicts, tuple(plates), seen(name, start) if draw else ())
-
-
-def module_of(name: str) -> ModuleType:
-    """The script of a chapter."""
-    return importlib.import_module(f"stickslip_thesis.{CHAPTERS[name]}")
 
 
 def reproduce(chapters: Sequence[str], *, folder: Path | None, tell: Tell) -> tuple[Chapter, ...]:
@@ -276,16 +270,17 @@ def results(chapters: Sequence[Chapter]) -> dict[str, Any]:
 
 
 def _plain(one: Seen) -> dict[str, Any]:
-    told = one.observation
+    observation = one.observation
     return {
-        "section": told.section, "figures": list(told.figures), "says": told.says, "measure": told.measure,
-        "values": list(one.values), "seen": one.shown, "why": told.why,
+        "section": observation.section, "figures": list(observation.figures), "says": observation.says,
+        "measure": observation.measure,
+        "values": list(one.values), "seen": one.shown, "why": observation.why,
     }  # fmt: skip
 
 
-def holds(found: dict[str, Any]) -> bool:
+def holds(outcome: dict[str, Any]) -> bool:
     """Whether every verdict holds, and everything is seen that should be."""
-    return not found["verdicts"][CHANGED] and all(one["seen"] == (not one["why"]) for one in found["seen"])
+    return not outcome["verdicts"][CHANGED] and all(one["seen"] == (not one["why"]) for one in outcome["seen"])
 
 
 def render(chapters: Sequence[Chapter]) -> str:
@@ -316,9 +311,9 @@ def digits_of(number: Number, value: float | None) -> str:
 
 def reasons(numbers: Sequence[Number]) -> list[tuple[str, str]]:
     """Why some of a row are not the same: each reason once, with the entries that it holds for."""
-    found: dict[str, list[str]] = {}
+    labels_of: dict[str, list[str]] = {}
     for number in numbers:
         if number.why:
-            found.setdefault(number.why, []).append(number.label)
-    whole = len(found) == 1 and len(next(iter(found.values()))) == len(numbers)
-    return [("" if whole else ", ".join(labels), why) for why, labels in found.items()]
+            labels_of.setdefault(number.why, []).append(number.label)
+    whole = len(labels_of) == 1 and len(next(iter(labels_of.values()))) == len(numbers)
+    return [("" if whole else ", ".join(labels), why) for why, labels in labels_of.items()]

@@ -1,9 +1,14 @@
-"""What the thesis prints, what its chapters start from, and the verdict on each of its numbers."""
+"""What the thesis prints and describes, as the data files have it.
+
+Its numbers, with the verdict on each; what the chapters start from; the captions; and the inventory: by what each thing
+is had here, what is seen, and the test that decides it.
+"""
 
 from __future__ import annotations
 
 import functools
 import tomllib
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -24,9 +29,10 @@ MEANINGS = {
     NOT_PRINTED: "what it was taken from is not printed; ours, where there is one, is of a twin",
     DIFFERS: "measured on the rig, and the model gives another number",
 }
-
 Given = Mapping[str, Mapping[str, Any]]
 Ours = Mapping[str, float | Sequence[float] | None]
+WORKS, PART, MISSING = "works", "in part", "missing"
+HEAD = "| section | what | command or function | what is seen | test | |\n|---|---|---|---|---|---|"
 
 
 @dataclass(frozen=True)
@@ -174,11 +180,77 @@ def _row(row: Mapping[str, Any], labels: Sequence[str]) -> Row:
     return Row(row["quantity"], row.get("unit", "1"), row["ours"], tuple(numbers), row.get("again", ""))
 
 
-def _number(label: str, printed: str, told: Mapping[str, Any]) -> Number:
-    tolerance = float(told.get("tolerance", half_unit(printed)))
-    return Number(label, printed, told.get("verdict", SAME), told.get("instead"), tolerance, told.get("why", ""))
+def _number(label: str, printed: str, entry: Mapping[str, Any]) -> Number:
+    tolerance = float(entry.get("tolerance", half_unit(printed)))
+    return Number(label, printed, entry.get("verdict", SAME), entry.get("instead"), tolerance, entry.get("why", ""))
 
 
 def read(name: str) -> dict[str, Any]:
     """A data file that lies beside the chapters."""
     return tomllib.loads((HERE / name).read_text("utf-8"))
+
+
+@dataclass(frozen=True)
+class Item:
+    """One thing that the thesis describes.
+
+    Attributes
+    ----------
+    section : str
+        Where; "7.2 (2)" is the second section of that number.
+    what : str
+        In our words.
+    by : tuple of str
+        Commands ("stickslip decay") and public functions ("ss.decrement").
+    seen : str
+        What they show.
+    figures : tuple of str
+        The thesis's figures that show it.
+    test : str
+        "test_decrement::test_...", empty where nothing decides it.
+    left : str
+        What is only in part, or missing.
+    """
+
+    section: str
+    what: str
+    by: tuple[str, ...]
+    seen: str
+    figures: tuple[str, ...]
+    test: str = ""
+    left: str = ""
+
+    @property
+    def state(self) -> str:
+        """Works, in part, or missing.
+
+        Examples
+        --------
+        >>> Item("2.2", "running in", (), "", (), "", "no law wears").state
+        'missing'
+        """
+        return MISSING if not self.by else PART if self.left else WORKS
+
+
+@functools.cache
+def items() -> tuple[Item, ...]:
+    """All of them, in the thesis's order."""
+    return tuple(
+        Item(**{**entry, "by": tuple(entry["by"]), "figures": tuple(entry.get("figures", ()))})
+        for entry in read("inventory.toml")["item"]
+    )
+
+
+def inventory(rows: Sequence[Item]) -> str:
+    """The items as a table in Markdown, and how many are in each state."""
+    counts = Counter(item.state for item in rows)
+    total = f"{len(rows)} items: {counts[WORKS]} work, {counts[PART]} in part, {counts[MISSING]} missing."
+    return "\n".join([total, "", HEAD, *map(_inventoried, rows)])
+
+
+def _inventoried(item: Item) -> str:
+    by = ", ".join(f"`{name}`" for name in item.by) or "–"
+    figures = f" ({', '.join(item.figures)})" if item.figures else ""
+    test = f"`{item.test.partition('::')[2]}`" if item.test else "–"
+    left = f": {item.left}" if item.left else ""
+    return f"| {item.section} | {item.what}{figures} | {by} | {item.seen or '–'} | {test} | {item.state}{left} |"

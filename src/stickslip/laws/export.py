@@ -13,13 +13,13 @@ from stickslip.laws.base import Law
 from stickslip.laws.c_code import c_code, modes_of, python_code
 from stickslip.laws.coulomb import Coulomb, LinearSlope
 from stickslip.laws.curved import CurvedLaw, lifted
-from stickslip.laws.formula import one_line, quoted, remark, written
+from stickslip.laws.formula import one_line, remark, written
 from stickslip.laws.guessing import registered
 from stickslip.laws.lugre import LuGre
 from stickslip.laws.rough import RoughSurface
 from stickslip.laws.stribeck import FrictionCurve, Tabulated
 from stickslip.laws.time_delay import SpeedCurve
-from stickslip.settings import nearest
+from stickslip.settings import nearest, toml_value
 
 TABLE = 33  # points of a curve over the speed, where a program takes a table
 WIDE, FASTEST = 10.0, 1.0  # it goes to ten times the law's own speed, or to 1 m/s where it has none
@@ -156,7 +156,7 @@ def _toml_value(value: Any) -> str:
         inner = ", ".join(f"{name} = {_toml_value(entry)}" for name, entry in _values(value))
         return f'{{ name = "{type(value).__name__}", {inner} }}'
     if isinstance(value, str):
-        return quoted(value)
+        return toml_value(value)
     return f"[{', '.join(map(_number, value))}]" if _listed(value) else _number(value)
 
 

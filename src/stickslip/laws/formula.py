@@ -6,7 +6,6 @@ Forms and expressions of laws as text, in Python's writing or C's.
 from __future__ import annotations
 
 import ast
-import json
 import math
 import re
 from collections.abc import Callable, Mapping
@@ -148,17 +147,6 @@ def remark(text: str) -> str:
     'of a curve * / evil(); / * - ->'
     """
     return MARKS.sub(" ", one_line(text)).rstrip("\\")
-
-
-def quoted(text: str) -> str:
-    """A text as a string of TOML, which is one of JSON too.
-
-    Examples
-    --------
-    >>> print(quoted('a sieve of 6"'))
-    "a sieve of 6\\""
-    """
-    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
 
 
 def written(form: Expression | Row, *, names: Mapping[str, str] | None = None, c: bool = False) -> str:

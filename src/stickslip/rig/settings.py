@@ -5,7 +5,6 @@ Which channel a column of a file may be is told by its name, in the words of sev
 from __future__ import annotations
 
 import fnmatch
-import json
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -21,7 +20,7 @@ from stickslip.printing import printable
 from stickslip.record.channels import VOCABULARY, Channel
 from stickslip.record.metadata import Log
 from stickslip.record.record import RIG_UNITS, Record
-from stickslip.settings import STRICT, checked, quantity, read_toml
+from stickslip.settings import STRICT, checked, quantity, read_toml, toml_key, toml_value
 from stickslip.units import prefixed
 
 # The first word that stands in a column's name decides, where its unit fits; the narrower ones come first.
@@ -425,28 +424,13 @@ def _toml_lines(values: Mapping[str, Any], path: str) -> Iterator[str]:
     """A table, plain keys first, then the tables in it."""
     for key, value in values.items():
         if not isinstance(value, Mapping) and value is not None:
-            yield f"{_toml_key(key)} = {_toml_value(value)}"
+            yield f"{toml_key(key)} = {toml_value(value)}"
     for key, value in values.items():
         if isinstance(value, Mapping) and value:
-            name = f"{path}.{_toml_key(key)}" if path else _toml_key(key)
+            name = f"{path}.{toml_key(key)}" if path else toml_key(key)
             if any(not isinstance(inner, Mapping) for inner in value.values()):
                 yield from ("", f"[{name}]")
             yield from _toml_lines(value, name)
-
-
-def _toml_key(key: str) -> str:
-    bare = key.replace("_", "").replace("-", "").isalnum() and key.isascii()
-    return key if bare else json.dumps(key, ensure_ascii=False)
-
-
-def _toml_value(value: Any) -> str:
-    if isinstance(value, (list, tuple)):
-        return f"[{', '.join(map(_toml_value, value))}]"
-    if isinstance(value, bool):
-        return str(value).lower()
-    if isinstance(value, (int, float)):
-        return repr(value)
-    return json.dumps(str(value), ensure_ascii=False)
 
 
 def rig_settings(values: Mapping[str, Any], *, source: str = "the settings", lines: Sequence[str] = ()) -> RigSettings:

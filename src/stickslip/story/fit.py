@@ -23,10 +23,10 @@ from stickslip.law.law import LawFit
 from stickslip.law.stretch import driving
 from stickslip.law.verdict import LawComparison
 from stickslip.laws.export import export_law, toml_table
-from stickslip.laws.formula import quoted
 from stickslip.parameters import unit
 from stickslip.record.record import Record
 from stickslip.rig.settings import rig_toml
+from stickslip.settings import toml_value
 from stickslip.story.scope import Scope, corrected, of_fit, reading_of
 from stickslip.story.story import Line, Story, Table
 from stickslip.story.words import Caution, doubts, interval_of, leading, number, value_of
@@ -240,7 +240,7 @@ def _tone(values: Array, fs: float) -> tuple[float, float, float, float]:
 
 def _plain(name: str, values: Mapping[str, Any]) -> str:
     lines = [
-        f"{key} = {quoted(value) if isinstance(value, str) else repr(float(value))}" for key, value in values.items()
+        f"{key} = {toml_value(value if isinstance(value, str) else float(value))}" for key, value in values.items()
     ]
     return "\n".join([f"[{name}]", *lines])
 

@@ -23,13 +23,13 @@ from stickslip.errors import ModelError
 from stickslip.files.read import read_record
 from stickslip.laws.base import Law
 from stickslip.laws.curved import CurvedLaw
-from stickslip.laws.formula import Formula, quoted
+from stickslip.laws.formula import Formula
 from stickslip.laws.stribeck import Curve
 from stickslip.laws.time_delay import SpeedCurve
 from stickslip.oscillator import Contact, Oscillator, Structure
 from stickslip.parameters import PARTS, changed, declared, find, places, unit
 from stickslip.scenarios import DRIVES, LAWS
-from stickslip.settings import STRICT, checked, line_of, nearest, quantity, read_toml
+from stickslip.settings import STRICT, checked, line_of, nearest, quantity, read_toml, toml_value
 from stickslip.solve.tables import System, numbered
 from stickslip.units import parse_constant
 
@@ -599,21 +599,13 @@ def _plain(value: Any) -> Any:
 
 def _toml(tables: Mapping[str, Any]) -> Iterator[str]:
     if tables["about"]:
-        yield f"about = {_toml_value(tables['about'])}"
+        yield f"about = {toml_value(tables['about'])}"
     for name, table in tables.items():
         for table_row in table if isinstance(table, list) else [table]:
             if name != "about" and table_row:
                 yield ""
                 yield f"[[{name}]]" if isinstance(table, list) else f"[{name}]"
-                yield from (f"{key} = {_toml_value(value)}" for key, value in table_row.items())
-
-
-def _toml_value(value: Any) -> str:
-    if isinstance(value, Mapping):
-        return f"{{ {', '.join(f'{key} = {_toml_value(item)}' for key, item in value.items())} }}"
-    if isinstance(value, list):
-        return f"[{', '.join(map(_toml_value, value))}]"
-    return quoted(value) if isinstance(value, str) else json.dumps(value)
+                yield from (f"{key} = {toml_value(value)}" for key, value in table_row.items())
 
 
 def _python(case: Case, tables: Mapping[str, Any]) -> Iterator[str]:
