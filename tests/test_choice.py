@@ -37,12 +37,21 @@ def released(truth: dict[str, float], *, noise: float, seed: int, half_cycles: i
     return choose(times, x, fs=FS, start=start)
 
 
+@pytest.mark.parametrize("drift", [-0.4, -0.15, 0.15, 0.4])
+@pytest.mark.parametrize("noise", [2e-4, 1e-3])
+def test_friction_that_wears_is_no_other_damping_without_a_doubt(drift: float, noise: float) -> None:
+    """It was told as quadratic damping or as a Stribeck curve, status ok; `drift` is that over the whole motion."""
+    found = released({"damping_ratio": 0.004, "dry_displacement": 0.022, "wear": drift / 20}, noise=noise, seed=5)
+    assert "changes with the way slid (wear)" in found.status
+
+
 @pytest.mark.parametrize("name", TRUTHS)
 def test_the_motion_is_found(name: str) -> None:
     """At a noise of a thousandth each of these is told from every simpler one."""
     truth = TRUTHS[name]
     found = released(truth, noise=1e-3, seed=3, half_cycles=13 if name == "static" else None)
     assert found.model == name
+    assert found.status == "ok", "and friction that wears does not explain it"
     assert found.status == "ok"
     for parameter in ("damping_ratio", "dry_displacement"):
         low, high = found.interval(parameter)

@@ -7,7 +7,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import stickslip as ss
-from stickslip.decay.motions import ALWAYS, MOTIONS, PARAMETERS, free_decay
+from stickslip.decay.motions import ALWAYS, MOTIONS, PARAMETERS, WORN, free_decay
 
 W, TIMES = 6.0, np.linspace(0.0, 9.0, 500)
 CASES = {
@@ -16,6 +16,8 @@ CASES = {
     "stribeck": {"damping_ratio": 0.01, "dry_displacement": 0.02, "rise": 0.3, "stribeck_speed": 0.05 * W},
     "micro-slip": {"damping_ratio": 0.01, "micro_slip": 0.05, "exponent": 0.4},
     "curved spring": {"damping_ratio": 0.01, "dry_displacement": 0.02, "curvature": 0.1},
+    "worn": {"damping_ratio": 0.01, "dry_displacement": 0.02, "wear": 0.05},
+    "worn smooth": {"dry_displacement": 0.02, "wear": -0.03, "rise": 0.3, "stribeck_speed": 0.05 * W},
 }
 
 
@@ -26,20 +28,21 @@ def parameters(**values: float) -> np.ndarray:
 
 def by_scipy(p: np.ndarray, pendulum: bool) -> np.ndarray:
     """The same motion, half cycle after half cycle, by scipy's eighth-order rule."""
-    w, zeta, dry, rest, first, start, q, rise, speed, slip, exponent, curve = p
+    w, zeta, dry, rest, first, start, q, rise, speed, slip, exponent, curve, wear = p
     side, amplitude, history = np.sign(first), abs(first), -slip * abs(first) ** (1 + exponent)
-    x = np.full(TIMES.size, rest + first)
+    x, slid = np.full(TIMES.size, rest + first), 0.0
 
     def spring(u: float) -> float:
         return (np.sin(u) if pendulum else u) + curve * u**3
 
-    while start < TIMES[-1] and abs(spring(amplitude) + history) > dry * (1 + rise):
+    while start < TIMES[-1] and abs(spring(amplitude) + history) > dry * (1 + rise) * (1 + wear * slid / abs(first)):
         top, held = amplitude, history
 
-        def rates(_: float, state: np.ndarray, top: float = top, held: float = held) -> list[float]:
+        def rates(_: float, state: np.ndarray, top: float = top, held: float = held, slid: float = slid) -> list[float]:
             u, y = state[0], -state[1]
             joint = 2 * slip * max((top - u) / 2, 0.0) ** (1 + exponent)
             friction = dry * (1 + rise * np.exp(-y / speed)) if speed else dry
+            friction *= 1 + wear * (slid + top - u) / abs(first)
             return [-y, w * w * (friction - spring(u) - held - joint) + 2 * zeta * w * y + q * y * y]
 
         def turning(_: float, state: np.ndarray) -> float:
@@ -55,7 +58,7 @@ def by_scipy(p: np.ndarray, pendulum: bool) -> np.ndarray:
         if rows.any():
             x[rows] = rest + side * run.sol(TIMES[rows] - start)[0]
         history = -history - 2 * slip * ((top - end) / 2) ** (1 + exponent)
-        amplitude, side, start = -end, -side, start + length
+        amplitude, side, start, slid = -end, -side, start + length, slid + top - end
         x[start < TIMES] = rest + side * amplitude
     return x
 
@@ -129,6 +132,6 @@ def test_micro_slip_is_that_of_many_sliders() -> None:
 
 
 def test_every_motion_names_parameters() -> None:
-    for name, motion in MOTIONS.items():
+    for name, motion in {**MOTIONS, "worn": WORN}.items():
         assert motion.name == name
         assert set(motion.free) <= set(PARAMETERS)

@@ -20,14 +20,14 @@ HOPELESS = 4.0  # times what viscous damping with dry friction leaves
 EVALUATIONS = 60  # of one search
 PRECISION = 1e-6  # of the range: no record is better, no residual below it says anything
 CONVERGED = 1e-8  # relative change of the sum of squares, and of the parameters
-LOWEST = {"damping_ratio": 0.0, "dry_displacement": 0.0, "quadratic": 0.0, "rise": 0.0, "micro_slip": 0.0}
+LOWEST = {"damping_ratio": 0.0, "dry_displacement": 0.0, "quadratic": 0.0, "rise": 0.0, "micro_slip": 0.0, "wear": -0.5}
 SHAPES = {
     "stribeck_speed": (0.02, 1.0),
     "exponent": (0.1, 1.0),
 }  # lowest and highest; speeds in units of the first speed
 ADDED = ("quadratic", "rise", "micro_slip")
 CLEAR = 10.0  # effect over noise above which the shape of a term is known
-HIGHEST = {"damping_ratio": 0.95, "rise": 1.0}
+HIGHEST = {"damping_ratio": 0.95, "rise": 1.0, "wear": 0.5}  # by half in a first amplitude is no wear any more
 STRIBECK_SPEEDS = (0.05, 0.3)  # of the first speed, at which a slope is looked for
 EXPONENT = 0.5  # of the micro-slip that is looked for
 NUMBERS = {name: number for number, name in enumerate(PARAMETERS)}
@@ -97,7 +97,7 @@ class Fitted:
     ----------
     motion : Motion
         The candidate.
-    parameters : ndarray, shape (12,)
+    parameters : ndarray, shape (13,)
         In the order of ``PARAMETERS``.
     half_cycles : int
         That it makes within the record.
@@ -204,7 +204,7 @@ def fit_motion(
         The candidate; what it does not free stays as in `start`.
     blocks : BlockMeans
         The data.
-    start : ndarray, shape (12,)
+    start : ndarray, shape (13,)
         Where the search begins.
     half_cycles : int, optional
         It stays after so many, whatever drives it on.

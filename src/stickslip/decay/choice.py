@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -22,7 +22,7 @@ from stickslip.decay.candidates import (
     fit_candidates,
     fit_motion,
 )
-from stickslip.decay.motions import MOTIONS, Restoring
+from stickslip.decay.motions import MOTIONS, WORN, Restoring
 from stickslip.errors import EstimateError
 from stickslip.estimate import NORMAL_95, Estimate
 from stickslip.statistics import mean_uncertainty, student
@@ -33,6 +33,7 @@ SIZE = 0.05  # of each candidate's test: how often a true one is rejected
 COLOURED = 0.01  # p-value of the best residual's whiteness below which its correlation counts
 DRAWS = 20000  # of the greatest of correlated Student variables
 NEAR = 2.0  # times the least residual: what counts where no candidate is true
+DRIFTS = (0.0, -0.01, 0.01)  # in a first amplitude, from which friction that wears is searched
 APART = 1e-4  # share of a direction that the fitted parameters must leave for it to be seen
 SEEN = {
     "damping_ratio": "viscous damping",
@@ -205,12 +206,15 @@ class Choice:
         p-value of the chosen motion's residual being white (cumulative periodogram).
     status : str
         "ok", or in words what to beware of.
+    worn : str
+        That friction which changes with the way slid explains the decay as well, in words; empty where it does not.
     """
 
     model: str
     candidates: tuple[Candidate, ...]
     lack_of_fit: float
     status: str
+    worn: str = ""
 
     @property
     def chosen(self) -> Candidate:
@@ -232,7 +236,7 @@ class Choice:
         if not tried or any(tested.kept for tested in tried):
             return ""
         best = min(tried, key=lambda tested: tested.fitted.motion.size)
-        return f"{best.against} is seen beside {best.fitted.motion.words}"
+        return self.worn or f"{best.against} is seen beside {best.fitted.motion.words}"
 
     def candidate(self, name: str) -> Candidate:
         """The candidate of a name in ``MOTIONS``."""
@@ -312,7 +316,33 @@ def choose(
     best = min(fits.values(), key=lambda fitted: fitted.cost)
     noise = Noise(best.residual, best.jacobian.shape[1], blocks.floor)
     tried = tuple(_tested(fitted, noise, best) for name, fitted in fits.items() if name in candidates)
-    return _chosen(tried)
+    choice = _chosen(tried)
+    worn = _worn(choice.chosen, fits["both"], best)
+    return replace(choice, status=worn, worn=worn) if worn else choice
+
+
+def _worn(chosen: Candidate, plain: Fitted, best: Fitted) -> str:
+    """That friction which changes with the way slid explains the decay too, in words; empty where it does not.
+
+    It is asked where more than viscous damping and dry friction is seen: decays of an independent integrator whose
+    friction drifted by 5 to 40 % were told as quadratic damping, or as friction that rises towards rest.
+    """
+    plainly = chosen.kept and set(chosen.fitted.motion.terms) <= set(plain.motion.terms)
+    if plainly and chosen.whiteness >= COLOURED:
+        return ""
+    starts = [plain.parameters.copy() for _ in DRIFTS]
+    for start, drift in zip(starts, DRIFTS, strict=True):
+        start[NUMBERS["wear"]] = drift
+    worn = min((fit_motion(WORN, plain.blocks, start) for start in starts), key=lambda fitted: fitted.cost)
+    least = min(worn, best, key=lambda fitted: fitted.cost)
+    tested = _tested(worn, Noise(least.residual, least.jacobian.shape[1], plain.blocks.floor), least)
+    if not tested.kept or tested.whiteness < COLOURED:
+        return ""
+    words = (
+        f"dry friction that changes with the way slid (wear), by {100 * worn.value('wear'):.2g} % in a first amplitude,"
+    )
+    better = worn.cost < chosen.fitted.cost
+    return f"{words} explains it {'better than' if better else 'as well as'} {chosen.fitted.motion.words}"
 
 
 def kept_by_all(choices: Sequence[Choice]) -> tuple[str, ...]:

@@ -5,12 +5,13 @@ The motion of a free decay from turning point to turning point, with its sensiti
 Between two turning points every candidate's equation is smooth. In the direction of motion, with ``u`` the displacement
 from rest counted positive at the half cycle's beginning, ``A`` its value there and ``y = -u'`` the speed,
 
-    u'' = -w^2 [r(u) + h + 2 kappa ((A - u) / 2)^(1 + p)] + w^2 x_k (1 + sigma exp(-y / v_s)) + 2 zeta w y + q y^2.
+    u'' = -w^2 [r(u) + h + 2 kappa ((A - u) / 2)^(1 + p)] + w^2 x_k (1 + sigma exp(-y / v_s)) (1 + eta s / |a|)
+          + 2 zeta w y + q y^2,
 
-The term in kappa is a Masing branch of the backbone ``x - kappa x^(1 + p)`` (a joint in micro-slip, Segalman 2005);
-``h`` is what the branches before have left. Gragg's extrapolated midpoint rule (order eight) carries state and
-sensitivities; the turning point is found to rounding; samples lie on quintics through position, speed and
-acceleration.
+s the way slid since the release and a the first amplitude: friction that changes as it wears. The term in kappa is a
+Masing branch of the backbone ``x - kappa x^(1 + p)`` (a joint in micro-slip, Segalman 2005); ``h`` is what the branches
+before have left. Gragg's extrapolated midpoint rule (order eight) carries state and sensitivities; the turning point is
+found to rounding; samples lie on quintics through position, speed and acceleration.
 """
 
 from __future__ import annotations
@@ -30,13 +31,13 @@ RESTORING: tuple[str, ...] = get_args(Restoring)
 
 PARAMETERS = (
     "angular_frequency", "damping_ratio", "dry_displacement", "rest", "amplitude", "release",
-    "quadratic", "rise", "stribeck_speed", "micro_slip", "exponent", "curvature",
+    "quadratic", "rise", "stribeck_speed", "micro_slip", "exponent", "curvature", "wear",
 )  # fmt: skip
 ALWAYS = ("angular_frequency", "rest", "amplitude", "release")
 
 FREQUENCY, DAMPING, DRY, REST, AMPLITUDE, RELEASE = range(6)
-QUADRATIC, RISE, SPEED, SLIP, EXPONENT, CURVATURE = range(6, 12)
-WIDTH = 12
+QUADRATIC, RISE, SPEED, SLIP, EXPONENT, CURVATURE, WEAR = range(6, 13)
+WIDTH = 13
 
 STEP = 0.2  # of a radian of the small motion
 ROWS = 4  # of extrapolation: midpoint rules of 2, 4, 6 and 8 steps
@@ -111,6 +112,13 @@ MOTIONS = {
     )
 }
 
+WORN = Motion(
+    "worn",
+    ("damping_ratio", "dry_displacement", "wear"),
+    "viscous damping and dry friction that changes with the way slid (wear)",
+)
+"""No candidate: a falling level is hardly told from more damping. It is the doubt of those that it passes for."""
+
 
 def free_decay(
     times: ArrayLike,
@@ -132,9 +140,10 @@ def free_decay(
     ----------
     times : array_like, shape (n,)
         Instants [s], rising.
-    parameters : array_like, shape (12,)
+    parameters : array_like, shape (12,) or (13,)
         In the order of ``PARAMETERS``: w [rad/s], zeta, x_k, rest position, first amplitude from there (signed),
-        release [s], q [1/length], sigma, v_s, kappa [length^-p], p, g [1/length^2].
+        release [s], q [1/length], sigma, v_s, kappa [length^-p], p, g [1/length^2]; eta, by which x_k grows over a way
+        of the first amplitude, 0 where left out.
     free : tuple of str
         Parameters whose sensitivities are wanted.
     restoring : {"linear", "pendulum"}
@@ -164,10 +173,11 @@ def free_decay(
         apart = np.asarray(spread, dtype=float)
         instants = np.stack([instants - apart, instants + apart], axis=1).ravel()
     active = np.array([PARAMETERS.index(name) for name in free], dtype=np.int64)
-    work = np.empty((13, 2 + 2 * len(active)))
+    work = np.empty((14, 2 + 2 * len(active)))
     x, jacobian = np.empty(len(instants)), np.empty((len(instants), len(active)))
     most = -1 if half_cycles is None else half_cycles
-    values = np.ascontiguousarray(parameters, dtype=float)
+    values = np.zeros(WIDTH)
+    values[: len(np.atleast_1d(parameters))] = parameters
     begun = decay(instants, values, active, restoring == "pendulum", most, work, x, jacobian)
     if spread is not None:
         x, jacobian = 0.5 * (x[::2] + x[1::2]), 0.5 * (jacobian[::2] + jacobian[1::2])
@@ -175,8 +185,9 @@ def free_decay(
 
 
 @compiled(**OPTIONS)
-def _rates(state, p, active, sine, branch, out):
-    """Rates of ``state = (u, u', du/dp_j, du'/dp_j, ...)``; `branch` holds A, h and their sensitivities."""
+def _rates(state, p, active, sine, branch, worn, out):
+    """Rates of ``state = (u, u', du/dp_j, du'/dp_j, ...)``; `branch` holds A, h and their sensitivities, `worn` the
+    way slid before A and its."""
     w, u, y = p[FREQUENCY], state[0], -state[1]
     square = w * w
     decay = math.exp(-y / p[SPEED]) if p[SPEED] > 0 else 0.0
@@ -185,9 +196,13 @@ def _rates(state, p, active, sine, branch, out):
     power = math.exp((1 + p[EXPONENT]) * log) if depth > 0 else 0.0
     slope = p[SLIP] * (1 + p[EXPONENT]) * power / depth if depth > 0 else 0.0
     spring = (math.sin(u) if sine else u) + p[CURVATURE] * u**3 + branch[1] + 2 * p[SLIP] * power
-    dry = p[DRY] * (1 + p[RISE] * decay)
-    fade = p[DRY] * p[RISE] * decay / p[SPEED] if p[SPEED] > 0 else 0.0
-    by_u = -square * ((math.cos(u) if sine else 1.0) + 3 * p[CURVATURE] * u * u - slope)
+    first, slid = abs(p[AMPLITUDE]), worn[0] + branch[0] - u
+    fresh = p[DRY] * (1 + p[RISE] * decay)
+    grown = p[WEAR] / first if p[WEAR] != 0 else 0.0
+    level = max(0.0, 1 + grown * slid)
+    dry = fresh * level
+    fade = level * p[DRY] * p[RISE] * decay / p[SPEED] if p[SPEED] > 0 else 0.0
+    by_u = -square * ((math.cos(u) if sine else 1.0) + 3 * p[CURVATURE] * u * u - slope + fresh * grown)
     by_y = -square * fade + 2 * p[DAMPING] * w + 2 * p[QUADRATIC] * y
     out[0] = state[1]
     out[1] = square * (dry - spring) + 2 * p[DAMPING] * w * y + p[QUADRATIC] * y * y
@@ -199,11 +214,11 @@ def _rates(state, p, active, sine, branch, out):
         elif name == DAMPING:
             direct = 2 * w * y
         elif name == DRY:
-            direct = square * (1 + p[RISE] * decay)
+            direct = square * level * (1 + p[RISE] * decay)
         elif name == QUADRATIC:
             direct = y * y
         elif name == RISE:
-            direct = square * p[DRY] * decay
+            direct = square * level * p[DRY] * decay
         elif name == SPEED:
             direct = square * fade * y / p[SPEED] if p[SPEED] > 0 else 0.0
         elif name == SLIP:
@@ -212,6 +227,12 @@ def _rates(state, p, active, sine, branch, out):
             direct = -2 * square * p[SLIP] * power * log
         elif name == CURVATURE:
             direct = -square * u**3
+        elif name == WEAR:
+            direct = square * fresh * slid / first
+        elif name == AMPLITUDE and grown != 0:
+            direct = -square * fresh * grown * slid / p[AMPLITUDE]
+        if grown != 0:
+            direct += square * fresh * grown * (worn[1 + j] + branch[2 + 2 * j])
         du, dv = state[2 + 2 * j], state[3 + 2 * j]
         out[2 + 2 * j] = dv
         out[3 + 2 * j] = (
@@ -232,7 +253,7 @@ def _advance(state, length, p, active, sine, branch, rates, work, out):
             old[i] = state[i]
             now[i] = state[i] + short * rates[i]
         for _ in range(1, count):
-            _rates(now, p, active, sine, branch, slopes)
+            _rates(now, p, active, sine, branch, work[13], slopes)
             for i in range(size):
                 next_ = old[i] + 2 * short * slopes[i]
                 old[i] = now[i]
@@ -285,16 +306,16 @@ def _rest(sample, p, active, side, branch, x, jacobian):
 
 
 @compiled(**OPTIONS)
-def _first_branch(p, active, side, branch, moved):
+def _first_branch(p, active, side, branch, worn, moved):
     """The branch from the first turning point, on the virgin backbone, and how its beginning moves."""
     amplitude = abs(p[AMPLITUDE])
     log = math.log(amplitude) if amplitude > 0 else 0.0
     power = math.exp((1 + p[EXPONENT]) * log) if amplitude > 0 else 0.0
-    branch[0], branch[1] = amplitude, -p[SLIP] * power
+    branch[0], branch[1], worn[0] = amplitude, -p[SLIP] * power, 0.0
     for j in range(active.size):
         name = active[j]
         branch[2 + 2 * j] = side if name == AMPLITUDE else 0.0
-        branch[3 + 2 * j] = 0.0
+        branch[3 + 2 * j] = worn[1 + j] = 0.0
         if name == SLIP:
             branch[3 + 2 * j] = -power
         elif name == EXPONENT:
@@ -305,7 +326,7 @@ def _first_branch(p, active, side, branch, moved):
 
 
 @compiled(**OPTIONS)
-def _next_branch(p, active, branch, state, rates, moved):
+def _next_branch(p, active, branch, worn, state, rates, moved):
     """The branch from the turning point that was reached, and how its beginning moves."""
     depth = 0.5 * (branch[0] - state[0])
     log = math.log(depth) if depth > 0 else 0.0
@@ -320,8 +341,10 @@ def _next_branch(p, active, branch, state, rates, moved):
         elif active[j] == EXPONENT:
             change += 2 * p[SLIP] * power * log
         branch[3 + 2 * j] = -branch[3 + 2 * j] - change
+        worn[1 + j] += branch[2 + 2 * j] - state[2 + 2 * j]
         branch[2 + 2 * j] = -state[2 + 2 * j]
     branch[1] = -branch[1] - 2 * p[SLIP] * power
+    worn[0] += branch[0] - state[0]
     branch[0] = -state[0]
 
 
@@ -333,7 +356,7 @@ def _step(p, active, sine, work):
     if p[SPEED] > 0:
         length = min(length, 0.3 * (p[SPEED] + 0.3 * abs(state[1])) / abs(rates[1]))
     _advance(state, length, p, active, sine, branch, rates, work, end)
-    _rates(end, p, active, sine, branch, end_rates)
+    _rates(end, p, active, sine, branch, work[13], end_rates)
     if end[1] < 0:
         return length, False
     share = state[1] / (state[1] - end[1])
@@ -344,12 +367,12 @@ def _step(p, active, sine, work):
     length *= share
     for _ in range(2):  # on the motion itself
         _advance(state, length, p, active, sine, branch, rates, work, end)
-        _rates(end, p, active, sine, branch, end_rates)
+        _rates(end, p, active, sine, branch, work[13], end_rates)
         if end_rates[1] > 0:
             length -= end[1] / end_rates[1]
     _advance(state, length, p, active, sine, branch, rates, work, end)
     end[1] = 0.0
-    _rates(end, p, active, sine, branch, end_rates)
+    _rates(end, p, active, sine, branch, work[13], end_rates)
     return length, True
 
 
@@ -365,10 +388,11 @@ def _read(sample, share, length, p, active, side, work, x, jacobian):
 
 
 @compiled(**OPTIONS)
-def _leaves(p, sine, most, branch):
+def _leaves(p, sine, most, branch, way):
     """Whether the mass leaves its turning point."""
     pull = _turning_spring(branch, p, sine)
-    if most < 0 and (abs(pull) <= p[DRY] * (1 + p[RISE]) or branch[0] < LEAST * abs(p[AMPLITUDE])):
+    level = 1 + p[WEAR] * way / abs(p[AMPLITUDE]) if p[WEAR] != 0 else 1.0
+    if most < 0 and (abs(pull) <= p[DRY] * (1 + p[RISE]) * level or branch[0] < LEAST * abs(p[AMPLITUDE])):
         return False
     return pull >= 0 and branch[0] > 0
 
@@ -377,21 +401,22 @@ def _leaves(p, sine, most, branch):
 def decay(times, p, active, sine, most, work, x, jacobian):
     """Fill `x` (n,) and `jacobian` (n, active.size) at rising `times`; return the number of half cycles begun.
 
-    `most` half cycles at the most, -1 for as many as the dry friction lets it make; `work` is (13, 2 + 2 active).
+    `most` half cycles at the most, -1 for as many as the dry friction lets it make; `work` is (14, 2 + 2 active).
     """
     count, size = times.size, 2 + 2 * active.size
     branch, state, rates, end, end_rates, moved = work[7], work[8], work[9], work[10], work[11], work[12]
+    worn = work[13]
     side = 1.0 if p[AMPLITUDE] >= 0 else -1.0
     start, sample, half_cycles = p[RELEASE], 0, 0
-    _first_branch(p, active, side, branch, moved)
+    _first_branch(p, active, side, branch, worn, moved)
     while sample < count and times[sample] <= start:
         _rest(sample, p, active, side, branch, x, jacobian)
         sample += 1
-    while sample < count and half_cycles != most and _leaves(p, sine, most, branch):
+    while sample < count and half_cycles != most and _leaves(p, sine, most, branch, worn[0]):
         half_cycles += 1
         for i in range(size):
             state[i] = branch[i] if i % 2 == 0 else 0.0
-        _rates(state, p, active, sine, branch, rates)
+        _rates(state, p, active, sine, branch, worn, rates)
         if rates[1] >= 0:
             break
         turned = False
@@ -406,7 +431,7 @@ def decay(times, p, active, sine, most, work, x, jacobian):
         if not turned:
             break
         side = -side
-        _next_branch(p, active, branch, state, rates, moved)
+        _next_branch(p, active, branch, worn, state, rates, moved)
     while sample < count:  # at rest
         _rest(sample, p, active, side, branch, x, jacobian)
         sample += 1

@@ -231,7 +231,7 @@ class Search:
     def tried(
         self, shown: Sequence[Shown], evidence: Evidence | None, passes: int, before: Mapping[str, Trial]
     ) -> dict[str, Trial]:
-        """Every law searched, or its search taken up again; none ends above a law that it contains."""
+        """Every law searched, or its search taken up again; anew where it ends above one that it contains."""
         stretches = [self.stretch(evidence)(motion, number) for number, motion in enumerate(shown)]
         trials: dict[str, Trial] = {}
         for kind, given in self.kinds:

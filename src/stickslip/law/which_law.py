@@ -49,6 +49,7 @@ from stickslip.law.trials import (
 from stickslip.law.verdict import (
     CALIBRATIONS,
     LEFT,
+    SUPPORTED,
     Candidate,
     Evidence,
     LawComparison,
@@ -358,7 +359,8 @@ def compare_laws(
     )
     best, final = search.settled(trials[ranking[0].name], looked, evidence, rests.fall)
     fit = search.fitted(best, final, rests.fall)
-    doubt, confidence = doubt_of(fit, oscillator, calibration), min(confidence, evidence.supported)
+    supported = evidence.supported if Remainder.of_fit(fit).explained else SUPPORTED
+    doubt, confidence = doubt_of(fit, oscillator, calibration), min(confidence, supported)
     if doubt:
         ranking, confidence = undescribed(ranking), 0.0
         fit = _flagged(fit, "none of the laws tried describes these records")

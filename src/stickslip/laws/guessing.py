@@ -129,7 +129,7 @@ class Hypothesis(NamedTuple):
     continued : callable
         Where else: at the end of the search of a simpler law that it contains, what it adds hardly felt.
     contains : tuple of str
-        Those simpler laws, by name: it never leaves more than they do.
+        Those simpler laws, by name: it is searched anew from where they end, if it ends above.
     holds : callable
         Whether a law of the class is this one, by its values.
     """

@@ -20,6 +20,7 @@ from stickslip.laws.guessing import (
     LITTLE,
     SPEEDS,
     STIFF,
+    STIFFEST,
     Array,
     Family,
     Hypothesis,
@@ -28,6 +29,10 @@ from stickslip.laws.guessing import (
 )
 from stickslip.laws.stribeck import require_static_above, stribeck_curve
 from stickslip.parameters import parameter, parametric
+
+# of the smallest stroke, by which bristles bend that begin as a rigid contact's: of a record with stops the softer ones
+# left 40 times what the Stribeck curve in them does
+RIGID = (STIFF / 2, STIFFEST)
 
 
 @parametric
@@ -137,9 +142,10 @@ def _from_simpler(simpler: Mapping[str, Searched]) -> list[LuGre]:
         begun.append(LuGre(bristle.kinetic, static, speed=speed, stiffness=bristle.stiffness, damping=bristle.damping))
     if curve is not None:
         law = curve.law
-        stiffness = 2 * law.kinetic / (STIFF * float(curve.scales[:, 0].min()))
-        damping = 0.2 * math.sqrt(stiffness * curve.mass)
-        begun.append(LuGre(law.kinetic, law.static, speed=law.speed, stiffness=stiffness, damping=damping))
+        for give in RIGID:
+            stiffness = law.kinetic / (give * float(curve.scales[:, 0].min()))
+            damping = 0.2 * math.sqrt(stiffness * curve.mass)
+            begun.append(LuGre(law.kinetic, law.static, speed=law.speed, stiffness=stiffness, damping=damping))
     return begun
 
 
