@@ -229,12 +229,12 @@ def _ringing(given: Given) -> Any:
 
     drawn, axes = panels(1, 2, height=3.0)
     axes[0].plot(section["stiffness"] * fine / 1e3, coupled(section["stiffness"] * fine), color=FAINT)
-    found = [ringing(stick_slip(given, stiffness=float(step))) for step in steps]
-    axes[0].plot(section["stiffness"] * steps / 1e3, found, "o", color=BLUE, markersize=4)
+    frequencies = [ringing(stick_slip(given, stiffness=float(step))) for step in steps]
+    axes[0].plot(section["stiffness"] * steps / 1e3, frequencies, "o", color=BLUE, markersize=4)
     axes[0].set(xlabel="contact stiffness [N/mm]", ylabel="frequency [Hz]")
     axes[1].plot(nominal * fine, coupled(section["stiffness"] * fine ** (1 / 3)), color=FAINT)
-    found = [ringing(stick_slip(given, load=float(step))) for step in steps]
-    axes[1].plot(nominal * steps, found, "o", color=ORANGE, markersize=4)
+    frequencies = [ringing(stick_slip(given, load=float(step))) for step in steps]
+    axes[1].plot(nominal * steps, frequencies, "o", color=ORANGE, markersize=4)
     axes[1].set(xlabel="normal load [N]", ylim=axes[0].get_ylim())
     for ax, letter in zip(axes, "ab", strict=True):
         tag(ax, letter)

@@ -71,13 +71,13 @@ def plates(given: Given) -> Iterator[Plate]:
         )
     for number, case in (("2.7", 0), ("2.8", 1), ("2.9", 2), ("2.10", 3)):
         record = rubbing(given, case)
-        found = ss.balance.compare_force(balanced(given, case))
+        comparison = ss.balance.compare_force(balanced(given, case))
         heard, ringing = (transients(given, record, band) for band in (HEARD, CELL_BAND))
         yield figure(
             number,
             _both_forces(given, record),
-            f"{words} Computed and felt force agree within a tenth up to {found.agree_up_to.value:.0f} Hz. Of what "
-            f"rings from {HEARD[0]:g} to {HEARD[1]:g} Hz F2 has {heard:.2f} of F1; from {CELL_BAND[0]:g} to "
+            f"{words} Computed and felt force agree within a tenth up to {comparison.agree_up_to.value:.0f} Hz. Of "
+            f"what rings from {HEARD[0]:g} to {HEARD[1]:g} Hz F2 has {heard:.2f} of F1; from {CELL_BAND[0]:g} to "
             f"{CELL_BAND[1]:g} Hz {ringing:.2f}, where the accelerometer on its mount of 125 Hz hears less, too.",
         )
     slow, fast = coupled(given["rig"])
@@ -266,14 +266,14 @@ def delayed(given: Given, values: Array, sign: int = 1) -> Array:
 def forces(given: Given, record: ss.Record, sign: int = 1) -> dict[str, Array]:
     """Spring, inertial and excitation force of section 2.3, from the sensors as they read."""
     section = given["rig"]
-    found = {"spring": section["spring"] * record["x"], "inertia": section["mass"] * delayed(given, record["a"], sign)}
-    return found | ({"excitation": section["spring"] * record["z"]} if "z" in record else {})
+    terms = {"spring": section["spring"] * record["x"], "inertia": section["mass"] * delayed(given, record["a"], sign)}
+    return terms | ({"excitation": section["spring"] * record["z"]} if "z" in record else {})
 
 
 def resultant(given: Given, record: ss.Record, sign: int = 1) -> Array:
     """What does not cancel: kS_3 - kS_1 - mS_2, the friction where there is a contact."""
-    found = forces(given, record, sign)
-    return found.get("excitation", 0.0) - found["spring"] - found["inertia"]
+    terms = forces(given, record, sign)
+    return terms.get("excitation", 0.0) - terms["spring"] - terms["inertia"]
 
 
 def both(given: Given, record: ss.Record) -> tuple[Array, Array, Array]:

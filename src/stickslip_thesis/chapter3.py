@@ -126,11 +126,11 @@ def _steady(mass: float, spring: float, law: Any, base: float, frequency: float)
 def base_for(given: Given, case: int) -> float:
     """The base amplitude [m] under which the model moves as far as the experiment of Table 3.2."""
     section = given["sliding"]
-    found = brentq(
+    root = brentq(
         lambda base: sliding(given, case, base=base).amplitude - section["amplitude"][case],
         0.98 * section["base"][case], 1.15 * section["base"][case], xtol=1e-9,
     )  # fmt: skip
-    return float(found)
+    return float(root)
 
 
 def equation_3_4(section: Mapping[str, Any], case: int) -> float:

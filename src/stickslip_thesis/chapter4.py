@@ -194,8 +194,8 @@ def base_of_state_variable(given: Given, case: int) -> float | None:
         return state_variable(given, case, base=base).amplitude - wanted
 
     most = given["state_variable"]["base"][case]
-    found = float(brentq(excess, 0.7 * most, most, xtol=1e-7))
-    return 1e3 * found if abs(excess(found)) < 0.01 * wanted else None
+    root = float(brentq(excess, 0.7 * most, most, xtol=1e-7))
+    return 1e3 * root if abs(excess(root)) < 0.01 * wanted else None
 
 
 @functools.lru_cache(8)
@@ -235,8 +235,8 @@ def _spectrum(time: Array, values: Array) -> tuple[Array, Array]:
     part = values[len(values) // 4 :]
     window = np.hanning(2 * len(part))[len(part) :]  # from the largest ringing on
     size = 1 << 17
-    found = np.abs(np.fft.rfft((part - np.mean(part)) * window, size)) ** 2
-    return np.fft.rfftfreq(size, time[1] - time[0]), found / np.max(found)
+    power = np.abs(np.fft.rfft((part - np.mean(part)) * window, size)) ** 2
+    return np.fft.rfftfreq(size, time[1] - time[0]), power / np.max(power)
 
 
 @functools.lru_cache(4)

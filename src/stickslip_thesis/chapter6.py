@@ -214,10 +214,10 @@ def _of_paper(given: Given) -> Ours:
     viscous = [ss.decay.log_decrement(on_paper(given, case, "viscous")) for case in (1, 2)]
     dry = [ss.decay.linear_decrement(on_paper(given, case, "dry")) for case in (1, 2)]
     return {
-        "paper.zeta": [found.damping_ratio.value for found in viscous],
-        "paper.dry": [1e3 * found.dry_displacement.value for found in dry],
-        "paper.zeta of both": [found.damping_ratio.value for found in both],
-        "paper.dry of both": [1e3 * found.dry_displacement.value for found in both],
+        "paper.zeta": [result.damping_ratio.value for result in viscous],
+        "paper.dry": [1e3 * result.dry_displacement.value for result in dry],
+        "paper.zeta of both": [result.damping_ratio.value for result in both],
+        "paper.dry of both": [1e3 * result.dry_displacement.value for result in both],
         **{f"paper.{key}": values for key, values in _scatters(given).items()},
         "paper.zeta off": [100 * abs(1 - each["estimated_ratio"] / each["damping_ratio"]) for each in section],
         "paper.dry off": [100 * abs(1 - each["estimated_dry"] / each["dry"]) for each in section],
@@ -241,14 +241,14 @@ def _scatters(given: Given) -> dict[str, list[float]]:
 
 def _of_bearing(given: Given) -> Ours:
     """Section 6.5."""
-    section, found = given["bearing"], ss.decrement(on_bearing(given))
-    zeta = found.damping_ratio.value
+    section, result = given["bearing"], ss.decrement(on_bearing(given))
+    zeta = result.damping_ratio.value
     return {
         "bearing.zeta": zeta,
         "bearing.beta": zeta / math.sqrt(1 - zeta**2),
-        "bearing.zeta scatter": float(np.std(found.scatter.damping_ratio)),
-        "bearing.friction scatter": section["stiffness"] * float(np.std(found.scatter.dry_displacement)),
-        "bearing.friction": section["stiffness"] * found.dry_displacement.value,
+        "bearing.zeta scatter": float(np.std(result.scatter.damping_ratio)),
+        "bearing.friction scatter": section["stiffness"] * float(np.std(result.scatter.dry_displacement)),
+        "bearing.friction": section["stiffness"] * result.dry_displacement.value,
         "bearing.coefficient": section["kinetic"] / (section["mass"] * section["gravity"]),
     }
 

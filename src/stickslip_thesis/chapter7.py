@@ -153,10 +153,10 @@ def base_for(rig: ss.Structure, amplitude: float) -> float:
         drive=rig.drive,
     )
     near = rig.drive.amplitude
-    found = brentq(
+    root = brentq(
         lambda base: ss.steady_state(first.having(amplitude=base)).amplitude - amplitude, near / 2, 2 * near, xtol=1e-7
     )
-    return float(found)
+    return float(root)
 
 
 def _together(rig: ss.Structure) -> ss.laws.LinearSlope:
@@ -188,8 +188,8 @@ def _record(surface: str, load: str, constants: tuple[tuple[str, float], ...]) -
 
 def squeaks(given: Given, surface: str, load: str) -> bool:
     """Does friction make a sound of the sliding?"""
-    found = ss.find_squeaks(record_of(given, surface, load))
-    return any(each.friction == "shown" for each in found.bursts)
+    squeaks = ss.find_squeaks(record_of(given, surface, load))
+    return any(burst.friction == "shown" for burst in squeaks.bursts)
 
 
 def merging(given: Given) -> tuple[float, float]:
@@ -310,7 +310,7 @@ def _thresholds(given: Given) -> Any:
         critical = [critical_load(given, float(share), power) for share in wetness]
         axes[0].plot(wetness, critical, color=colour, label=name)
         sliding = [ss.stability(rig_between(given, 1.0, float(load), power), speed=TOWARDS) for load in loads]
-        modes = [sorted(mode.frequency for mode in found.modes)[-2:] for found in sliding]
+        modes = [sorted(mode.frequency for mode in state.modes)[-2:] for state in sliding]
         axes[1].plot(loads, modes, color=colour)
         axes[1].axvline(critical[-1], color=colour, linestyle=":", linewidth=0.9)
     axes[0].set(xlabel="wetness: 0 dry, 1 wet", ylabel="critical load [N]", ylim=(0, None))

@@ -158,10 +158,10 @@ def _agrees(ours: float | None, printed: str, tolerance: float) -> bool:
 
 
 def _values(row: Row, ours: Ours) -> list[float | None]:
-    found = ours[row.ours]
-    if found is None:
+    computed = ours[row.ours]
+    if computed is None:
         return [None] * len(row.numbers)
-    return [None if np.isnan(value) else float(value) for value in np.atleast_1d(np.asarray(found, dtype=float))]
+    return [None if np.isnan(value) else float(value) for value in np.atleast_1d(np.asarray(computed, dtype=float))]
 
 
 def _table(entry: Mapping[str, Any]) -> Table:
