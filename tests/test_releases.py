@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from stickslip.law.trials import FALLS, Rests
+from stickslip.law.data import FALLS, Rests
 
 FS, FREQUENCY, TOP, HOLD = 4000, 2.5, 0.016, 0.055  # Hz, Hz, m/s, s of each stick
 LEVEL, EXCESS, SPEED = 0.95, 0.2, 5e-3

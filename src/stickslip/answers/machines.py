@@ -13,8 +13,7 @@ import numpy as np
 
 from stickslip.answers.findings import Comparison, Findings, Inquiry, flagged, record_name, require_several, with_doubt
 from stickslip.answers.mistakes import called, require_angle
-from stickslip.cycle.joint import JointFriction, regress_joint
-from stickslip.cycle.joint_fit import regress_joint_logs
+from stickslip.cycle.joint import JointFriction, regress_joint, regress_joint_logs
 from stickslip.cycle.joint_onset import joint_backlash, joint_breakaway
 from stickslip.cycle.onset import Breakaway, breakaway
 from stickslip.cycle.sticks import find_sticks

@@ -24,10 +24,10 @@ from stickslip.signals.derivatives import (
     checked_bandwidth,
     differentiate,
     five_point_average,
-    noise_along,
     smooth,
 )
 from stickslip.signals.interpolate import without_delays
+from stickslip.signals.noise import noise_along
 from stickslip.statistics import mean_of_cycles
 
 Array = NDArray[np.float64]

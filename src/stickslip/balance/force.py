@@ -34,10 +34,10 @@ from stickslip.signals.derivatives import (
     checked_bandwidth,
     differentiate,
     five_point_average,
-    noise_along,
     total_sd,
 )
 from stickslip.signals.interpolate import without_delays
+from stickslip.signals.noise import noise_along
 
 Array = NDArray[np.float64]
 

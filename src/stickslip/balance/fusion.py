@@ -13,9 +13,9 @@ from stickslip.balance.balance import Balance
 from stickslip.record.channels import Channel
 from stickslip.record.flaws import saturated
 from stickslip.record.record import Record
-from stickslip.signals.derivatives import LEAST, Filter, best_bandwidth, noise_along
+from stickslip.signals.derivatives import LEAST, Filter, best_bandwidth
 from stickslip.signals.kalman import Motion, Seen, Smoothed, log_likelihood, smooth_motion, surprises
-from stickslip.signals.noise import local_noise
+from stickslip.signals.noise import local_noise, noise_along
 
 Array = NDArray[np.float64]
 

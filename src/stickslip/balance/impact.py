@@ -15,8 +15,8 @@ from stickslip.balance.mounts import ACCELEROMETER, CELL, Resonance
 from stickslip.errors import EstimateError
 from stickslip.estimate import Constant, Estimate, Plain, Result
 from stickslip.record.record import Record
-from stickslip.signals.derivatives import noise_along
 from stickslip.signals.interpolate import without_delays
+from stickslip.signals.noise import noise_along
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]

@@ -17,9 +17,9 @@ from stickslip.balance.motion import is_measured
 from stickslip.errors import EstimateError
 from stickslip.estimate import Constant, Estimate, Plain
 from stickslip.record.record import Record, Step
-from stickslip.signals.derivatives import LEAST, noise_along
+from stickslip.signals.derivatives import LEAST
 from stickslip.signals.interpolate import without_delays
-from stickslip.signals.noise import noise_level
+from stickslip.signals.noise import noise_along, noise_level
 from stickslip.signals.response import resonance
 
 Array = NDArray[np.float64]

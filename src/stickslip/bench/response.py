@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from stickslip.errors import EstimateError, ModelError, StickslipError
 from stickslip.estimate import Constant, Doubt, Estimate, Result, Status
 from stickslip.record.record import Record
-from stickslip.signals.derivatives import noise_along
 from stickslip.signals.interpolate import without_delays
+from stickslip.signals.noise import noise_along
 from stickslip.signals.response import derivative_spectra
 
 Array = NDArray[np.float64]

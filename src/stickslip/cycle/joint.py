@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from stickslip.cycle.joint_fit import ADVICE, JointData, Telling, fitted, joint_data, turning
+from stickslip.cycle.joint_fit import ADVICE, JointData, Telling, about_load, fitted, joint_data, pooled, turning
+from stickslip.errors import EstimateError, RecordError
 from stickslip.estimate import Constant, Doubt, Estimate, Result, Status
 from stickslip.record.record import Record
 from stickslip.signals.noise import noise_level
@@ -18,6 +20,7 @@ Array = NDArray[np.float64]
 BIASED = 0.01  # share of noise in the power of the acceleration above which the inertia is visibly low
 WAYS = ((1.0, "forward"), (-1.0, "back"))
 NOISY, LOADED = "noisy", "loaded"  # kinds of doubt
+RICHER = {"load", "uneven"}  # what Coulomb and viscous friction of both directions alike do not have
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -250,3 +253,145 @@ def _worries(data: JointData, fit: LeastSquares, terms: tuple[str, ...], record:
             doubt = f"noise in the acceleration lowers the inertia by about {100 * noisy:.2g} %: log the reference too"
             worries.append(Doubt(doubt, NOISY))
     return worries
+
+
+# ---- several logs of one joint
+
+
+@dataclass(frozen=True, eq=False)
+class JointPrediction:
+    """How far the torque of a log is predicted by what the other logs tell.
+
+    Attributes
+    ----------
+    error, plain : float
+        Norm of what the prediction misses over that of the torque about its mean, by all that the other logs tell; and
+        by Coulomb and viscous friction alone, fitted to the same logs with inertia and gravity.
+    time : ndarray, shape (m,)
+        Times [s] at which the joint slides.
+    measured, predicted : ndarray, shape (m,)
+        As it was, smoothed by windows within strokes, and as it is predicted [N m].
+    """
+
+    error: float
+    plain: float
+    time: Array
+    measured: Array
+    predicted: Array
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class JointLogs(Result):
+    """What several logs of one joint tell together.
+
+    Attributes
+    ----------
+    forward, back, viscous, load, inertia, sine, cosine, damping : Estimate or None
+        As of :class:`JointFriction`, of all logs at once; None where they do not tell it, or where it was stated.
+    predictions : tuple of JointPrediction
+        Of each log by the others.
+    left_out : tuple of str
+        What all logs together can not tell, and which motion would.
+    status : str
+        "ok", or in words what to beware of.
+    """
+
+    forward: Estimate
+    back: Estimate
+    viscous: Estimate
+    load: Estimate | None
+    inertia: Estimate | None
+    sine: Estimate | None
+    cosine: Estimate | None
+    damping: Estimate | None
+    predictions: tuple[JointPrediction, ...]
+    left_out: tuple[str, ...]
+    status: str = "ok"
+
+
+def regress_joint_logs(
+    records: Sequence[Record], *, gravity: bool | None = None, **constants: Constant | None
+) -> JointLogs:
+    r"""What do several logs of one joint tell together, and does what some tell hold in the others?
+
+    The balance of :func:`regress_joint` is solved for all logs at once, so that one may tell gravity and another
+    viscous friction. Each log is then left out in turn: the others' solution predicts its torque :math:`\tau` from its
+    motion, and told is
+
+    .. math:: \frac{|\tau - \hat\tau|}{|\tau - \bar\tau|},
+
+    the normalised root of the mean square (Ljung, System Identification, 1999, section 16.4), while the joint slides;
+    beside it stands that of Coulomb and viscous friction, fitted to the same logs.
+
+    Parameters
+    ----------
+    records : sequence of Record
+        Two or more, each as :func:`regress_joint` takes it, all with a torque of the same source.
+    gravity : bool, optional
+        As of :func:`regress_joint`.
+    **constants : float, str, tuple or Estimate
+        `inertia`, `kp`, `kd` and `torque_constant`, as of :func:`regress_joint`.
+
+    Returns
+    -------
+    JointLogs
+
+    Raises
+    ------
+    RecordError
+        Fewer than two logs, or logs whose torques have different sources.
+    ModelError
+        A constant without meaning.
+    EstimateError
+        What a log, or all but one, can not tell: the sentence says which motion would.
+
+    Examples
+    --------
+    >>> def moved(seed, speed):
+    ...     t = np.arange(4000) / 200
+    ...     q = np.sin(2 * np.pi * speed * t) + 0.4 * np.sin(2 * np.pi * 3.1 * speed * t)
+    ...     v, a = np.gradient(q, 1 / 200), np.gradient(np.gradient(q, 1 / 200), 1 / 200)
+    ...     torque = 0.02 * a + 0.03 * v + (0.06 + 0.1 * abs(0.5 * np.sin(q))) * np.sign(v) + 0.5 * np.sin(q)
+    ...     torque += np.random.default_rng(seed).normal(0, 0.01, t.size)
+    ...     return Record.of({"theta": q, "force": torque}, fs=200, units={"force": "N m"})
+    >>> together = regress_joint_logs([moved(0, 0.2), moved(1, 0.3), moved(2, 0.5)])
+    >>> together.load.includes(0.1)
+    True
+    >>> [bool(one.error < one.plain) for one in together.predictions]
+    [True, True, True]
+    """
+    data = [joint_data(record, gravity, **constants)[1] for record in records]
+    if len(data) < 2 or len({(one.source, one.terms) for one in data}) > 1:
+        raise RecordError(
+            f"{len(data)} log{'s' * (len(data) != 1)}, with torque by {', '.join(one.source for one in data)}",
+            "several logs are told together by torques of one source",
+            "give two logs or more, of one robot and one kind",
+        )
+    fit, terms, _, left_out = fitted(pooled(data))
+    tell = Telling(pooled(data), fit, terms, turning(records[0]), "ok")
+    known = {term: tell.one(term) for term in terms if term != "uneven"}
+    predictions = [
+        _predicted(log, pooled(data[:place] + data[place + 1 :]), record)
+        for place, (log, record) in enumerate(zip(data, records, strict=True))
+    ]
+    return JointLogs(
+        known["forward"].within(0.0), known["back"].within(0.0), known["viscous"],
+        load=known.get("load"), inertia=known.get("inertia"), sine=known.get("sine"), cosine=known.get("cosine"),
+        damping=known.get("damping"), predictions=tuple(predictions), left_out=left_out,
+    )  # fmt: skip
+
+
+def _predicted(log: JointData, others: JointData, record: Record) -> JointPrediction:
+    """A log's torque by the regression of the others, and by a plain one."""
+    fit, terms, pull, _ = fitted(others)
+    predicted = log.model(fit, terms, pull)
+    plain = tuple("coulomb" if term == "forward" else term for term in terms if term not in {*RICHER, "back"})
+    fit, pull = about_load(replace(others, terms=plain), plain)
+    spread = float(np.linalg.norm(log.torque - log.torque.mean()))
+    if spread == 0:
+        raise EstimateError("the torque of a log never changes", "a prediction is of a torque", "check its column")
+    error, simple = (
+        float(np.linalg.norm(log.torque - torque)) / spread for torque in (predicted, log.model(fit, plain, pull))
+    )
+    time = record.start + log.logs[0].sliding.rows / record.fs
+    return JointPrediction(error, simple, time, log.torque, predicted)

@@ -11,11 +11,10 @@ from numpy.typing import NDArray
 from stickslip.balance.balance import ALONE, Balance
 from stickslip.balance.force import FUSIONS
 from stickslip.balance.motion import FORCES, is_measured
-from stickslip.cycle.slips import FAST, Stroke, Strokes, find_strokes, ringing_of
+from stickslip.cycle.slips import FAST, Stroke, Strokes, find_strokes, ringing_of, sliding_swing
 from stickslip.errors import EstimateError
-from stickslip.estimate import NORMAL_95, UNSTATED, Doubt, Estimate, Result, Status
+from stickslip.estimate import UNSTATED, Doubt, Estimate, Result, Status
 from stickslip.record.record import Record
-from stickslip.signals.derivatives import noise_along
 from stickslip.signals.noise import noise_level
 from stickslip.statistics import mean_of_cycles
 from stickslip.units import prefixed
@@ -25,7 +24,7 @@ Array = NDArray[np.float64]
 GIVING = "presliding"
 SIDES = ((1, "forward"), (-1, "back"))
 LOW, HIGH = 0.2, 0.8  # of the sliding friction, between which a line is drawn on either side of zero
-FEW = 4  # samples for a line
+LINE = 4  # samples for a line
 FELT = 5e-4  # of a stroke: a contact that gives way by less is not told from a rigid one
 ELASTIC = 1 / 3  # of a stroke, that friction may take to turn: one that follows the speed seems to give way over 0.44
 RIGID = 0.02  # of a stroke: where friction may take more to build up, a contact is not shown to be rigid
@@ -46,9 +45,6 @@ NEAR = 12  # samples before a slip in which the friction's rise is looked for
 CREEPS = 0.1  # of a stroke's largest speed, below which it does not slide for good
 RINGS = 1.5  # times what a mount's ring is after half a cycle it is at its start, at most
 LEAST = 8  # samples in which a stick's end and a slip's start can be told
-STEADY = 0.3  # of the sliding friction: one that swings by more is no friction to be quoted
-UNSURE = 0.2  # of the noise's variance, by which what is taken off may be wrong (95 %)
-QUARTILE = 0.6744897501960817  # of the normal distribution
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -162,7 +158,7 @@ def _branch(stroke: Stroke, low: float, high: float) -> tuple[float, float] | No
     """Displacement at no friction and compliance, from where the friction is between two shares of its level."""
     friction = stroke.friction[: stroke.slip + 1]
     inside = (friction > low * stroke.level) & (friction < high * stroke.level)
-    if inside.sum() < FEW or np.ptp(friction[inside]) == 0:
+    if inside.sum() < LINE or np.ptp(friction[inside]) == 0:
         return None
     slope, offset = np.polyfit(friction[inside], stroke.displacement[: stroke.slip + 1][inside], 1)
     return float(offset), float(slope)
@@ -179,7 +175,7 @@ def _compliance(strokes: Sequence[Stroke], name: str, unit: str) -> Estimate:
     lines = [line for stroke in strokes if (line := _branch(stroke, LOW, HIGH))]
     if not lines:
         raise EstimateError(
-            f"fewer than {FEW} samples of each stroke lie between {LOW:g} and {HIGH:g} of the sliding friction",
+            f"fewer than {LINE} samples of each stroke lie between {LOW:g} and {HIGH:g} of the sliding friction",
             "a line through the build-up of friction needs more",
             "sample faster",
         )
@@ -340,7 +336,9 @@ def breakaway(record: Record, *, contact: str | None = None) -> Breakaway:
     status = borne.status
     rings = ringing_of(strokes.strokes, record.fs) if is_measured(record, "friction") else None  # a balance rings too
     heard = (None, None, None) if rings is None else (rings.forward, rings.back, rings.difference)
-    swings = [_swing(record, [stroke for stroke in borne.strokes if stroke.way == way], side) for way, side in SIDES]
+    swings = [
+        sliding_swing(record, [stroke for stroke in borne.strokes if stroke.way == way], side) for way, side in SIDES
+    ]
     forward, back = (_flagged(level, status) for level in levels)
     ratio = _flagged(ratio, status) or ratio
     return Breakaway(forward, back, ratio, *heard, swings[0], swings[1], len(borne.strokes), status)
@@ -565,49 +563,3 @@ def _start(travel: Array, pull: Array, mass: float, fs: float) -> float | None:
 def _summed(values: Array) -> Array:
     """The integral, by trapezoids of one sample."""
     return np.concatenate([[0.0], np.cumsum((values[1:] + values[:-1]) / 2)])
-
-
-def _swing(record: Record, strokes: Sequence[Stroke], side: str) -> Estimate | None:
-    """Median deviation of the friction from its median while it slides, as a normal law's, less that of its noise."""
-    noise, squares, noises = _noise(record), [], []
-    for stroke in strokes:
-        speed = np.gradient(stroke.displacement)
-        rows = stroke.slip + np.flatnonzero(speed[stroke.slip :] > FAST * speed.max())
-        if len(rows):
-            friction = stroke.friction[rows]
-            swing = float(np.median(np.abs(friction - np.median(friction)))) / QUARTILE
-            noises.append((float(np.median(noise[stroke.first + rows])) / stroke.level) ** 2)
-            squares.append((swing / stroke.level) ** 2 - noises[-1])
-    if not squares:
-        return None
-    square = mean_of_cycles(
-        f"swing of the friction while sliding {side}",
-        squares,
-        unit="1",
-        method="median deviation from the median, less the noise",
-    )
-    half = UNSURE * float(np.mean(noises))
-    low, high = square.interval
-    estimate = _root(replace(square, interval=(low - half, high + half), sd=float(np.hypot(square.sd, half / 2))))
-    swings = f"the friction swings by {100 * estimate.value:.0f} % of its level while it slides: a vibration of the rig"
-    return (
-        replace(estimate, status=f"{swings} or a faulty record, no steady friction")
-        if estimate.value >= STEADY
-        else estimate
-    )
-
-
-def _noise(record: Record) -> Array:
-    """Standard deviation of the friction's noise at each sample: as its balance tells it, as stated, or as it shows."""
-    if "friction_sd" in record and not is_measured(record, "friction"):
-        return record["friction_sd"]
-    return noise_along(record["friction"], record.fs, record.channels["friction"].noise)
-
-
-def _root(square: Estimate) -> Estimate:
-    """The square root of an estimate that can not be below zero."""
-    possible = square.within(0.0, otherwise="its noise is larger than all that the friction swings by")
-    low, high = (float(np.sqrt(end)) for end in possible.interval)
-    return replace(
-        possible, value=float(np.sqrt(possible.value)), interval=(low, high), sd=(high - low) / (2 * NORMAL_95)
-    )

@@ -1,4 +1,4 @@
-"""How the friction rings after a slip begins, and whether it does so alike in both directions.
+"""How the friction rings after a slip begins, alike in both directions or not; how it swings while it slides.
 
 A motion cut at its reversals: in each stroke the contact first holds, then breaks away, then slides one way.
 """
@@ -8,7 +8,7 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any
 
@@ -27,9 +27,10 @@ from stickslip.balance.motion import (
     require_fit,
 )
 from stickslip.errors import EstimateError, RecordError
-from stickslip.estimate import FEW, Doubt, Estimate, Result, Status
+from stickslip.estimate import FEW, NORMAL_95, Doubt, Estimate, Result, Status
 from stickslip.record.record import Record
 from stickslip.signals.interpolate import without_delays
+from stickslip.signals.noise import noise_along
 from stickslip.statistics import FEW_CYCLES, mean_of_cycles, student
 
 Array = NDArray[np.float64]
@@ -56,6 +57,9 @@ HELD = 0.5  # of the sliding friction: a contact that moves before it bears so m
 MANY = 200  # strokes looked at, evenly chosen: their mean is known well enough
 SHORT = 0.7  # of the usual travel: shorter strokes belong to the start or the end of a run
 SLIPPED = 3.0  # times the speed that may be rest
+STEADY = 0.3  # of the sliding friction: one that swings by more is no friction to be quoted
+UNSURE = 0.2  # of the noise's variance, by which what is taken off may be wrong (95 %)
+QUARTILE = 0.6744897501960817  # of the normal distribution
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -425,3 +429,49 @@ def _breakaway(force: Array, speed: Array, level: float, slow: float, fall: floa
     fallen = np.flatnonzero(highest - force[near[0] :] > fall)
     last = int(fallen[0]) + 1 if len(fallen) else len(highest)
     return int(near[0]) + int(np.argmax(force[near[0] : near[0] + last])), False
+
+
+def sliding_swing(record: Record, strokes: Sequence[Stroke], side: str) -> Estimate | None:
+    """Median deviation of the friction from its median while it slides, as a normal law's, less that of its noise."""
+    noise, squares, noises = _noise(record), [], []
+    for stroke in strokes:
+        speed = np.gradient(stroke.displacement)
+        rows = stroke.slip + np.flatnonzero(speed[stroke.slip :] > FAST * speed.max())
+        if len(rows):
+            friction = stroke.friction[rows]
+            swing = float(np.median(np.abs(friction - np.median(friction)))) / QUARTILE
+            noises.append((float(np.median(noise[stroke.first + rows])) / stroke.level) ** 2)
+            squares.append((swing / stroke.level) ** 2 - noises[-1])
+    if not squares:
+        return None
+    square = mean_of_cycles(
+        f"swing of the friction while sliding {side}",
+        squares,
+        unit="1",
+        method="median deviation from the median, less the noise",
+    )
+    half = UNSURE * float(np.mean(noises))
+    low, high = square.interval
+    estimate = _root(replace(square, interval=(low - half, high + half), sd=float(np.hypot(square.sd, half / 2))))
+    swings = f"the friction swings by {100 * estimate.value:.0f} % of its level while it slides: a vibration of the rig"
+    return (
+        replace(estimate, status=f"{swings} or a faulty record, no steady friction")
+        if estimate.value >= STEADY
+        else estimate
+    )
+
+
+def _noise(record: Record) -> Array:
+    """Standard deviation of the friction's noise at each sample: as its balance tells it, as stated, or as it shows."""
+    if "friction_sd" in record and not is_measured(record, "friction"):
+        return record["friction_sd"]
+    return noise_along(record["friction"], record.fs, record.channels["friction"].noise)
+
+
+def _root(square: Estimate) -> Estimate:
+    """The square root of an estimate that can not be below zero."""
+    possible = square.within(0.0, otherwise="its noise is larger than all that the friction swings by")
+    low, high = (float(np.sqrt(end)) for end in possible.interval)
+    return replace(
+        possible, value=float(np.sqrt(possible.value)), interval=(low, high), sd=(high - low) / (2 * NORMAL_95)
+    )

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stickslip.decay import extremes as ex
-from stickslip.decay.release import RingDown, find_releases
+from stickslip.decay.release import RingDown, find_releases, locate
 from stickslip.errors import EstimateError
 from stickslip.estimate import Estimate, Result, Status
 from stickslip.record.record import Record, require_record
@@ -204,7 +204,7 @@ def decrement(record: Record, *, channel: str | None = None, form: str = "immune
 
 def _of_one(ring_down: RingDown, form: str, location: str) -> Decrement:
     """The decrements of one release: its extremes, the pair of differences that tells beta best, then x_k."""
-    times, values, sd, errors = _used(ring_down, *ex.locate(ring_down, location))
+    times, values, sd, errors = _used(ring_down, *locate(ring_down, location))
     if len(values) < NEEDED[form]:
         raise EstimateError(
             f"{len(values)} extremes can be used",

@@ -1,6 +1,6 @@
 """The older ways to read a free decay, from its extremes or its envelope alone, with what each gets wrong.
 
-Where the extremes lie, the recursion that they follow, and what errors in them do."""
+The recursion that extremes follow, and what errors in them do."""
 
 from __future__ import annotations
 
@@ -22,9 +22,6 @@ from stickslip.statistics import least_squares, student
 Array = NDArray[np.float64]
 
 FORMS = ("immune", "plain")  # equations 6.11 and 6.8
-WINDOW = 0.8  # radians on either side of an extreme that the local fit uses
-CERTAIN = 3.0  # standard deviations taken as the bound of a noise
-HIGHEST = 4.0  # the same for the largest of several samples
 LEAST = 5  # extremes
 CLEAR = 5.0  # times the noise that an extreme must stand out
 FREE = 4  # what the recursion is fitted by: first swing, beta, x_k, rest
@@ -209,124 +206,6 @@ def _largest_at_corners(quantity: Callable[[Array], float], x: Array, used: list
         except EstimateError:
             return math.inf
     return largest
-
-
-def locate(ring_down: RingDown, how: str) -> tuple[Array, Array, Array, Array]:
-    """Times [s in the record], values, standard deviations and largest errors of a decay's extremes.
-
-    Parameters
-    ----------
-    ring_down : RingDown
-        As :func:`~stickslip.decay.release.find_releases` gives it.
-    how : {"fit", "sample"}
-        By least squares on the samples near each extreme, ``X + c (cos w t - 1)`` with a c of its own on either side,
-        for friction makes the curvature jump at a turn; or the largest sample.
-    """
-    turns = ring_down.turns.astype(float)
-    if how == "fit":
-        turns = np.array([_turn(ring_down, number) for number in range(len(turns))])
-        even = _evenly_spaced(turns, ring_down)
-        fits = np.array([_fitted(ring_down, number, turn) for number, turn in enumerate(even)])
-    else:
-        fits = np.array([_sampled(ring_down, number) for number in range(len(turns))])
-        turns = fits[:, 0]
-    times = ring_down.first + turns / ring_down.fs
-    quantised = ring_down.step if ring_down.noise < ring_down.step else 0.0
-    sd = np.sqrt(fits[:, 2] ** 2 + quantised**2 / 12)
-    return times, fits[:, 1], sd, fits[:, 3] + quantised / 2
-
-
-def _sampled(ring_down: RingDown, number: int) -> tuple[float, float, float, float]:
-    """Row, value, standard deviation and bound of the largest sample near an extreme."""
-    turn, half = int(ring_down.turns[number]), ring_down.fs / ring_down.frequency / 2
-    reach = max(1, round(half / 4))
-    first = max(0, turn - reach)
-    part = ring_down.samples[first : turn + reach + 1]
-    top = (number % 2 == 0) == (ring_down.amplitude > 0)  # the last extreme may lie on the side of the one before
-    row = first + int(np.argmax(part) if top else np.argmin(part))
-    value = float(ring_down.samples[row])
-    bend = abs(value - float(ring_down.samples[ring_down.turns[max(0, number - 1)]])) / 2 or abs(ring_down.amplitude)
-    missed = bend * (math.pi / half) ** 2 / 8  # of a top between two samples
-    # the noise alone of a digitiser is its step's twelfth
-    noise = math.sqrt(max(0.0, ring_down.noise**2 - ring_down.step**2 / 12))
-    return row, value, math.hypot(noise, missed / math.sqrt(3)), HIGHEST * noise + missed
-
-
-def _half(ring_down: RingDown) -> float:
-    """Samples in half a cycle."""
-    return ring_down.fs / ring_down.frequency / 2
-
-
-def _window(ring_down: RingDown, turn: float) -> NDArray[np.intp]:
-    reach = max(2.0, WINDOW / math.pi * _half(ring_down))
-    return np.arange(max(0, math.ceil(turn - reach)), min(len(ring_down.samples), math.floor(turn + reach) + 1))
-
-
-def _turn(ring_down: RingDown, number: int) -> float:
-    """Row, with its fraction, of an extreme by a local fit; of the release and the stop as they were found."""
-    turn, turning = float(ring_down.turns[number]), math.pi / _half(ring_down)
-    if _at_rest(ring_down, number):
-        return turn
-    if ring_down.order == 2:  # the last sample before the jump at a turn is the largest
-        return _sampled(ring_down, number)[0] + 0.5
-    first = turn
-    for _ in range(4):
-        rows = _window(ring_down, turn)
-        bend = np.cos(turning * (rows - turn)) - 1
-        shift = np.sin(turning * (rows - turn))
-        columns = (np.ones(len(rows)), bend * (rows < turn), bend * (rows > turn), shift)
-        solution = np.linalg.lstsq(np.column_stack(columns), ring_down.samples[rows], rcond=None)[0]
-        mean = (solution[1] + solution[2]) / 2
-        step = float(solution[3] / (mean * turning)) if mean else 0.0
-        turn += min(max(step, -0.1 * _half(ring_down)), 0.1 * _half(ring_down))
-        if abs(step) < 1e-4:
-            break
-    return turn if abs(turn - first) < _half(ring_down) / 4 else first
-
-
-def _at_rest(ring_down: RingDown, number: int) -> str:
-    """On which side of this extreme nothing moves."""
-    if ring_down.held and number == 0:
-        return "before"
-    return "after" if ring_down.stopped and number == len(ring_down.turns) - 1 else ""
-
-
-def _evenly_spaced(turns: Array, ring_down: RingDown) -> Array:
-    """The turns on one even spacing, each counting by its amplitude: where noise hides a turn, its neighbours tell.
-
-    Of a spring that is not linear the later half alone, where the amplitude is small.
-    """
-    if len(turns) < 4:
-        return turns
-    number = np.arange(len(turns))
-    weights = np.abs(ring_down.samples[ring_down.turns] - ring_down.rest)
-    weights[[0, -1]] *= 1e-3  # release and stop are known less well than turns
-    weights[~ring_down.sound] *= 1e-3
-    first = 0 if ring_down.isochronous else len(turns) // 2
-    line = np.polyfit(number[first:], turns[first:], 1, w=weights[first:])
-    return np.concatenate([turns[:first], np.polyval(line, number[first:])])
-
-
-def _fitted(ring_down: RingDown, number: int, turn: float) -> tuple[float, float, float, float]:
-    """Row, value, standard deviation and bound of an extreme by a local fit at its instant."""
-    rows, turning, still = _window(ring_down, turn), math.pi / _half(ring_down), _at_rest(ring_down, number)
-    if ring_down.order == 2:
-        rows = rows[rows < turn]
-    bend = np.cos(turning * (rows - turn)) - 1
-    columns = [np.ones(len(rows))]
-    columns += [bend * (rows < turn)] if still != "before" else []
-    if ring_down.order == 2:
-        columns += [np.sin(turning * (rows - turn))]
-    elif still != "after":
-        columns += [bend * (rows > turn)]
-    design = np.column_stack(columns)
-    if len(rows) <= design.shape[1]:
-        return _sampled(ring_down, number)
-    solution = np.linalg.lstsq(design, ring_down.samples[rows], rcond=None)[0]
-    residual = ring_down.samples[rows] - design @ solution
-    spread = float(np.sqrt(np.linalg.pinv(design.T @ design)[0, 0]))
-    noise = max(ring_down.noise, float(np.sqrt(residual @ residual / (len(rows) - design.shape[1]))))
-    return turn, float(solution[0]), noise * spread, CERTAIN * noise * spread
 
 
 def motion(times: Array, start: float, *, damping_ratio: float, dry_displacement: float, frequency: float) -> Array:

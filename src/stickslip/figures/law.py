@@ -37,8 +37,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from stickslip.answers.findings import Findings
-    from stickslip.cycle.joint import JointFriction
-    from stickslip.cycle.joint_fit import JointPrediction
+    from stickslip.cycle.joint import JointFriction, JointPrediction
 
 Array = NDArray[np.float64]
 WORDS = {

@@ -1,7 +1,9 @@
-"""What a curve is fitted to: friction and motion of a contact, with the cycle that each sample lies in."""
+"""What curves and laws are held against: friction over a motion, cycle by cycle, and friction around rest."""
 
 from __future__ import annotations
 
+import itertools
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -19,6 +21,7 @@ from stickslip.balance.motion import (
 )
 from stickslip.cycle.loops import LEAST_SPREAD, Loops
 from stickslip.errors import EstimateError
+from stickslip.estimate import NORMAL_95, Estimate
 from stickslip.record.record import Record
 from stickslip.signals.derivatives import smooth
 from stickslip.signals.interpolate import without_delays
@@ -32,6 +35,16 @@ LEAST = 50  # samples
 REVERSED = 0.05  # of the fastest speed: what goes back slower than that does not reverse
 COEFFICIENT = {"N": "1", "N s/m": "s/m", "N/m": "1/m"}  # what stands for a unit where friction has none
 TURNING = {"N": "N m", "N s/m": "N m s/rad", "N/m": "N m/rad", "m": "rad", "m/s": "rad/s"}
+FAST = 0.3  # of the largest speed, above which friction is that of sliding
+CREEPING, AT_REST = 0.08, 0.02  # of the largest speed: hardly sliding, and not at all
+NOISY = 4.0  # deviations of the velocity, below which it may be at rest
+HELD = 0.4  # of a radian of the motion that a contact holds at least, for a release to be told
+LEAST_HELD, LEAST_SLOW = 24, 8  # samples of a hold, and of slow sliding
+CORNER, AFTER = 3, 15  # samples after a release within which a sudden fall is blurred, and is over
+ROUNDED = 0.01  # of the level, that smoothing alone makes of a corner
+GAINS = 1.0  # calibrations by which the level at rest, told by the springs, is off that in sliding
+EXCESSES = np.linspace(0.0, 0.6, 121)[1:]
+FALLS = np.geomspace(0.03, 1.0, 16)  # Stribeck speed over the largest speed
 
 
 @dataclass(frozen=True, eq=False)
@@ -239,3 +252,153 @@ def require_reversals(samples: Samples, curve: str) -> None:
             f"the curve '{curve}' needs motion both ways",
             "give a record that reverses",
         )
+
+
+@dataclass(frozen=True, eq=False)
+class Rests:
+    """Friction around rest, over its level in fast sliding.
+
+    Attributes
+    ----------
+    falls : ndarray (n,)
+        Of each release: by how much the friction falls at once.
+    sinks : ndarray (n, 16)
+        What a Stribeck curve of excess 1 falls there as quickly, for each v_s of FALLS.
+    rises : ndarray (q,)
+        Of each start and each end of a stroke: by how much it is larger in slow sliding.
+    shapes : ndarray (q, 16)
+        Mean of ``exp(-(v/v_s)^2)`` there, for each v_s of FALLS.
+    strays : ndarray
+        Of each stroke: standard deviation in fast sliding.
+    """
+
+    falls: Array
+    sinks: Array
+    rises: Array
+    shapes: Array
+    strays: Array
+
+    @classmethod
+    def of(cls, speed: Array, friction: Array, *, fs: float, frequency: float, unsure: float, blur: int = 1) -> Rests:
+        """Those of one record; `unsure` [m/s] is the speed's deviation, `frequency` [rad/s] the motion's.
+
+        A fall is not told where smoothing spreads it beyond its corner (`blur` samples), or where the motion goes on
+        while its samples pass: at 60 samples a cycle even a friction of one level seemed to fall by its own size.
+        """
+        sudden = blur <= CORNER and AFTER / fs * frequency < HELD
+        top = float(np.abs(speed).max())
+        still = max(AT_REST * top, NOISY * unsure)
+        falls, sinks, rises, shapes, strays = [], [], [], [], []
+        ended = None
+        for first, last in _strokes(speed, still, FAST * top):
+            side = np.sign(speed[(first + last) // 2])
+            fast = side * speed[first:last] > FAST * top
+            sliding = side * friction[first:last]
+            level = float(np.median(sliding[fast]))
+            if not level > 0:
+                continue
+            strays.append(float(np.std(sliding[fast])) / level)
+            swift = np.flatnonzero(side * speed[first:last] > CREEPING * top)
+            begins, ends = (first, first + int(swift[0])), (first + int(swift[-1]) + 1, last)
+            whole = (ended is not None, last < len(speed) - LEAST_HELD)
+            for (a, b), seen in zip((begins, ends), whole, strict=True):
+                if seen and b - a >= max(LEAST_SLOW, 2 * blur) and still < CREEPING * top:
+                    rises.append(float(side * friction[a:b].mean()) / level - 1)
+                    shapes.append(_stribeck(speed[a:b] / top))
+            duration = first - (first if ended is None else ended)
+            if sudden and duration >= max(LEAST_HELD, HELD / frequency * fs) and first + LEAST_HELD <= len(speed):
+                begun = first - duration // 2
+                fall, after = _fall(side * friction[begun : first + LEAST_HELD], duration // 2)
+                falls.append(fall / level)
+                sinks.append(1 - _stribeck(speed[begun:][after] / top))
+            ended = last
+        curves = (np.array(rows).reshape(-1, len(FALLS)) for rows in (sinks, shapes))
+        return cls(np.array(falls), next(curves), np.array(rises), next(curves), np.array(strays))
+
+    @classmethod
+    def together(cls, parts: Sequence[Rests]) -> Rests:
+        """Those of several records."""
+        names = ("falls", "sinks", "rises", "shapes", "strays")
+        return cls(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))
+
+    @property
+    def fall(self) -> Estimate | None:
+        """By what the friction falls at once when the contact lets go; of two releases at least."""
+        if len(self.falls) < 2:
+            return None
+        value, sd = _middle(self.falls, self.strays)
+        sd = float(np.hypot(sd, ROUNDED))
+        ends = (max(0.0, value - NORMAL_95 * sd), max(0.0, value) + NORMAL_95 * sd)
+        method = f"fall of the friction as the contact lets go, median of {len(self.falls)} releases"
+        return Estimate("excess of static friction", max(0.0, value), ends, sd, "1", method)
+
+    def probabilities(self, calibration: float, least: float) -> dict[str, float]:
+        r"""How probable each rigid law is, its parameters averaged over what they may be.
+
+        With J the fall at a release and R the rise in slow sliding, both over the level: Coulomb has J = R = 0; static
+        friction that exceeds by e has J = e, R = 0; a Stribeck curve J = 0, :math:`R = e \exp(-(v/v_s)^2)`. An excess
+        below `least` is not asked for. What was not seen speaks for none. Where the speed has run through a curve when
+        the friction after a release is told, J is what that has fallen by.
+        """
+        fall, rise, sink, shape = 0.0, 0.0, np.zeros(len(FALLS)), np.ones(len(FALLS))
+        sharp, slow = np.inf, np.inf
+        if self.fall is not None:
+            fall, sharp, sink = float(np.median(self.falls)), self.fall.sd, np.median(self.sinks, axis=0)
+        if len(self.rises) > 1:
+            scatter = max(float(np.std(self.rises, ddof=1)), float(np.median(self.strays)))
+            slow = float(np.hypot(scatter / len(self.rises) ** 0.5, max(ROUNDED, GAINS * calibration)))
+            rise, shape = float(self.rises.mean()), self.shapes.mean(axis=0)
+        excesses = EXCESSES[np.greater(EXCESSES, least)]
+        flat, still = _likely(rise / slow), _likely(fall / sharp)
+        odds = {
+            "Coulomb": still * flat,
+            "static": flat * _likely((fall - excesses) / sharp),
+            "Stribeck": _likely(
+                np.hypot((fall - np.outer(excesses, sink)) / sharp, (rise - np.outer(excesses, shape)) / slow)
+            ),
+        }
+        total = sum(odds.values())
+        return {name: value / total if total > 0 else 1 / len(odds) for name, value in odds.items()}
+
+
+def _stribeck(speeds: Array) -> Array:
+    """Mean of Stribeck's curve at speeds over the largest one, for each v_s of FALLS."""
+    return np.asarray(np.exp(-((speeds[:, None] / FALLS) ** 2)).mean(axis=0))
+
+
+def _likely(strays: Array | float) -> float:
+    """The mean likelihood of Gaussian strays."""
+    return float(np.mean(np.exp(-np.square(strays) / 2)))
+
+
+def _middle(values: Array, strays: Array) -> tuple[float, float]:
+    """The median, and how unsure: neither surer than the values agree nor than the friction strays in sliding."""
+    scatter = max(float(np.median(np.abs(values - np.median(values)))) / 0.6745, float(np.median(strays)))
+    return float(np.median(values)), 1.25 * scatter / float(np.sqrt(len(values)))
+
+
+def _strokes(speed: Array, still: float, fast: float) -> list[tuple[int, int]]:
+    """First and last row of each slide one way in which the mass becomes fast."""
+    way = np.concatenate([[0.0], np.sign(speed) * (np.abs(speed) > still), [0.0]])
+    edges = np.flatnonzero(np.diff(way))
+    slides = [(int(a), int(b)) for a, b in itertools.pairwise(edges) if way[a + 1]]
+    return [(a, b) for a, b in slides if np.abs(speed[a:b]).max() > fast]
+
+
+def _fall(friction: Array, hold: int) -> tuple[float, slice]:
+    """By what the friction is less after a release than the line that it followed until then, and where it is told; the
+    release is searched.
+
+    `hold` is the row from which on it surely slides.
+    """
+    best, fall = np.inf, (0.0, slice(hold + CORNER, hold + AFTER))
+    for release in range(hold // 2, hold + 1):
+        rows = np.arange(max(0, release - hold // 2), release) - release
+        inner = slice(release + CORNER, release + AFTER)
+        after = friction[inner]
+        slope, end = np.polyfit(rows, friction[release + rows], 1)
+        left = np.concatenate([friction[release + rows] - end - slope * rows, after - after.mean()])
+        cost = float(left @ left) / len(left)
+        if cost < best:
+            best, fall = cost, (float(end - after.mean()), inner)
+    return fall

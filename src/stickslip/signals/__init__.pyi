@@ -1,7 +1,6 @@
 from stickslip.signals.derivatives import differentiate as differentiate
 from stickslip.signals.derivatives import keep_band as keep_band
 from stickslip.signals.derivatives import remove_mode as remove_mode
-from stickslip.signals.derivatives import remove_trend as remove_trend
 from stickslip.signals.derivatives import smooth as smooth
 from stickslip.signals.interpolate import clock_offset as clock_offset
 from stickslip.signals.interpolate import clock_rate as clock_rate
@@ -11,6 +10,7 @@ from stickslip.signals.repair import fill_gaps as fill_gaps
 from stickslip.signals.repair import fill_missing as fill_missing
 from stickslip.signals.repair import remove_drift as remove_drift
 from stickslip.signals.repair import remove_spikes as remove_spikes
+from stickslip.signals.repair import remove_trend as remove_trend
 from stickslip.signals.repair import repair_clock as repair_clock
 from stickslip.signals.repair import resample as resample
 from stickslip.signals.repair import restore_clipped as restore_clipped

@@ -2,7 +2,7 @@
 
 Two methods of differentiation. The thesis's: a central difference followed by a five-point average (Appendix A). The
 better one: a smoothing spline on the samples, as wide as the record's own noise asks, followed by a five-point
-difference. The filters keep a band, take a mode out, or take a trend off; each is told in the history.
+difference. The filters keep a band or take a mode out; each is told in the history.
 """
 
 from __future__ import annotations
@@ -17,14 +17,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from stickslip.errors import EstimateError, RecordError
 from stickslip.record.record import Record, Step, require_record
-from stickslip.signals.noise import ROUGHNESS, checked_samples, end_modes, local_noise, penalised
+from stickslip.signals.noise import ROUGHNESS, checked_samples, end_modes, noise_along, penalised
 from stickslip.units import parse_value
 
 Array = NDArray[np.float64]
 
 ORDER = 4  # of Butterworth's filter, which runs forward and back: the gain at an edge is one half
 SETTLES = 3  # periods of the lowest edge that a record must last
-MOST_DEGREE = 6
 Method = Literal["smoother", "five-point"]
 METHODS: tuple[Method, ...] = ("smoother", "five-point")
 LEAST = 24  # samples
@@ -131,44 +130,6 @@ def remove_mode(
     outcome = f"taken out {edges[0]:g} to {edges[1]:g} Hz"
     step = Step("remove_mode", {"frequency": frequency, "width": width}, outcome)
     return _passed(record, channels, edges, "bandstop", step)
-
-
-def remove_trend(record: Record, *channels: str, degree: int = 1) -> Record:
-    """Take off a straight line (degree 0: the mean; up to 6) fitted to all samples by least squares.
-
-    What oscillates over few periods bends such a line: :func:`remove_drift` looks at means over whole periods.
-
-    Parameters
-    ----------
-    record : Record
-        With one clock.
-    *channels : str
-        Which ones; all where none is named.
-    degree : int
-        Of the polynomial.
-
-    Returns
-    -------
-    Record
-
-    Raises
-    ------
-    RecordError
-        A degree outside 0 to 6, or values that are not numbers.
-
-    Examples
-    --------
-    >>> record = remove_trend(Record.of({"load": [3.0, 4.0, 5.0, 6.0]}, fs=10.0))
-    >>> bool(np.abs(record["load"]).max() < 1e-12), record.history[-1].action
-    (True, 'remove_trend')
-    """
-    if not 0 <= degree <= MOST_DEGREE:
-        raise RecordError(f"degree = {degree}", f"a trend is a polynomial of degree 0 to {MOST_DEGREE}", "choose one")
-    names = _named(record, channels, "remove_trend", degree + 2)
-    rows = np.linspace(-1, 1, len(record))
-    off = {n: np.polynomial.Polynomial.fit(rows, record[n], degree)(rows) for n in names}
-    step = Step("remove_trend", {"channels": names, "degree": degree}, f"a polynomial of degree {degree} taken off")
-    return record.with_samples({**record.samples, **{n: record[n] - off[n] for n in names}}, step)
 
 
 def _named(record: Record, channels: Iterable[str] | None, asker: str, samples: int) -> list[str]:
@@ -553,23 +514,6 @@ def total_sd(filtered: Array, noise_sd: Array, bias: Filter | None, ratio: float
         return noise_sd
     change = filtered - bias.apply(filtered, {0: 1.0})
     return np.asarray(np.sqrt(noise_sd**2 + np.maximum(0, change**2 - (ratio * noise_sd) ** 2)))
-
-
-def noise_along(samples: Array, fs: float, noise: ArrayLike | None) -> Array:
-    """The noise's standard deviation at every sample: as given, or estimated."""
-    if noise is None:
-        return local_noise(samples, fs)
-    try:
-        level = np.asarray(noise, dtype=float)
-    except (TypeError, ValueError):
-        level = np.array(np.nan)
-    if level.shape not in ((), samples.shape) or not np.isfinite(level).all() or (level < 0).any():
-        raise EstimateError(
-            f"noise = {np.array2string(np.asarray(noise), threshold=4)}",
-            "a noise level is one number, or one per sample, finite and not negative",
-            "pass noise= in the unit of the samples, or leave it out",
-        )
-    return np.broadcast_to(level, samples.shape)
 
 
 def _filtered(

@@ -260,3 +260,20 @@ def _least_squares(matrix: Array, target: Array) -> Array:
     factor, triangle = np.linalg.qr(matrix / scales)
     solution = np.linalg.solve(triangle, factor.T @ target)
     return np.asarray(solution / scales.reshape(-1, *[1] * (target.ndim - 1)))
+
+
+def noise_along(samples: Array, fs: float, noise: ArrayLike | None) -> Array:
+    """The noise's standard deviation at every sample: as given, or estimated."""
+    if noise is None:
+        return local_noise(samples, fs)
+    try:
+        level = np.asarray(noise, dtype=float)
+    except (TypeError, ValueError):
+        level = np.array(np.nan)
+    if level.shape not in ((), samples.shape) or not np.isfinite(level).all() or (level < 0).any():
+        raise EstimateError(
+            f"noise = {np.array2string(np.asarray(noise), threshold=4)}",
+            "a noise level is one number, or one per sample, finite and not negative",
+            "pass noise= in the unit of the samples, or leave it out",
+        )
+    return np.broadcast_to(level, samples.shape)

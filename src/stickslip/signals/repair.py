@@ -12,7 +12,7 @@ from stickslip.errors import RecordError
 from stickslip.record import flaws
 from stickslip.record.check import SHARP_UNITS, in_words
 from stickslip.record.clock import BRIDGED, Line, fit_line, inspect
-from stickslip.record.record import Record, Step
+from stickslip.record.record import Record, Step, require_record
 from stickslip.signals.interpolate import band_limited, bridge
 
 Array = NDArray[np.float64]
@@ -20,6 +20,7 @@ Mask = NDArray[np.bool_]
 
 DERIVED = "friction_force"  # the source of channels that were computed from
 SOURCES = ("x", "z", "v", "a", "force")
+MOST_DEGREE = 6
 
 
 def repair_clock(record: Record, *, fs: float | None = None, trust: str | None = None) -> Record:
@@ -433,6 +434,46 @@ def remove_drift(record: Record, channel: str, *, order: int | None = None) -> R
     outcome = f"a polynomial of order {order} taken off {channel}, {float(np.ptp(drifted)):.3g} {unit} over the record"
     step = Step("remove_drift", {"channel": channel, "order": order}, outcome, "drift")
     return _mended(record, {**record.samples, channel: values - drifted}, step)
+
+
+def remove_trend(record: Record, *channels: str, degree: int = 1) -> Record:
+    """Take off a straight line (degree 0: the mean; up to 6) fitted to all samples by least squares.
+
+    What oscillates over few periods bends such a line: :func:`remove_drift` looks at means over whole periods.
+
+    Parameters
+    ----------
+    record : Record
+        With one clock.
+    *channels : str
+        Which ones; all where none is named.
+    degree : int
+        Of the polynomial.
+
+    Returns
+    -------
+    Record
+
+    Raises
+    ------
+    RecordError
+        A degree outside 0 to 6, or values that are not numbers.
+
+    Examples
+    --------
+    >>> record = remove_trend(Record.of({"load": [3.0, 4.0, 5.0, 6.0]}, fs=10.0))
+    >>> bool(np.abs(record["load"]).max() < 1e-12), record.history[-1].action
+    (True, 'remove_trend')
+    """
+    if not 0 <= degree <= MOST_DEGREE:
+        raise RecordError(f"degree = {degree}", f"a trend is a polynomial of degree 0 to {MOST_DEGREE}", "choose one")
+    require_record(record)
+    names = list(channels or record)
+    record.require_clean(*names, question="remove_trend", samples=degree + 2)
+    rows = np.linspace(-1, 1, len(record))
+    off = {n: np.polynomial.Polynomial.fit(rows, record[n], degree)(rows) for n in names}
+    step = Step("remove_trend", {"channels": names, "degree": degree}, f"a polynomial of degree {degree} taken off")
+    return record.with_samples({**record.samples, **{n: record[n] - off[n] for n in names}}, step)
 
 
 def _best_order(rows: Array, slow: Array) -> int:

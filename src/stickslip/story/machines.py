@@ -10,8 +10,7 @@ from typing import Any
 import numpy as np
 
 from stickslip.answers.findings import Comparison, Findings
-from stickslip.cycle.joint import JointFriction
-from stickslip.cycle.joint_fit import JointLogs
+from stickslip.cycle.joint import JointFriction, JointLogs
 from stickslip.cycle.tribometer import DEFINITIONS
 from stickslip.errors import ModelError
 from stickslip.estimate import Estimate, stands
