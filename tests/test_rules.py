@@ -11,6 +11,7 @@ import re
 import subprocess
 import sys
 import types
+from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -190,6 +191,21 @@ def test_a_file_is_short_and_named_for_what_it_holds() -> None:
     assert not [str(place) for place, file in places.items() if len(file.read_text("utf-8").splitlines()) > 700]
     assert not [place for place in places if {*place.parts} & EMPTY_NAMES]
     assert not [place for place in places if len(place.parts) > 2], "two levels at most"
+
+
+def test_a_constant_stands_once_in_a_file() -> None:
+    """The second of two would silently hold for what was written by the first."""
+    twice = []
+    for name, tree in TREES.items():
+        targets = [target for node in tree.body if isinstance(node, ast.Assign) for target in node.targets]
+        names = Counter(
+            node.id
+            for target in targets
+            for node in ast.walk(target)
+            if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store)
+        )
+        twice += [(name, constant) for constant, count in names.items() if count > 1]
+    assert not twice
 
 
 def test_a_room_names_what_is_public_in_its_stub_alone() -> None:

@@ -85,10 +85,6 @@ def plot_response(fit: ModalFit) -> Figure:
     return figure
 
 
-COLOURS = (BLUE, ORANGE, GREEN, PURPLE)
-MARKS = ("o", "s", "^", "D")
-
-
 @styled
 def plot_plan(plan: ExperimentPlan) -> Figure:
     """What each sampling rate and choice of sensors can tell, one panel a question.

@@ -53,7 +53,6 @@ DECIBELS = 80.0  # dB between the largest modulus and the threshold
 LEVELS = 18  # contour lines across them, as in the thesis
 COLUMNS = 900
 RISING = "cividis"  # even in brightness, and told apart by the colour blind
-RISING = "cividis"
 FEW = 16  # values of a count that are handles apart by colour
 MOSTLY = 0.95  # of the points have whole numbers of a count: on a border they may not
 WIDE, SPAN = 100.0, 1e4  # a range this wide is drawn by its logarithm, and as much of it
