@@ -24,7 +24,7 @@ def null_decay(seed: int, noise: str, *, dry: float = 0.0) -> tuple[Array, float
     amplitude = float(np.exp(rng.uniform(math.log(1e-3), math.log(2e-2))))
     held = float(rng.choice([0.0, 2.0])) / frequency
     t = np.arange(int((held + length) * fs)) / fs - held
-    moved = _let_go(np.maximum(t, 0.0), 2 * math.pi * frequency, zeta, dry)
+    moved = let_go(np.maximum(t, 0.0), 2 * math.pi * frequency, zeta, dry)
     ratio = 10 ** -rng.uniform(1.5, 3.5)  # noise over the first amplitude
     sensed = amplitude * (moved + ratio * _noise(rng, noise, t, frequency, ratio)) + rng.uniform(-1, 1) * amplitude
     if noise.endswith("bit"):
@@ -33,8 +33,8 @@ def null_decay(seed: int, noise: str, *, dry: float = 0.0) -> tuple[Array, float
     return sensed, fs, {"damping_ratio": zeta, "dry_displacement": dry * amplitude, "frequency": frequency}
 
 
-def _let_go(t: Array, w: float, zeta: float, dry: float) -> Array:
-    """From one, half cycle by half cycle: about +dry or -dry, each as long, till it stays."""
+def let_go(t: Array, w: float, zeta: float, dry: float, rise: float = 0.0) -> Array:
+    """From one, half cycle by half cycle: about +dry or -dry, each as long, till it stays; `dry` rises in each."""
     turn = w * math.sqrt(1 - zeta**2)
     half, ratio = math.pi / turn, zeta / math.sqrt(1 - zeta**2)
     x, begin, swing, side = np.zeros(len(t)), 0.0, 1.0, 1.0
@@ -47,6 +47,7 @@ def _let_go(t: Array, w: float, zeta: float, dry: float) -> Array:
         wave = np.exp(-zeta * w * since) * (np.cos(turn * since) + ratio * np.sin(turn * since))
         x[rows] = side * (dry + (swing - dry) * wave)
         swing, side, begin = (swing - dry) * math.exp(-math.pi * ratio) - dry, -side, begin + half
+        dry += rise
     return x
 
 

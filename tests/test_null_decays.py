@@ -5,11 +5,12 @@ from __future__ import annotations
 from functools import cache
 from pathlib import Path
 
+import numpy as np
 import pytest
 from click.testing import CliRunner
 
 import stickslip as ss
-from null_decays import NOISES, null_decay
+from null_decays import NOISES, let_go, null_decay
 from stickslip.cli.program import main
 
 
@@ -34,7 +35,22 @@ def test_dry_friction_that_is_there_is_told() -> None:
     assert found.decay.rubs
     told = " ".join(ss.summary(found).headline)
     assert "dies away by viscous and dry friction" in told
+    assert "if the dry friction stays the same. If it rises by 1 % over the decay, the damping ratio is read" in told
     assert "dry friction force of" in told
+
+
+@pytest.mark.parametrize("change", [-0.02, 0.01])
+@pytest.mark.parametrize(("ratio", "dry"), [(0.003, 0.02), (0.012, 0.012), (0.0008, 0.05)])
+def test_what_a_changing_friction_is_misread_by_is_said_beforehand(ratio: float, dry: float, change: float) -> None:
+    t = np.arange(12000) / 1000
+    half_cycles = np.count_nonzero(np.diff(np.sign(np.diff(let_go(t, 20.0, ratio, dry)))))
+    noise = 1e-5 * np.random.default_rng(5).standard_normal(t.size)
+    values = let_go(t, 20.0, ratio, dry, rise=change * dry / half_cycles) + noise
+    decay = ss.analyze_decay(ss.Record.of({"x": values}, fs=1000), stiffness=1000.0).decay
+    assert decay.motion is not None
+    off = decay.waveform.damping_ratio.value - ratio
+    assert abs(off) > 10 * decay.waveform.damping_ratio.sd  # the interval does not hold it
+    assert off == pytest.approx(change * decay.motion.choice.candidate("both").damping_per_drift, rel=0.25)
 
 
 def test_one_damping_ratio_is_quoted_and_the_others_are_folded() -> None:

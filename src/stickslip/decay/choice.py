@@ -187,6 +187,19 @@ class Candidate:
             self._status,
         )
 
+    @cached_property
+    def damping_per_drift(self) -> float:
+        """By how much the damping ratio is misread where dry friction rises over the decay, over that rise.
+
+        To first order: of a rise that goes with the way slid, what least squares takes for more or less damping.
+        """
+        fitted = self.fitted
+        count = fitted.half_cycles if fitted.forced else None
+        motion, slope, _ = fitted.blocks.motion(fitted.parameters, free=("wear",), half_cycles=count)
+        way = float(np.abs(np.diff(motion)).sum()) / abs(fitted.value("amplitude"))
+        moved = np.linalg.pinv(fitted.jacobian) @ fitted.blocks.weighted(slope[:, 0])
+        return float(moved[fitted.motion.free.index("damping_ratio")]) / way
+
     @property
     def _status(self) -> str:
         return "ok" if self.kept else f"{self.against} is seen beside it"

@@ -177,6 +177,7 @@ def _frictions(findings: Findings) -> Iterator[str]:
     """What makes it die away, and what the record says against that."""
     decay = findings.decay
     yield _dying(decay)
+    yield from _steady(decay)
     if CLEAR <= decay.against < SIZE:
         yield (
             f"The motions tried speak against viscous and dry friction, but weakly (p = {decay.against:.1g}): of "
@@ -206,13 +207,29 @@ def _dying(decay: Decay) -> str:
         return f"Read as viscous and dry friction, which the record speaks against, it shows {shown}."
     if viscous and rubs:
         model = decay.best.model
-        return f"The motion dies away by {model if 'friction' in model else f'{model} friction'}: {shown}."
+        forces = model if "friction" in model else f"{model} friction"
+        return f"The motion dies away by {forces}: {shown}, if the dry friction stays the same."
     if viscous:
         widest = max((dry, *decay.whichever[1:]), key=lambda estimate: estimate.interval[1])
         return f"The motion dies away by viscous friction: {_with_interval(ratio)}. {_hidden(widest, 'dry friction')}"
     if rubs:
         return f"The motion dies away by dry friction: {_with_interval(dry)}. {_hidden(ratio, 'viscous friction')}"
     return "Neither viscous nor dry friction can be told from zero."
+
+
+def _steady(decay: Decay) -> Iterator[str]:
+    """What of the damping ratio a dry friction that changes on the way would be: no record tells the two well apart."""
+    ratio = decay.best.damping_ratio
+    if decay.motion is None or decay.best is decay.motion or decay.denied or not (decay.rubs and ratio.interval[0] > 0):
+        return
+    per_drift = decay.motion.choice.candidate("both").damping_per_drift
+    fall = -100 * ratio.value / per_drift if per_drift else math.inf
+    all_of_it = f"; a fall by {fall:.0f} % would pass for all of it" if 0 < fall < 100 else ""
+    moved = "small" if per_drift < 0 else "large"
+    yield (
+        f"If it rises by 1 % over the decay, the damping ratio is read {abs(per_drift) / 100:.2g} too "
+        f"{moved}{all_of_it}."
+    )
 
 
 def _listed(parts: list[str]) -> str:
