@@ -161,6 +161,34 @@ def test_no_law_ends_above_one_that_it_contains(kind: str, seed: int) -> None:
     assert misfits["Stribeck"] < 1.05 * misfits["static"]
 
 
+@pytest.mark.parametrize(("kind", "seed"), [("Coulomb", 2), ("static", 1)])
+def test_a_law_begun_by_its_units_alone_begins_next_to_rigid_too(kind: str, seed: int) -> None:
+    """Dahl's was left with 880 and 3240 times what Coulomb's leaves, which it comes to as it grows stiff."""
+    rng = np.random.default_rng([777, seed, len(kind)])
+    rig = stepped.drawn(kind, rng)
+    told = stepped.record(rig, rng, noise=1e-3, cycles=10)
+    known = ss.Oscillator(law=ss.laws.Coulomb(1.0), **rig.stated)
+    found = ss.compare_laws(told, known, laws=["Coulomb", "Dahl"])
+    misfits = {law.name: law.standing.misfit for law in found.candidates}
+    assert misfits["Dahl"] < 2 * misfits["Coulomb"]
+
+
+def test_no_sudden_fall_is_told_without_a_load_cell() -> None:
+    """Of 20 % the smoother left an accelerometer none, and the static friction was said to exceed by 2 % at most."""
+    system = slider().having(law=ss.laws.Coulomb(1.1, static=1.32), drive=ss.drives.HarmonicBase(6.5e-4, frequency=2.5))
+    run = ss.simulate(system, cycles=12)
+    rig = ss.Rig.perfect("x", "z", "a", "load").having("x", white=1e-6).having("z", white=1e-6)
+    told = rig.having("a", white=1e-2).having("load", white=2e-3).measure(run, fs=4000, rng=3)
+    told = told.rows(4000, len(told))
+    alone = told.with_samples({name: told[name] for name in ("x", "z", "a")}, Step("example", {}, "no load cell"))
+    assert Seen.of([alone], slider()).rests.fall is None
+    felt = Seen.of([told], slider()).rests.fall
+    assert felt is not None
+    assert felt.includes(0.2)
+    found = ss.compare_laws(alone, slider(), laws=["Coulomb", "static"])
+    assert "exceeds" not in found.verdict
+
+
 def test_a_law_that_is_searched_alone_finds_the_valley_of_a_simpler_one() -> None:
     """A compliant contact, begun at far too soft a one, was left at 5.7 times the noise of its own record."""
     rng = np.random.default_rng([91, 0, len("compliant")])
@@ -328,6 +356,16 @@ def test_a_level_above_a_held_static_friction_ends_its_interval() -> None:
     problem = Problem.of(system, [shown.stretch(0, (0, len(told) - 1))], [Knob("kinetic", "log", 0.95)])
     end = _end(problem, problem.begin(np.zeros(1)), 0, 1.0, 1e300, lambda: None)
     assert 0 < end < 0.1  # of a logarithm: 5 % lie between
+
+
+def test_a_curve_too_steep_to_be_seen_is_no_stribeck_curve() -> None:
+    """Of static friction that falls at once it was said to fall along a Stribeck curve, of 2 um/s, 0 to 10."""
+    rng = np.random.default_rng([777, 2, len("static")])
+    rig = stepped.drawn("static", rng)
+    known = ss.Oscillator(law=ss.laws.Coulomb(1.0), **rig.stated)
+    found = ss.compare_laws(stepped.record(rig, rng, noise=1e-3, cycles=10), known, laws=["Coulomb", "Stribeck"])
+    assert found.fit.parameters["speed"].interval[0] == 0
+    assert "along a Stribeck curve" not in found.verdict
 
 
 # ---- records that tell nothing

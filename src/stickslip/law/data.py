@@ -279,13 +279,24 @@ class Rests:
     strays: Array
 
     @classmethod
-    def of(cls, speed: Array, friction: Array, *, fs: float, frequency: float, unsure: float, blur: int = 1) -> Rests:
+    def of(
+        cls,
+        speed: Array,
+        friction: Array,
+        *,
+        fs: float,
+        frequency: float,
+        unsure: float,
+        blur: int = 1,
+        sharp: bool = True,
+    ) -> Rests:
         """Those of one record; `unsure` [m/s] is the speed's deviation, `frequency` [rad/s] the motion's.
 
-        A fall is not told where smoothing spreads it beyond its corner (`blur` samples), or where the motion goes on
-        while its samples pass: at 60 samples a cycle even a friction of one level seemed to fall by its own size.
+        A fall is not told where no sensor shows it (`sharp`), where smoothing spreads it beyond its corner (`blur`
+        samples), or where the motion goes on while its samples pass: at 60 samples a cycle even a friction of one level
+        seemed to fall by its own size.
         """
-        sudden = blur <= CORNER and AFTER / fs * frequency < HELD
+        sudden = sharp and blur <= CORNER and AFTER / fs * frequency < HELD
         top = float(np.abs(speed).max())
         still = max(AT_REST * top, NOISY * unsure)
         falls, sinks, rises, shapes, strays = [], [], [], [], []

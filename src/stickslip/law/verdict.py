@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stickslip.estimate import Doubt, Estimate, Result, Status
+from stickslip.law.data import told
 from stickslip.law.law import MISFIT, LawFit
 from stickslip.laws.guessing import family_of
 from stickslip.oscillator import Oscillator
@@ -437,7 +438,7 @@ def concluded(
         families[0] if len(families) == 1 and not doubt else None,
         tuple(law.name for law in kept), confidence,
         f"None of the laws tried describes these records: {doubt}." if doubt
-        else " ".join(_sentences(ranking, families, excess_, calibration, confidence, Remainder.of_fit(fit))),
+        else " ".join(_sentences(ranking, families, excess_, calibration, confidence, fit)),
         fit, excess_, Status(doubt) if doubt else Status(*worries), checks,
         (*records[0].history, step),
     )  # fmt: skip
@@ -467,10 +468,10 @@ def _sentences(
     excess_: Estimate | None,
     calibration: float,
     confidence: float,
-    remainder: Remainder,
+    fit: LawFit,
 ) -> Iterator[str]:
     """The verdict, to be pasted into a report."""
-    best = laws[0]
+    best, remainder = laws[0], Remainder.of_fit(fit)
     if len(laws) == 1:  # nothing was compared: how well it explains the records is all there is to say
         yield f"{best.name}, the only law tried, {remainder}, {times(remainder.over)} the noise of {remainder.channel}."
         return
@@ -515,10 +516,20 @@ def _sentences(
             most = f"{100 * high:.1f} % at most"
             yield f"One level of friction explains it: static friction exceeds the kinetic by {most}."
         else:
-            falls = "at once" if kept == ["static"] else "with the speed, along a Stribeck curve"
-            yield f"Static friction exceeds the kinetic {exceeds} and falls {falls}."
+            yield f"Static friction exceeds the kinetic {exceeds} and falls {_falls(fit)}."
+    elif best.family == "rigid" and len(families) == 1 and len(kept) > 1:
+        yield f"Within it {_either(kept)} can not be told apart."
     if len(kept) == 1:
         yield f"Confidence {100 * confidence:.1f} %."
+
+
+def _falls(fit: LawFit) -> str:
+    """How static friction falls to the kinetic; within which speed, where a Stribeck curve is not told from a jump."""
+    speed = fit.parameters.get("speed")
+    if speed is None:
+        return "at once"
+    low, high = speed.interval
+    return "with the speed, along a Stribeck curve" if low > 0 else f"at once, or within {told(high, 'm/s')}"
 
 
 def _either(names: Sequence[str]) -> str:

@@ -364,7 +364,7 @@ def compare_laws(
     if doubt:
         ranking, confidence = undescribed(ranking), 0.0
         fit = _flagged(fit, "none of the laws tried describes these records")
-    rigid = _excess(fit) if best.name == "Stribeck" else rests.fall
+    rigid = _excess(fit) if best.name == "Stribeck" and fit.parameters["speed"].interval[0] > 0 else rests.fall
     fit = _calibrated(fit, records, calibration)
     if progress:
         progress(1.0)

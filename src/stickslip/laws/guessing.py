@@ -199,7 +199,7 @@ def _sized(law: type[Any], parameter: Any, seen: Observed) -> tuple[float, ...]:
         "s/m": tuple(1 / (part * fastest) for part in SPEEDS),
         "m": tuple(part * furthest for part in (STIFF, 0.1)),
         "N/m": tuple(
-            level / (part * furthest) for part in (STIFF, 0.1, 10.0)
+            level / (part * furthest) for part in (STIFFEST, STIFF, 0.1, 10.0)
         ),  # a contact's, or friction along the way
         "N s/m": (LITTLE * level / fastest, 0.1 * level / fastest),
         "s": tuple(part / seen.frequency for part in SPEEDS),
