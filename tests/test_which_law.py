@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -13,15 +14,16 @@ from click.testing import CliRunner
 
 import stepped
 import stickslip as ss
+from any_law import ONE_NEWTON
 from stickslip.cli.program import main
 from stickslip.figures.law import law_plates
 from stickslip.law.law import _end
 from stickslip.law.search import Knob, Problem
 from stickslip.law.start import Shown
 from stickslip.law.stretch import channels_of
-from stickslip.law.trials import Seen
-from stickslip.law.verdict import CERTAIN, SUPPORTED, Evidence, Misfit, _within, seen_above, standings
-from stickslip.laws.guessing import hypotheses
+from stickslip.law.trials import Seen, like
+from stickslip.law.verdict import CERTAIN, SUPPORTED, Evidence, Misfit, Remainder, _within, seen_above, standings
+from stickslip.laws.guessing import _by_units, _natural, asked_for, hypotheses
 from stickslip.record.record import Step
 
 RIG: dict[str, Any] = {"mass": 2.42, "stiffness": 2310.0, "damping": 0.12}
@@ -187,6 +189,54 @@ def test_no_sudden_fall_is_told_without_a_load_cell() -> None:
     assert felt.includes(0.2)
     found = ss.compare_laws(alone, slider(), laws=["Coulomb", "static"])
     assert "exceeds" not in found.verdict
+
+
+def test_a_law_with_values_that_units_do_not_tell_is_fitted_as_it_is() -> None:
+    """A second search asked its class where to begin, and refused it after the fit."""
+    lagging = ss.laws.TimeDelay(ss.laws.LinearSlope(0.9, slope=0.1), lag=1e-3)
+    found = ss.fit_law(record("compliant"), slider().having(law=lagging), intervals=False)
+    assert type(found.law) is ss.laws.TimeDelay
+
+
+def test_what_is_not_fitted_stays_as_it_was_given() -> None:
+    """A second search from a simpler law's end gave back another rule, no static friction, and another exponent."""
+    begun = ss.laws.LuGre(1.0, 1.1, speed=1e-3, stiffness=1e6, damping=90)
+    given = ss.laws.LuGre(0.95, 1.2, speed=5e-3, stiffness=2e4, damping=24, exponent=1.0)
+    assert like(slider().having(law=given), begun) == replace(begun, exponent=1.0)
+    held = ss.laws.CompliantContact(0.95, stiffness=2e5, damping=24, static=1.2)
+    assert like(slider().having(law=held), replace(held, static=None)) is None
+    assert like(slider().having(law=given), held) is None
+
+
+def test_a_law_that_refuses_every_start_is_refused_in_words() -> None:
+    @ss.parameters.parametric
+    class Choosy(ss.laws.Coulomb):
+        def __post_init__(self) -> None:
+            raise ss.errors.ModelError("kinetic", "no value will do", "take another law")
+
+    Choosy.hypotheses = None  # type: ignore[method-assign,assignment]
+    with pytest.raises(ss.errors.ModelError, match="refuses all values"):
+        _by_units(Choosy, ONE_NEWTON)
+
+
+def test_starts_are_thinned_over_all_parameters() -> None:
+    """The first 24 of 64 had the same normal friction each."""
+    starts = asked_for(ss.laws.RateState)[0].guesses(ONE_NEWTON)
+    assert 1 < len(starts) <= 24
+    for name in ("normal", "friction", "direct", "evolution", "distance"):
+        assert len({getattr(start, name) for start in starts}) > 1, name
+
+
+@pytest.mark.parametrize(("unit", "size"), [("N", 1.0), ("1/m", 100.0), ("N s^2/m^2", 100.0), ("s", 0.1)])
+def test_a_parameter_of_any_unit_has_a_natural_size(unit: str, size: float) -> None:
+    assert _natural(unit, ONE_NEWTON) == pytest.approx(size)  # 1 N, 0.01 m, 0.1 s
+
+
+def test_the_channel_left_with_most_noise_is_named_where_all_shares_are_small() -> None:
+    """x at three times its noise went unsaid beside a load that a law explains."""
+    told = Remainder.of({"x": 3e-6, "load": 1.15e-2}, {"x": 1e-6, "load": 1e-2}, {"x": 1e-3, "load": 1.0})
+    assert not told.explained
+    assert told.channel == "x"
 
 
 def test_a_law_that_is_searched_alone_finds_the_valley_of_a_simpler_one() -> None:

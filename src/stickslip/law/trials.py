@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
@@ -228,35 +228,53 @@ class Search:
             trial = resumed(before[name], stretches, least, passes, self.tell) if name in before else None
             if trial is None:
                 begun = [replace(one, law=law) for one, seen in self.seen for law in given or kind.guesses(seen)]
-                begun += _continued(kind, trials)
+                begun += self._continued(kind, given, trials)
                 trial = searched(name, begun, stretches, self.known, self.calibration, least, passes, self.tell)
-            trial = self._no_worse(kind, trial, trials, passes)
+            trial = self._no_worse(kind, given, trial, trials, passes)
             if trial is not None:
                 trials[name] = trial
         return trials
 
     def _no_worse(
-        self, kind: Hypothesis, trial: Trial | None, before: Mapping[str, Trial], passes: int
+        self, kind: Hypothesis, given: list[Any], trial: Trial | None, before: Mapping[str, Trial], passes: int
     ) -> Trial | None:
         """The trial, or where it is above a law that it contains, one that begins where that one ends."""
         inner = min((before[name] for name in kind.contains if name in before), key=_misfit, default=None)
         if inner is None or (trial is not None and trial.point.chi2 <= NO_WORSE * inner.point.chi2):
             return trial
-        ends = [extended(kind.name, inner, law, self.known, passes, self.tell) for law in kind.continued(before)]
+        begun = self._simpler(kind, given, before)
+        ends = [extended(kind.name, inner, law, self.known, passes, self.tell) for law in begun]
         return min((one for one in (trial, *ends) if one is not None), key=_misfit, default=None)
+
+    def _continued(self, kind: Hypothesis, given: list[Any], before: Mapping[str, Trial]) -> list[Oscillator]:
+        """Where else a search begins: where those of simpler laws end, with the damper of the one that left least."""
+        if not before:
+            return []
+        nearest = min(before.values(), key=_misfit)
+        stated = nearest.problem.oscillator.having(damping=nearest.system.damping)
+        return [replace(stated, law=law) for law in self._simpler(kind, given, before)]
+
+    def _simpler(self, kind: Hypothesis, given: list[Any], before: Mapping[str, Trial]) -> list[Any]:
+        """The law next to simpler ones where their searches end; of one with values such as it is."""
+        begun = kind.continued(before)
+        if not given:
+            return begun
+        asked = replace(self.seen[0][0], law=given[0])
+        return [same for law in begun if (same := like(asked, law)) is not None]
 
 
 def _misfit(trial: Trial) -> float:
     return trial.point.chi2
 
 
-def _continued(kind: Hypothesis, before: Mapping[str, Trial]) -> list[Oscillator]:
-    """Where else a search begins: at the ends of simpler laws' searches, with the damper of the one that left least."""
-    if not before:
-        return []
-    nearest = min(before.values(), key=_misfit)
-    stated = nearest.problem.oscillator.having(damping=nearest.system.damping)
-    return [replace(stated, law=law) for law in kind.continued(before)]
+def like(asked: Oscillator, law: Any) -> Any | None:
+    """A law with all that is not fitted as in the one that was asked for; None where it has other parameters."""
+    names, own = free_names(asked, None), vars(asked.law)
+    if type(law) is not type(asked.law) or free_names(replace(asked, law=law), None) != names:
+        return None
+    fitted = {name.removeprefix("law.") for name in names}
+    begun: Any = law  # else it would be narrowed to the protocol of laws, which are no dataclasses to the checker
+    return replace(begun, **{field.name: own[field.name] for field in fields(begun) if field.name not in fitted})
 
 
 def extended(name: str, simpler: Trial, law: Any, known: Sequence[str], passes: int, tell: Tell) -> Trial | None:

@@ -263,7 +263,10 @@ def undescribed(ranking: Sequence[Standing]) -> list[Standing]:
 
 
 class Remainder(NamedTuple):
-    """The channel of which a law leaves the largest share beyond the noise, that share, and times its noise."""
+    """What a law leaves of a channel: its share beyond the noise, and how many times its noise.
+
+    The channel of the largest share; where all of those are small, of the most times its noise.
+    """
 
     channel: str
     share: float
@@ -276,8 +279,11 @@ class Remainder(NamedTuple):
             name: math.sqrt(max(0.0, rms**2 - noise[name] ** 2)) / max(sizes[name], 1e-300)
             for name, rms in left.items()
         }
+        over = {name: rms / max(noise[name], 1e-300) for name, rms in left.items()}
         worst = max(shares, key=lambda name: shares[name])
-        return cls(worst, shares[worst], left[worst] / max(noise[worst], 1e-300))
+        if shares[worst] <= LEFT:
+            worst = max(over, key=lambda name: over[name])
+        return cls(worst, shares[worst], over[worst])
 
     @classmethod
     def of_fit(cls, fit: LawFit) -> Remainder:

@@ -38,6 +38,7 @@ from stickslip.law.trials import (
     Seen,
     Trial,
     evidence_of,
+    like,
     resumed,
     seen_by,
     squares,
@@ -124,10 +125,10 @@ def fit_law(
         Channels to explain; all that were measured where left out.
     law : str, type or law, optional
         The law to fit: its name, its class, or an instance with the values to start from; the oscillator's own where
-        left out. ``RoughSurface``: the oscillator's own on a surface whose friction is not the same everywhere: its
-        forces are multiplied by a profile along the surface, which is fitted too; it is Coulomb's or the
-        CompliantContact, and its sliding friction the mean of the profile, as sure as that mean is for another part of
-        the surface.
+        left out. The class ``RoughSurface``: the oscillator's own on a surface whose friction is not the same
+        everywhere: its forces are multiplied by a profile along the surface, which is fitted too; it is Coulomb's or
+        the CompliantContact, and its sliding friction the mean of the profile, as sure as that mean is for another part
+        of the surface.
     intervals : bool
         Whether to ask how sure the parameters are; without, the fit is quicker.
     progress : callable, optional
@@ -230,17 +231,22 @@ def _from_simpler(
     A law next to rigid, or with a curve that is next to none, has valleys of its own: a compliant contact left 6 times
     the noise of a record of another compliant contact, bristles 32 times that of a rigid one, which they contain.
     """
-    known = hypotheses()
-    kind = hypothesis_of(problem.oscillator.law)
-    inner = [one for name, one in known.items() if name in contained(kind)]
-    nuisance = [turned.name for turned in problem.knobs if turned.name not in free_names(problem.oscillator, None)]
+    asked = problem.oscillator
+    kind = hypothesis_of(asked.law)
+    simpler = contained(kind)
+    if not simpler:
+        return problem, point
+    inner = [one for name, one in hypotheses().items() if name in simpler]
+    nuisance = [turned.name for turned in problem.knobs if turned.name not in free_names(asked, None)]
     nuisance = list(dict.fromkeys(nuisance))
-    stated = [problem.oscillator, *([seen_damping(problem.oscillator, shown)] if "damping" in nuisance else [])]
+    stated = [asked, *([seen_damping(asked, shown)] if "damping" in nuisance else [])]
     search = Search([(one, []) for one in (*inner, kind)], seen_by(records, stated), nuisance, CALIBRATION, tell)
     trial = search.tried(shown, None, PASSES, {}).get(kind.name)
-    if trial is None or type(trial.law) is not type(problem.oscillator.law):
+    law = None if trial is None else like(asked, trial.law)
+    if trial is None or law is None:
         return problem, point
-    other = _posed(trial.system, free_names(trial.system, None), nuisance, problem.stretches)
+    system = replace(trial.system, law=law)
+    other = _posed(system, free_names(system, None), nuisance, problem.stretches)
     end = descend(other, other.begin(np.zeros(len(other.knobs))), tell=tell)
     return (other, end) if end.chi2 < point.chi2 else (problem, point)
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import functools
 import itertools
+import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import MISSING, dataclass, fields
 from typing import Any, NamedTuple, Protocol
@@ -17,6 +18,7 @@ from numpy.typing import NDArray
 from stickslip import laws
 from stickslip.errors import ModelError
 from stickslip.parameters import declaration
+from stickslip.units import dimensions
 
 Array = NDArray[np.float64]
 
@@ -179,7 +181,14 @@ def asked_for(law: type[Any]) -> tuple[Hypothesis, ...]:
 def _by_units(law: type[Any], seen: Observed) -> list[Any]:
     """Laws whose values have the size of what was observed, of those that the class allows."""
     choices = [[(own.name, value) for value in _sized(law, own, seen)] for own in fields(law) if own.default is MISSING]
-    return list(itertools.islice(_allowed(law, choices), MOST_GUESSED))
+    allowed = list(_allowed(law, choices))
+    if not allowed:
+        raise ModelError(
+            f"{law.__name__} refuses all values of the size of what was seen",
+            "its search begins at one that it allows",
+            "give the law with its values",
+        )
+    return allowed[:: math.ceil(len(allowed) / MOST_GUESSED)]  # the first ones have the first parameters alike
 
 
 def _allowed(law: type[Any], choices: list[list[tuple[str, float]]]) -> Iterator[Any]:
@@ -199,7 +208,7 @@ def _sized(law: type[Any], parameter: Any, seen: Observed) -> tuple[float, ...]:
         "s/m": tuple(1 / (part * fastest) for part in SPEEDS),
         "m": tuple(part * furthest for part in (STIFF, 0.1)),
         "N/m": tuple(
-            level / (part * furthest) for part in (STIFFEST, STIFF, 0.1, 10.0)
+            level / (part * furthest) for part in (STIFF, 0.1, 10.0, STIFFEST)
         ),  # a contact's, or friction along the way
         "N s/m": (LITTLE * level / fastest, 0.1 * level / fastest),
         "s": tuple(part / seen.frequency for part in SPEEDS),
@@ -207,14 +216,21 @@ def _sized(law: type[Any], parameter: Any, seen: Observed) -> tuple[float, ...]:
         "kg": (seen.mass,),
         "1": (1.0, EXCESSES[1]),
     }
-    if declared.unit not in sizes or declared.size != "number":
+    if not declared.unit or declared.size != "number":
         raise ModelError(
             f"{law.__name__} of which no {parameter.name} is known",
-            "records tell where to begin with a number in N, m, s, kg or of these",
+            "records tell where to begin with a number that has a unit",
             "give the law with its values",
         )
-    values = sizes[declared.unit]
+    values = sizes.get(declared.unit) or (_natural(declared.unit, seen),)
     return (*values, *(-value for value in values)) if declared.signed else values
+
+
+def _natural(unit: str, seen: Observed) -> float:
+    """What a quantity is when measured by the friction's level, the way and the time of the motion."""
+    powers, time = dimensions(unit), 1 / seen.frequency
+    measures = {"mass": seen.level * time**2 / seen.furthest, "length": seen.furthest, "time": time}
+    return float(math.prod(measures[name] ** power for name, power in powers.items()))
 
 
 def hypotheses() -> dict[str, Hypothesis]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
@@ -308,18 +309,19 @@ def _runs(tour: Tour) -> Table:
     for finding, run in zip(tour.comparison.findings, tour.runs, strict=True):
         estimates = tuple(finding.estimates)
         cells = [value_of(one) if (one := _of(estimates, name)) else "–" for name in names]
-        cells.append(_excess(_of(estimates, "static over sliding friction")))
+        cells.append(_static_over_sliding(_of(estimates, "static over sliding friction")))
         rows.append([f"{run.frequency:g} Hz", f"{1e3 * run.amplitude:g} mm", run.why, *cells])
     heads = ("base", "amplitude", "what for", "sliding friction", "stuck", "contact stiffness", "static over sliding")
     note = "Each run has its own section below, with intervals and figures; –: not asked, or not told by that run."
     return Table("What the runs tell", heads, rows, note)
 
 
-def _excess(ratio: Estimate | None) -> str:
-    """Static over sliding friction; where it may be 1, what it lies below."""
+def _static_over_sliding(ratio: Estimate | None) -> str:
+    """The ratio; where it may be 1, what it lies below."""
     if ratio is None or not ratio.known:
         return "–"
-    return value_of(ratio) if ratio.interval[0] > 1 else f"below {ratio.interval[1]:.3g}"
+    low, high = ratio.interval
+    return value_of(ratio) if low > 1 else f"below {high:.3g}" if math.isfinite(high) else "–"
 
 
 def _next(tour: Tour) -> Table:

@@ -220,11 +220,13 @@ def _dying(decay: Decay) -> str:
 def _steady(decay: Decay) -> Iterator[str]:
     """What of the damping ratio a dry friction that changes on the way would be: no record tells the two well apart."""
     ratio = decay.best.damping_ratio
-    if decay.motion is None or decay.best is decay.motion or decay.denied or not (decay.rubs and ratio.interval[0] > 0):
+    if decay.motion is None or decay.best is not decay.waveform or decay.denied:
+        return
+    if not (decay.rubs and ratio.interval[0] > 0):
         return
     per_drift = decay.motion.choice.candidate("both").damping_per_drift
     fall = -100 * ratio.value / per_drift if per_drift else math.inf
-    all_of_it = f"; a fall by {fall:.0f} % would pass for all of it" if 0 < fall < 100 else ""
+    all_of_it = f"; a fall by about {fall:.0f} % would pass for all of it" if 0 < fall < 100 else ""
     moved = "small" if per_drift < 0 else "large"
     yield (
         f"If it rises by 1 % over the decay, the damping ratio is read {abs(per_drift) / 100:.2g} too "

@@ -238,7 +238,9 @@ def _asks_for(belief: Belief, name: str) -> bool:
 def _led_by(families: list[list[Belief]], record: Record, mapped: Map) -> list[Belief]:
     """The nearest of each family and others as near, over the whole record where its beginning allows them."""
     horizons = [record.rows(0, samples) for samples in _horizons(record)]
-    families = _further(families, partial(_over_first, record=horizons[0]), mapped)
+    # what a process is sent is short: with the whole record and its slopes 200 starts were 3 GB
+    families = [[replace(begun, record=horizons[0], fit=None) for begun in family] for family in families]
+    families = _further(families, _followed, mapped)
     families = _further([family[:STARTS] for family in families], partial(_tried, passes=1), mapped)
     families = [family[: 1 if family[0].held else KEPT] for family in families]
     families = _further(families, partial(_led_on, horizons=horizons), mapped)
@@ -253,9 +255,8 @@ def _further(families: list[list[Belief]], step: Callable[[Belief], Belief], map
     return [sorted(itertools.islice(moved, len(family)), key=_left) for family in families]
 
 
-def _over_first(begun: Belief, record: Record) -> Belief:
-    """The same over a record's first cycle, with what it leaves of it."""
-    begun = replace(begun, record=record)
+def _followed(begun: Belief) -> Belief:
+    """The same, with what it leaves of its record."""
     _left(begun)
     return begun
 
