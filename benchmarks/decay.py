@@ -125,29 +125,29 @@ def tell(outcomes: list[Outcome], trials: int) -> None:
     print(f"\n{len(outcomes)} conditions in white noise, {trials} records each")
     print(f"one standard error: ratio to the bound {error:.1f} %, coverage {points:.1f} points")
     for name, index in zip(("damping ratio", "dry friction"), SHOWN, strict=True):
-        ratio = np.array([each.ratio[index] for each in outcomes])
-        clear = np.array([each.clear for each in outcomes])
+        ratio = np.array([outcome.ratio[index] for outcome in outcomes])
+        clear = np.array([outcome.clear for outcome in outcomes])
         print(
             f"{name:14} RMSE / bound: median {np.median(ratio):.3f}, <= 1.05 in {100 * np.mean(ratio <= 1.05):.1f} %,"
             f" 95 % quantile {np.quantile(ratio, 0.95):.3f}, worst {ratio.max():.3f};"
             f" where the half cycles are clear ({clear.sum()}): <= 1.05 in {100 * np.mean(ratio[clear] <= 1.05):.1f} %,"
             f" worst {ratio[clear].max():.3f}"
         )
-        cover = 100 * np.array([each.coverage[index] for each in outcomes])
+        cover = 100 * np.array([outcome.coverage[index] for outcome in outcomes])
         beyond = np.sum((cover < 93 - 2 * points) | (cover > 97 + 2 * points))
         print(
             f"{'':14} 95 % intervals: mean {cover.mean():.2f} %, {cover.min():.1f} to {cover.max():.1f} %,"
             f" within 93-97 % in {np.sum((cover >= 93) & (cover <= 97))}, beyond by two standard errors in {beyond}"
         )
-    print(f"no answer: {sum(each.failures for each in outcomes)} of {len(outcomes) * trials}")
-    point, whole = ([1e3 * getattr(each, name) for each in outcomes] for name in ("point", "whole"))
+    print(f"no answer: {sum(outcome.failures for outcome in outcomes)} of {len(outcomes) * trials}")
+    point, whole = ([1e3 * getattr(outcome, name) for outcome in outcomes] for name in ("point", "whole"))
     print(f"point fit: median {statistics.median(point):.3f} ms, slowest condition {max(point):.3f} ms")
     print(f"with profile intervals: median {statistics.median(whole):.3f} ms, slowest condition {max(whole):.3f} ms")
     print("\nthe worst conditions\ndamping dry    noise   rate length    n right   ratio: damping  dry   coverage")
-    for each in sorted(outcomes, key=lambda each: -max(each.ratio[list(SHOWN)]))[:12]:
-        damping, dry = each.ratio[list(SHOWN)]
-        cover = " ".join(f"{100 * share:.1f}" for share in each.coverage[list(SHOWN)])
-        print(f"{each.condition!s:36} {100 * each.right:5.0f} %   {damping:14.3f} {dry:6.3f}   {cover}")
+    for outcome in sorted(outcomes, key=lambda each: -max(each.ratio[list(SHOWN)]))[:12]:
+        damping, dry = outcome.ratio[list(SHOWN)]
+        cover = " ".join(f"{100 * share:.1f}" for share in outcome.coverage[list(SHOWN)])
+        print(f"{outcome.condition!s:36} {100 * outcome.right:5.0f} %   {damping:14.3f} {dry:6.3f}   {cover}")
 
 
 def rates(trials: int) -> None:
@@ -244,12 +244,12 @@ def other_noise(trials: int) -> None:
         for truth, bound, samples in records(condition, trials, step, share, corner):
             record = ss.Record.of({"x": samples}, fs=float(condition.rate))
             begin = time.process_time()
-            found = fit_decay(record)
+            decay = fit_decay(record)
             seconds.append(time.process_time() - begin)
-            answers = (found.damping_ratio, found.dry_displacement)
+            answers = (decay.damping_ratio, decay.dry_displacement)
             errors.append([(a.value - truth[k]) / bound[k] for a, k in zip(answers, SHOWN, strict=True)])
             inside.append([a.includes(truth[k]) for a, k in zip(answers, SHOWN, strict=True)])
-            kinds.append("counts" if "counts" in found.noise else "drift" if "drift" in found.noise else "white")
+            kinds.append("counts" if "counts" in decay.noise else "drift" if "drift" in decay.noise else "white")
         ratio, cover = np.sqrt(np.mean(np.square(errors), axis=0)), 100 * np.mean(inside, axis=0)
         name = f"step {step}, noise {share} of it" if step else f"1/f, corner {corner} natural"
         most = max(set(kinds), key=kinds.count)

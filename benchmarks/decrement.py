@@ -35,11 +35,11 @@ def main(releases: int = 20) -> None:
         rng = np.random.default_rng(1)
         records = [twin(ratio, dry, rng) for _ in range(releases)]
         for location in ("sample", "fit"):
-            found = [ss.decrement(record, location=location) for record in records]
-            off = np.array([each.damping_ratio.value - ratio for each in found])
-            scatter = np.mean([each.scatter.damping_ratio.std(ddof=1) for each in found])
-            own = np.median([each.damping_ratio.sd for each in found])
-            held = np.mean([each.damping_ratio.includes(ratio) for each in found])
+            decrements = [ss.decrement(record, location=location) for record in records]
+            off = np.array([decrement.damping_ratio.value - ratio for decrement in decrements])
+            scatter = np.mean([decrement.scatter.damping_ratio.std(ddof=1) for decrement in decrements])
+            own = np.median([decrement.damping_ratio.sd for decrement in decrements])
+            held = np.mean([decrement.damping_ratio.includes(ratio) for decrement in decrements])
             rms = float(np.sqrt(np.mean(off**2)))
             print(f"{name:12} {location:8} {ratio:7.4f} {scatter:8.5f} {rms:8.5f} {own:8.5f} {held:10.2f}")
 

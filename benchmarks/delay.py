@@ -94,12 +94,12 @@ def row(names: tuple[str, ...], draws: int, *, mount: bool) -> str:
     errors, inside, sds, resonance = [], 0, [], []
     for seed in range(draws):
         runs = [record(name, RIG, 1000 * j + seed, mount=mount) for j, name in enumerate(names)]
-        found = ss.balance.sensor_delay(runs)
-        errors.append(found.delay.value + LAG)
-        sds.append(found.delay.sd)
-        inside += found.delay.includes(-LAG)
-        if found.mount_frequency is not None:
-            resonance.append(found.mount_frequency.value)
+        delay = ss.balance.sensor_delay(runs)
+        errors.append(delay.delay.value + LAG)
+        sds.append(delay.delay.sd)
+        inside += delay.delay.includes(-LAG)
+        if delay.mount_frequency is not None:
+            resonance.append(delay.mount_frequency.value)
     least = bound(names, mount=mount)
     rms = float(np.sqrt(np.mean(np.square(errors))))
     said = f"; mount {np.mean(resonance):.2f} -+ {np.std(resonance):.2f} Hz in {len(resonance)}" if resonance else ""

@@ -211,14 +211,14 @@ def soda_march() -> Callable[..., int]:
         p[8] = 1.0 if p[6] == 0.0 and p[1] * p[4] > p[5] else 0.0
         while True:
             step = longest if p[8] == 0.0 and p[6] == 0.0 else longest * (p[10] == 1.0)
-            found = solve_ivp(
+            solution = solve_ivp(
                 field, np.array([t, end]), state, np.empty(0), "DOP853", 2, events, p.ctypes.data, 0.0, step,
                 tolerance, tolerance * 1e-4,
             )  # fmt: skip
-            if not found.event_found:
+            if not solution.event_found:
                 return count
-            t = found.t_event
-            state[0], state[1] = found.y_event[0], found.y_event[1]
+            t = solution.t_event
+            state[0], state[1] = solution.y_event[0], solution.y_event[1]
             if p[8] != 0.0:
                 if p[6] != 0.0:
                     # a hair below the level: its event finder takes a crossing downwards as well
@@ -227,7 +227,7 @@ def soda_march() -> Callable[..., int]:
                 p[8] = 0.0 if p[6] != 0.0 or abs(pull) <= p[5] else math.copysign(1.0, pull)
                 state[1] = 0.0
             else:
-                p[8] = 1.0 if found.ind_event == 0 else -1.0
+                p[8] = 1.0 if solution.ind_event == 0 else -1.0
             times[count], modes[count] = t, p[8]
             count += 1
 

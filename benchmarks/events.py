@@ -51,7 +51,7 @@ def onsets(events: tuple[StickEvent, ...]) -> dict[str, list[tuple[float, float]
 
 def compared(ours: list[tuple[float, float]], true: np.ndarray) -> Figures:
     """What of the true onsets is missed, what of ours is false, the errors [s], and the errors over their sd."""
-    inside = np.array([each for each in ours if ENDS < each[0] < SECONDS - ENDS])
+    inside = np.array([onset for onset in ours if ENDS < onset[0] < SECONDS - ENDS])
     apart = inside[:, :1] - true
     hits = np.abs(apart).min(axis=0) < NEAR
     nearest = np.abs(apart).argmin(axis=0)[hits]
@@ -97,8 +97,8 @@ def draw(frequency: float, rough: float, seed: int) -> Figures:
 
 def kept(path: Path | None) -> dict[tuple[float, float, int], Figures]:
     lines = path.read_text("utf-8").splitlines() if path and path.exists() else []
-    each = [json.loads(line) for line in lines]
-    return {(one["frequency"], one["rough"], one["seed"]): one["figures"] for one in each}
+    rows = [json.loads(line) for line in lines]
+    return {(row["frequency"], row["rough"], row["seed"]): row["figures"] for row in rows}
 
 
 def run_all(draws: int, rough: float, path: Path | None) -> dict[tuple[float, float, int], Figures]:

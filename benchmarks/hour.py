@@ -91,12 +91,12 @@ def analyzed(minutes: int) -> None:
         )
         seconds = time.perf_counter() - began
         size = path.stat().st_size / 2**20
-    found = json.loads(run.stdout)
-    values = {each["name"]: each["value"] for each in found["estimates"]}
+    data = json.loads(run.stdout)
+    values = {each["name"]: each["value"] for each in data["estimates"]}
     print(f"{minutes * 60 * FS / 1e6:.1f} million samples of four channels, {size:.0f} MB of Parquet")
     print(f"{seconds:.0f} s, {int(run.stderr.split()[-1]) / 1024:.0f} MB at most")
     print({name: values[name] for name in ("sliding friction", "contact stiffness", "stuck share of the time")})
-    print(found["notes"][0])
+    print(data["notes"][0])
 
 
 def main() -> None:

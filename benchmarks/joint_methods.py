@@ -60,9 +60,9 @@ def plainly(record: ss.Record, halves: list[ss.Record]) -> Answer:
 
 def ours(record: ss.Record, halves: list[ss.Record]) -> Answer:
     """As `stickslip joint` does it."""
-    found = ss.cycle.regress_joint(record)
+    regression = ss.cycle.regress_joint(record)
     missed = ss.cycle.regress_joint_logs(halves).predictions[1].error
-    return {name: (getattr(found, name).value, *getattr(found, name).interval) for name in TOLD}, missed
+    return {name: (getattr(regression, name).value, *getattr(regression, name).interval) for name in TOLD}, missed
 
 
 METHODS: dict[str, Callable[[ss.Record, list[ss.Record]], Answer]] = {"ours": ours, "plain regression": plainly}

@@ -47,11 +47,11 @@ def asked(joint: joints.Joint, kind: str) -> Found:
     if kind == "torque alone":
         alone = {name: record[name] for name in ("theta", "force")}
         record = ss.Record.of(alone, fs=record.fs, units={"force": "N m"}).with_details("force", gain_sd=joints.GAIN)
-    found = ss.cycle.regress_joint(record, **({"kp": joint.kp} if kind == "controller" else {}))
+    regression = ss.cycle.regress_joint(record, **({"kp": joint.kp} if kind == "controller" else {}))
     if kind in PLAYING:
         with contextlib.suppress(ss.errors.EstimateError):
-            return found, ss.cycle.joint_backlash(record, joint=found)
-    return found, None
+            return regression, ss.cycle.joint_backlash(record, joint=regression)
+    return regression, None
 
 
 def main() -> None:

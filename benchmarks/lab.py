@@ -97,11 +97,11 @@ def main() -> None:
     parser.add_argument("--json", action="store_true")
     options = parser.parse_args()
     with lab() as (address, up):
-        found = measured(address, events=options.events, gap=options.gap)
-    result = {"server up [s]": up, "page ready [s]": found["ready [s]"], "page [KB]": found["page [KB]"]}
+        record = measured(address, events=options.events, gap=options.gap)
+    result = {"server up [s]": up, "page ready [s]": record["ready [s]"], "page [KB]": record["page [KB]"]}
     for name in ("drawn", "seen"):
         for share in (50, 95):
-            result[f"slider to {name}, {share}th percentile [ms]"] = float(np.percentile(found[name], share))
+            result[f"slider to {name}, {share}th percentile [ms]"] = float(np.percentile(record[name], share))
     print(
         json.dumps(result) if options.json else "\n".join(f"{name:45s} {value:8.3g}" for name, value in result.items())
     )

@@ -23,11 +23,9 @@ START = ss.laws.CompliantContact(1.3, stiffness=120000, damping=10.0)
 def draw(frequency: float, rough: float, seed: int) -> dict[str, tuple[float, float, float, float]]:
     """Truth, value, low and high end of each parameter of one record."""
     record = measured(frequency, rough, seed)
-    found = ss.fit_law(record, ss.Oscillator(law=START, **RIG), law=ss.laws.RoughSurface if rough else None)
+    fit = ss.fit_law(record, ss.Oscillator(law=START, **RIG), law=ss.laws.RoughSurface if rough else None)
     truth = {"kinetic": MOTIONS[frequency][1], "law.stiffness": STIFFNESS, "law.damping": DAMPING}
-    return {
-        name: (true, found.parameters[name].value, *found.parameters[name].interval) for name, true in truth.items()
-    }
+    return {name: (true, fit.parameters[name].value, *fit.parameters[name].interval) for name, true in truth.items()}
 
 
 def main() -> None:

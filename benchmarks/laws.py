@@ -153,17 +153,17 @@ def draw(name: str, condition: str, seed: int, laws: list[str] | None) -> dict[s
         measured(law, frequency, CONDITIONS[condition], rigs, seed=int(chance.integers(2**31))) for frequency in MOTIONS
     ]
     begun = time.perf_counter()
-    found = ss.compare_laws(records, ss.Oscillator(law=ss.laws.Coulomb(1.0), **RIG), laws=laws, calibration=0.01)
-    excess = found.excess
+    comparison = ss.compare_laws(records, ss.Oscillator(law=ss.laws.Coulomb(1.0), **RIG), laws=laws, calibration=0.01)
+    excess = comparison.excess
     return {
-        "truth": name, "condition": condition, "seed": seed, "law": found.law, "family": found.family,
-        "kept": list(found.kept), "confidence": found.confidence, "seconds": time.perf_counter() - begun,
-        "limits": [each.name for each in found.candidates if each.standing.limit],
-        "true": repr(law), "fitted": repr(found.best.oscillator.law),
-        "held": _held(found.fit, law) if found.law == NAMES[name] else {},
+        "truth": name, "condition": condition, "seed": seed, "law": comparison.law, "family": comparison.family,
+        "kept": list(comparison.kept), "confidence": comparison.confidence, "seconds": time.perf_counter() - begun,
+        "limits": [candidate.name for candidate in comparison.candidates if candidate.standing.limit],
+        "true": repr(law), "fitted": repr(comparison.best.oscillator.law),
+        "held": _held(comparison.fit, law) if comparison.law == NAMES[name] else {},
         "excess": None if excess is None else [excess.value, *excess.interval],
-        "misfits": {each.name: each.standing.misfit for each in found.candidates},
-        "criteria": {each.name: each.standing.criterion for each in found.candidates},
+        "misfits": {candidate.name: candidate.standing.misfit for candidate in comparison.candidates},
+        "criteria": {candidate.name: candidate.standing.criterion for candidate in comparison.candidates},
     }  # fmt: skip
 
 
@@ -184,7 +184,7 @@ def told(draws: list[dict[str, Any]]) -> list[str]:
     """The shares, in lines."""
     lines = []
     for name in NAMES:
-        own = [each for each in draws if each["truth"] == name and "error" not in each]
+        own = [draw for draw in draws if draw["truth"] == name and "error" not in draw]
         if not own:
             continue
         families = Counter(_answer(each["family"], family(NAMES[name])) for each in own)
@@ -194,7 +194,7 @@ def told(draws: list[dict[str, Any]]) -> list[str]:
             f"{name:18}{len(own):5}  family {_shares(families, len(own))}"
             f"  law {_shares(laws, len(own))}  {seconds:.0f} s"
         )
-    done = [each for each in draws if "error" not in each]
+    done = [draw for draw in draws if "error" not in draw]
     if done:
         right = [each["family"] == family(NAMES[each["truth"]]) for each in done]
         wrong = [each for each in done if _wrong(each) and each["confidence"] > SURE]
@@ -202,7 +202,7 @@ def told(draws: list[dict[str, Any]]) -> list[str]:
         lines.append(f"wrong with a confidence above {SURE:.0%}: {len(wrong)} of {len(done)}")
         lines += [f"  {each['truth']} {each['seed']}: {each['kept']}, {each['confidence']:.3f}" for each in wrong]
         lines += _reliability(done) + _coverage(done)
-    refused = [each for each in draws if "error" in each]
+    refused = [draw for draw in draws if "error" in draw]
     return lines + [f"refused: {each['truth']} {each['seed']}: {each['error']}" for each in refused]
 
 
@@ -258,7 +258,7 @@ def main() -> None:
     parser.add_argument("--keep", type=Path, metavar="FILE")
     given = parser.parse_args()
     draws = kept(given.keep)
-    done = {(each["truth"], each["condition"], each["seed"]) for each in draws}
+    done = {(draw["truth"], draw["condition"], draw["seed"]) for draw in draws}
     for seed in range(given.first, given.first + given.draws):
         for name in given.truths.split(","):
             if (name, given.condition, seed) in done:
@@ -271,7 +271,7 @@ def main() -> None:
                 with given.keep.open("a", encoding="utf-8") as file:
                     file.write(json.dumps(draws[-1]) + "\n")
     print(f"Which law it is: {given.condition}, three records of {SECONDS} s")
-    print("\n".join(told([each for each in draws if each["condition"] == given.condition])))
+    print("\n".join(told([draw for draw in draws if draw["condition"] == given.condition])))
 
 
 if __name__ == "__main__":

@@ -62,10 +62,10 @@ def candidates(trials: int) -> None:
         began = time.process_time()
         for _ in range(trials):
             x = noisy(values, rng, 13 if name == "static" else None)
-            found = choose(TIMES, x, fs=FS, start=values[:6])
-            rejected += not found.candidate(name).kept
-            chosen += found.model == name
-            low, high = found.interval("dry_displacement")
+            choice = choose(TIMES, x, fs=FS, start=values[:6])
+            rejected += not choice.candidate(name).kept
+            chosen += choice.model == name
+            low, high = choice.interval("dry_displacement")
             held += low <= values[NUMBERS["dry_displacement"]] <= high
         spent = (time.process_time() - began) / trials
         print(
@@ -91,11 +91,11 @@ def power(trials: int) -> None:
         rng, rejected, alone, held = np.random.default_rng(2), 0, 0, 0
         truth = motion(**BOTH, **shape, **{name: strength})
         for _ in range(trials):
-            found = choose(TIMES, noisy(truth, rng), fs=FS, start=values[:6])
-            both = found.candidate("both")
+            choice = choose(TIMES, noisy(truth, rng), fs=FS, start=values[:6])
+            both = choice.candidate("both")
             rejected += not both.kept
             alone += both.estimate("dry_displacement").includes(BOTH["dry_displacement"])
-            low, high = found.interval("dry_displacement")
+            low, high = choice.interval("dry_displacement")
             held += low <= BOTH["dry_displacement"] <= high
         needed = bias / seen * (1.96 + 2.33)
         shares = (

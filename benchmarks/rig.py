@@ -105,13 +105,13 @@ def tell(found: Draws, frequencies: list[float]) -> None:
     print("motion           draws |  stiffness: bias   rms  largest  coverage |  damping: bias   rms  coverage | slope")
     for condition in itertools.product(frequencies, ROUGHNESS):
         figures = list(found[condition].values())
-        stiffness, damping = (np.array([each[name] for each in figures]) for name in ("stiffness", "damping"))
+        stiffness, damping = (np.array([figure[name] for figure in figures]) for name in ("stiffness", "damping"))
         error, resisting = 100 * (stiffness[:, 0] / STIFFNESS - 1), 100 * (damping[:, 0] / DAMPING - 1)
         inside = 100 * np.mean((stiffness[:, 1] <= STIFFNESS) & (stiffness[:, 2] >= STIFFNESS))
         damped = 100 * np.mean((damping[:, 1] <= DAMPING) & (damping[:, 2] >= DAMPING))
         slope = []
         for method in ("F1", "F2"):
-            mean, scatter = np.array([each[method] for each in figures]).T
+            mean, scatter = np.array([figure[method] for figure in figures]).T
             off = 100 * (np.mean(mean) / STIFFNESS - 1)
             slope.append(f"{method} {off:+.0f} %, scatter {100 * np.mean(scatter / mean):.0f} %")
         print(

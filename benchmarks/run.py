@@ -152,12 +152,12 @@ def bench_reading(files: Mapping[str, Path], rounds: int) -> None:
             "pandas": lambda plain=plain, file=file, skip=skip: plain(file, **skip),
             "stickslip": lambda file=file: ss.read_record(file),
         }
-        found = interleaved(peers, rounds=rounds)
-        frame, record = found["pandas"][1], found["stickslip"][1]
+        decay = interleaved(peers, rounds=rounds)
+        frame, record = decay["pandas"][1], decay["stickslip"][1]
         column = next(name for name in frame.columns if name.split()[0] == "x")
         apart = float(np.max(np.abs(frame[column].to_numpy() - record["x"])))
-        for name, (seconds, _) in found.items():
-            ratio = seconds / found["pandas"][0]
+        for name, (seconds, _) in decay.items():
+            ratio = seconds / decay["pandas"][0]
             rows.append([kind, name, f"{seconds:.2f} s", f"{ratio:.2f}", f"{len(record):,}", f"{apart:.1g}"])
     table("reading, five columns", ["format", "reader", "median", "ratio", "rows", "largest difference in x [m]"], rows)
 
@@ -182,8 +182,8 @@ def bench_smoothing(rounds: int) -> None:
         ),
         "make_smoothing_spline (GCV)": lambda: spline(time_, noisy),
     }
-    found = interleaved(peers, rounds=rounds)
-    first = next(iter(found.values()))[0]
+    decay = interleaved(peers, rounds=rounds)
+    first = next(iter(decay.values()))[0]
     rows = [
         [
             name,
@@ -192,7 +192,7 @@ def bench_smoothing(rounds: int) -> None:
             f"{relative(got[0], v):.2%}",
             f"{relative(got[1], a):.1%}",
         ]
-        for name, (seconds, got) in found.items()
+        for name, (seconds, got) in decay.items()
     ]
     heads = ["method", "median, both orders", "ratio", "rms error of v", "rms error of a"]
     table(f"differentiation, {len(x):,} samples of stick-slip, noise and counts of an LVDT", heads, rows)
@@ -239,8 +239,8 @@ def bench_start(rounds: int) -> None:
         name: lambda command=command: subprocess.run([sys.executable, *command], capture_output=True, check=True)
         for name, command in commands.items()
     }
-    found = interleaved(peers, rounds=rounds)
-    table("start", ["command", "median"], [[name, f"{1e3 * seconds:.0f} ms"] for name, (seconds, _) in found.items()])
+    decay = interleaved(peers, rounds=rounds)
+    table("start", ["command", "median"], [[name, f"{1e3 * seconds:.0f} ms"] for name, (seconds, _) in decay.items()])
 
 
 def _tool(name: str) -> Any:

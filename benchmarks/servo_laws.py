@@ -39,16 +39,18 @@ def asked(law: str, seed: int) -> dict[str, Any]:
     begun = time.process_time()
     row: dict[str, Any] = {"seed": seed, "law": law}
     try:
-        found = ss.compare_laws(rig.records, stated)
+        comparison = ss.compare_laws(rig.records, stated)
     except ss.StickslipError as error:
         return {**row, "error": str(error), "seconds": time.process_time() - begun}
-    standings = [each.standing for each in found.candidates]
+    standings = [candidate.standing for candidate in comparison.candidates]
     true = {**rig.numbers, "static": rig.numbers["static"] * rig.numbers["level"] / rig.numbers["kinetic"]}
     return {
-        **row, "seconds": time.process_time() - begun, "kept": list(found.kept), "confidence": found.confidence,
-        "limits": [each.name for each in standings if each.limit], "best": found.best.name, "status": found.status,
-        "odds": {each.name: 1.0 if each.limit else each.odds for each in standings},
-        "said": {key: [true[TRUE[key]], one.value, *one.interval] for key, one in found.fit.parameters.items()
+        **row, "seconds": time.process_time() - begun,
+        "kept": list(comparison.kept), "confidence": comparison.confidence,
+        "limits": [standing.name for standing in standings if standing.limit],
+        "best": comparison.best.name, "status": comparison.status,
+        "odds": {standing.name: 1.0 if standing.limit else standing.odds for standing in standings},
+        "said": {key: [true[TRUE[key]], one.value, *one.interval] for key, one in comparison.fit.parameters.items()
                  if key in TRUE},
     }  # fmt: skip
 

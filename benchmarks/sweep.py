@@ -34,8 +34,8 @@ def grid(side: int) -> dict[str, Any]:
 def mapped(values: dict[str, Any], name: str) -> tuple[Any, float, float]:
     """The map, and the processor and wall time it took [s]."""
     begin, clock = time.process_time(), time.perf_counter()
-    found = ss.sweep(engine.RIGID, values, measures=["stops"], settle=SETTLE, cycles=CYCLES, engine=name)
-    return found, time.process_time() - begin, time.perf_counter() - clock
+    swept = ss.sweep(engine.RIGID, values, measures=["stops"], settle=SETTLE, cycles=CYCLES, engine=name)
+    return swept, time.process_time() - begin, time.perf_counter() - clock
 
 
 def points(values: dict[str, Any], step: int) -> Iterator[tuple[int, int, ss.Oscillator]]:

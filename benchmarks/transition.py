@@ -66,10 +66,10 @@ def true_slips(run: ss.solve.Trajectory, begin: float, end: float) -> np.ndarray
 
 def slips_told(ringing: Ringing, true: np.ndarray) -> tuple[list[float], int, int]:
     """Errors of the times [s]; micro-slips missed within the windows looked at; false ones."""
-    found = np.array([event.time for event in microslips_of(ringing).events])
-    near = [float(np.abs(true - time).min()) if true.size else math.inf for time in found]
+    values = np.array([event.time for event in microslips_of(ringing).events])
+    near = [float(np.abs(true - time).min()) if true.size else math.inf for time in values]
     errors = [each for each in near if each < SAME]
-    inner = true[(true > found.min() - SAME) & (true < found.max() + SAME)] if found.size else true
+    inner = true[(true > values.min() - SAME) & (true < values.max() + SAME)] if values.size else true
     return errors, max(0, len(inner) - len(errors)), len(near) - len(errors)
 
 

@@ -60,12 +60,12 @@ def running_lab(browser: Path | None = None) -> Iterator[Lab]:
     said = ""
     for line in process.stdout:
         said += line
-        if found := re.search(r"http://127\.0\.0\.1:(\d+)/\?token=(\S+)", line):
+        if match := re.search(r"http://127\.0\.0\.1:(\d+)/\?token=(\S+)", line):
             break
     else:
         raise AssertionError(f"the lab did not start: {said}")
     try:
-        yield Lab(int(found[1]), found[2], process)
+        yield Lab(int(match[1]), match[2], process)
     finally:
         process.send_signal(signal.SIGINT)
         try:
@@ -79,6 +79,6 @@ def running_lab(browser: Path | None = None) -> Iterator[Lab]:
 
 def received(socket: Any) -> tuple[dict[str, Any], dict[str, Any]]:
     """The next answer on a socket, but for the word that kernels are compiled, which comes on a machine's first run."""
-    while (found := unframed(socket.receive_bytes()))[0]["kind"] == "compiling":
+    while (frame := unframed(socket.receive_bytes()))[0]["kind"] == "compiling":
         pass
-    return found
+    return frame

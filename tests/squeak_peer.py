@@ -150,14 +150,14 @@ def dop853(rig: Rig, duration: float, *, rtol: float, longest: float) -> tuple[l
         # an exit at the very start of a step is the way in: begin a little past it
         begin = min(1e-9, duration - now)
         first = solve_ivp(rate, (now, now + begin), state[:size], **options).y[:, -1]
-        found = solve_ivp(rate, (now + begin, duration), first, events=[watched(row) for row in mode.rows],
+        solution = solve_ivp(rate, (now + begin, duration), first, events=[watched(row) for row in mode.rows],
                           max_step=longest, **options)  # fmt: skip
-        now = float(found.t[-1])
+        now = float(solution.t[-1])
         angle = omega * now
-        state = np.array([*found.y[:, -1], 1.0, math.cos(angle), math.sin(angle)])
-        if found.status != 1:
+        state = np.array([*solution.y[:, -1], 1.0, math.cos(angle), math.sin(angle)])
+        if solution.status != 1:
             break
-        contact, what = next(e for e, times in zip(mode.exits, found.t_events, strict=True) if len(times))
+        contact, what = next(e for e, times in zip(mode.exits, solution.t_events, strict=True) if len(times))
         state, names = rig.after(names, contact, what, state)
         order.append(names)
     return order, state

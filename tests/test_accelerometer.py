@@ -41,9 +41,9 @@ def measured(rig: ss.Rig, seed: int = 1) -> ss.Record:
 )
 def test_what_the_sensors_are_known_to_add_is_taken_out(rig: ss.Rig) -> None:
     record = rig.stated(measured(rig))
-    found = ss.answers.time_frequency(record, frequencies=FEW, **RIG)
-    assert found.mechanism.name == "double stick-slip"
-    slips, mode = found.microslips, found.transition
+    maps = ss.answers.time_frequency(record, frequencies=FEW, **RIG)
+    assert maps.mechanism.name == "double stick-slip"
+    slips, mode = maps.microslips, maps.transition
     assert mode.status == "ok"
     assert (slips.status == "ok") == (record.channels["load"].mount is not None if "load" in record else False)
     assert slips.per_stick.value == pytest.approx(2, abs=0.3)
@@ -71,20 +71,20 @@ def test_what_the_sensors_are_known_to_add_is_taken_out(rig: ss.Rig) -> None:
     ids=["mount of 125 Hz", "mount of 1000 Hz", "noise", "the thesis's"],
 )
 def test_what_is_not_stated_is_named_and_nothing_told_surely(rig: ss.Rig, told: dict[str, float], why: str) -> None:
-    found = ss.answers.time_frequency(measured(rig), frequencies=FEW, **told)
-    assert found.mechanism is not None
-    assert found.mechanism.name == UNTOLD
-    assert np.isnan(found.mechanism.probability)
-    assert re.match(why, found.mechanism.reason)
-    assert found.estimates or "no transition" in found.notes[0]
-    assert all(each.status != "ok" for each in found.estimates)
+    maps = ss.answers.time_frequency(measured(rig), frequencies=FEW, **told)
+    assert maps.mechanism is not None
+    assert maps.mechanism.name == UNTOLD
+    assert np.isnan(maps.mechanism.probability)
+    assert re.match(why, maps.mechanism.reason)
+    assert maps.estimates or "no transition" in maps.notes[0]
+    assert all(estimate.status != "ok" for estimate in maps.estimates)
 
 
 def test_a_stated_mount_is_not_taken_for_the_contact_where_it_can_not_be_taken_out() -> None:
     record = ss.Rig().stated(measured(ss.Rig()))
-    found = ss.contact.mechanism(record)
-    assert found.name == UNTOLD
-    assert found.reason.startswith("a stands on a mount of 125 Hz")
+    mechanism = ss.contact.mechanism(record)
+    assert mechanism.name == UNTOLD
+    assert mechanism.reason.startswith("a stands on a mount of 125 Hz")
     assert ss.contact.find_microslips(record).per_stick.status.startswith("a stands on a mount of 125 Hz")
 
 
@@ -97,8 +97,8 @@ def test_a_mount_faster_than_the_record_is_none() -> None:
 
 def test_an_acceleration_alone_that_swings_may_be_its_mount() -> None:
     record = measured(PERFECT.having("a", mount=ss.rig.Mount(125, 0.1)))
-    found = ss.contact.mechanism(ss.Record.of({"a": record["a"]}, fs=record.fs))
-    assert found.name == UNTOLD or "an accelerometer whose mount rings looks alike" in found.reason
+    mechanism = ss.contact.mechanism(ss.Record.of({"a": record["a"]}, fs=record.fs))
+    assert mechanism.name == UNTOLD or "an accelerometer whose mount rings looks alike" in mechanism.reason
 
 
 def test_a_clean_record_from_rest_on_has_no_mount_and_no_offset() -> None:
@@ -106,9 +106,9 @@ def test_a_clean_record_from_rest_on_has_no_mount_and_no_offset() -> None:
     drive = ss.drives.HarmonicBase(0.65e-3, frequency=2.5)
     slider = ss.Oscillator(mass=2.42, stiffness=2310, damping=0.1196, law=contact, drive=drive)
     clean = ss.simulate(slider, duration=4).record(fs=4000)
-    found = ss.answers.time_frequency(clean, frequencies=FEW)
-    assert found.mechanism.name == "double stick-slip"
-    assert found.transition.frequency.status == "ok"
-    assert found.transition.frequency.value == pytest.approx(TRUE, rel=1e-4)
+    maps = ss.answers.time_frequency(clean, frequencies=FEW)
+    assert maps.mechanism.name == "double stick-slip"
+    assert maps.transition.frequency.status == "ok"
+    assert maps.transition.frequency.value == pytest.approx(TRUE, rel=1e-4)
     # its start from rest is no offset: the first two sticks hold one micro-slip, all others two
-    assert found.microslips.counts == (1, 1, *[2] * 18)
+    assert maps.microslips.counts == (1, 1, *[2] * 18)

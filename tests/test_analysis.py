@@ -134,9 +134,9 @@ def test_constants_that_are_not_used_are_said_and_left_out() -> None:
 def test_a_balance_of_before_is_made_anew_by_other_constants() -> None:
     record = ss.datasets.demo()
     first = ss.friction_force(record, mass=2.42, stiffness=2310, contact="ground")
-    told = analyze(first)
-    assert told.settings["mass"] == 2.42
-    assert np.array_equal(told.record["friction"], first["friction"])
+    findings = analyze(first)
+    assert findings.settings["mass"] == 2.42
+    assert np.array_equal(findings.record["friction"], first["friction"])
     again = analyze(first, mass=3.0, stiffness=2310)
     assert again.settings["mass"] == 3.0
     direct = analyze(record, mass=3.0, stiffness=2310)
@@ -163,14 +163,14 @@ def test_a_normal_load_is_taken_by_its_magnitude_or_missed_aloud(reading: float,
 
 
 def test_records_left_out_of_the_coefficient_are_named() -> None:
-    found = [replace(analyze(sliding(0.3 * n, normal=n)), name=f"load {n}") for n in (2.0, 4.0)]
+    variants = [replace(analyze(sliding(0.3 * n, normal=n)), name=f"load {n}") for n in (2.0, 4.0)]
     turning = ss.Record.of(
         {"theta": sliding()["x"], "friction": sliding()["friction"], "normal": np.full(TIME.size, 3.0)},
         fs=FS, units={"friction": "N m"},
     )  # fmt: skip
     torque = replace(analyze(turning), name="torque")
-    mute = replace(found[0].having(loops=None), name="mute")
-    comparison = compare([*found, torque, mute])
+    mute = replace(variants[0].having(loops=None), name="mute")
+    comparison = compare([*variants, torque, mute])
     assert comparison.coefficient is not None
     assert comparison.coefficient.value == pytest.approx(0.3, abs=0.01)
     assert "The friction of torque is a torque" in " ".join(comparison.notes)
@@ -227,9 +227,9 @@ def test_without_loads_there_is_a_table_and_a_note() -> None:
 
 def test_results_are_plain_data() -> None:
     findings = analyze(sliding(normal=3.0))
-    told = json.loads(json.dumps(ss.summary(findings).data(), allow_nan=False))
-    assert told["normal_load"] == 3.0
-    assert {"friction coefficient", "sliding friction"} <= {estimate["name"] for estimate in told["estimates"]}
+    data = json.loads(json.dumps(ss.summary(findings).data(), allow_nan=False))
+    assert data["normal_load"] == 3.0
+    assert {"friction coefficient", "sliding friction"} <= {estimate["name"] for estimate in data["estimates"]}
     assert isinstance(compare([findings, findings]), Comparison)
     assert isinstance(findings, Findings)
 

@@ -44,16 +44,16 @@ def of(*names: str, stated: bool = False, **instead: np.ndarray) -> ss.Record:
 
 
 def words(found: ss.answers.Findings) -> str:
-    told = ss.summary(found)
-    return " ".join([*told.headline, *told.cautions, *told.notes])
+    story = ss.summary(found)
+    return " ".join([*story.headline, *story.cautions, *story.notes])
 
 
 def test_a_displacement_and_a_load_cell_are_enough() -> None:
     bare = ss.Record.of({name: settled()[name] for name in ("x", "load")}, fs=4000)
-    found = ss.analyze(bare, **RIG)
-    assert found.level is not None
-    assert found.level.value == pytest.approx(1.1, rel=0.05)
-    assert "nothing is stated" in words(found)
+    findings = ss.analyze(bare, **RIG)
+    assert findings.level is not None
+    assert findings.level.value == pytest.approx(1.1, rel=0.05)
+    assert "nothing is stated" in words(findings)
 
 
 def test_a_displacement_that_does_not_change_is_named() -> None:
@@ -64,31 +64,31 @@ def test_a_displacement_that_does_not_change_is_named() -> None:
 
 def test_no_mount_is_told_by_forces_that_differ_from_the_start() -> None:
     still = of("x", "z", "a", "load", stated=True, z=np.full(len(settled()), 1e-8))
-    found = ss.analyze(still, **RIG)
-    assert found.comparison is None
-    assert "z does not change" in words(found)
-    assert not [each.name for each in found.estimates if "mount" in each.name]
-    assert "wrong sign" not in words(found)
+    findings = ss.analyze(still, **RIG)
+    assert findings.comparison is None
+    assert "z does not change" in words(findings)
+    assert not [estimate.name for estimate in findings.estimates if "mount" in estimate.name]
+    assert "wrong sign" not in words(findings)
     assert ss.balance.compare_force(still, **RIG).resonances == ()
 
 
 def test_a_contact_that_holds_at_its_turns_alone_does_not_never_stick() -> None:
-    found = ss.analyze(settled(), **RIG)
-    assert found.sticks is not None
-    assert found.sticks.share.value == pytest.approx(0.0638, abs=0.001)
-    assert not [each for each in found.sticks.events if each.kind == "stick"]
-    assert re.search(r"rests only briefly as it turns round, 6\.\d+ % of the time", words(found))
-    assert "never sticks" not in words(found)
-    assert "a rigid contact read without lag leaves" in words(found)
+    findings = ss.analyze(settled(), **RIG)
+    assert findings.sticks is not None
+    assert findings.sticks.share.value == pytest.approx(0.0638, abs=0.001)
+    assert not [event for event in findings.sticks.events if event.kind == "stick"]
+    assert re.search(r"rests only briefly as it turns round, 6\.\d+ % of the time", words(findings))
+    assert "never sticks" not in words(findings)
+    assert "a rigid contact read without lag leaves" in words(findings)
 
 
 def test_a_mount_that_is_not_stated_is_told_beside_the_friction() -> None:
     for names in (("x", "z", "a", "load"), ("x", "z", "a")):
-        found = ss.analyze(of(*names), **RIG)
-        assert found.level is not None
-        assert "not stated" in found.level.status
-        assert "which the interval leaves out" in found.level.status
-        assert "none shows" not in words(found)
+        findings = ss.analyze(of(*names), **RIG)
+        assert findings.level is not None
+        assert "not stated" in findings.level.status
+        assert "which the interval leaves out" in findings.level.status
+        assert "none shows" not in words(findings)
 
 
 def test_a_mount_found_is_said_of_its_own_sensor() -> None:
@@ -101,27 +101,27 @@ def test_a_mount_found_is_said_of_its_own_sensor() -> None:
 
 def test_sensors_that_are_not_there_or_left_out_are_not_missed() -> None:
     for names in (("x", "z"), ("x", "z", "load")):
-        found = ss.analyze(of(*names, stated=True), **RIG)
-        assert "mounted" not in words(found)
-        assert found.level is not None
-        assert kinds(found.level.status) == {UNTRIED}
-        assert stands(found.level.status)
+        findings = ss.analyze(of(*names, stated=True), **RIG)
+        assert "mounted" not in words(findings)
+        assert findings.level is not None
+        assert kinds(findings.level.status) == {UNTRIED}
+        assert stands(findings.level.status)
 
 
 def test_a_mass_that_contradicts_the_record_is_told_in_the_headline() -> None:
-    found = with_a_wrong_mass()
-    assert found.level is not None
-    assert re.search(r"a mass of 2\.4\d* kg", found.level.status)
-    assert "not to be trusted" in " ".join(ss.summary(found).headline)
-    assert found.sticks is not None
-    assert found.sticks.share.status != "ok"
+    findings = with_a_wrong_mass()
+    assert findings.level is not None
+    assert re.search(r"a mass of 2\.4\d* kg", findings.level.status)
+    assert "not to be trusted" in " ".join(ss.summary(findings).headline)
+    assert findings.sticks is not None
+    assert findings.sticks.share.status != "ok"
 
 
 def test_micro_slips_are_not_sure_where_the_load_strays_from_every_contact() -> None:
-    found = ss.analyze(told(measured(2.5, seconds=3.0)[0]), **{**RIG, "mass": 2.9})
-    assert found.sticks is not None
-    assert found.sticks.microslips is not None
-    assert "likeliest contact" in found.sticks.microslips.status
+    findings = ss.analyze(told(measured(2.5, seconds=3.0)[0]), **{**RIG, "mass": 2.9})
+    assert findings.sticks is not None
+    assert findings.sticks.microslips is not None
+    assert "likeliest contact" in findings.sticks.microslips.status
 
 
 def test_a_base_that_is_not_measured_is_told_and_negative_friction_is_never_sure() -> None:
@@ -138,27 +138,27 @@ def test_a_base_that_is_not_measured_is_told_and_negative_friction_is_never_sure
 
 
 def test_a_mass_found_in_the_record_is_told_beside_the_contact() -> None:
-    found = ss.analyze(settled(2.5), stiffness=2310, damping=RIG["damping"])
-    assert found.stiffness is not None
-    assert "the mass (found in this record) is not stated" in found.stiffness.status
+    findings = ss.analyze(settled(2.5), stiffness=2310, damping=RIG["damping"])
+    assert findings.stiffness is not None
+    assert "the mass (found in this record) is not stated" in findings.stiffness.status
 
 
 def test_advice_holds_on_the_page_too() -> None:
-    found = with_a_wrong_mass()
-    assert "record.with_details(" not in words(found)
-    assert "[sensors]" in words(found)
+    findings = with_a_wrong_mass()
+    assert "record.with_details(" not in words(findings)
+    assert "[sensors]" in words(findings)
 
 
 def test_a_sound_record_of_sensors_that_are_not_described_is_trusted_with_a_caution() -> None:
-    found = of_the_demo()
-    told = ss.summary(found)
-    assert "not to be trusted" not in " ".join(told.headline)
-    assert "which the interval leaves out" in " ".join(told.cautions)
-    assert found.level is not None
-    assert "delay" not in found.level.status  # one was looked for, and none was taken out
+    findings = of_the_demo()
+    story = ss.summary(findings)
+    assert "not to be trusted" not in " ".join(story.headline)
+    assert "which the interval leaves out" in " ".join(story.cautions)
+    assert findings.level is not None
+    assert "delay" not in findings.level.status  # one was looked for, and none was taken out
 
 
 def test_how_far_a_contact_gives_is_told_in_readable_units() -> None:
-    found = of_the_demo()
-    assert re.search(r"up to 1\.1\d* N it moves -?\d+(\.\d+)? [µn]?m forward", words(found))
-    assert "e-0" not in words(found).split("it moves", 1)[1].split("would be seen", 1)[0]
+    findings = of_the_demo()
+    assert re.search(r"up to 1\.1\d* N it moves -?\d+(\.\d+)? [µn]?m forward", words(findings))
+    assert "e-0" not in words(findings).split("it moves", 1)[1].split("would be seen", 1)[0]

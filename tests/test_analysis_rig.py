@@ -64,8 +64,8 @@ def told(path: Path, *arguments: str) -> dict[str, dict[str, object]]:
     channels = [part for column in COLUMNS for part in ("--channels", column)]
     run = CliRunner().invoke(main, ["analyze", str(path), *channels, "--json", *arguments], catch_exceptions=False)
     assert run.exit_code == 0, run.output
-    found = json.loads(run.stdout)
-    return {each["name"]: each for each in found["estimates"]} | {"notes": {"all": " ".join(found["notes"])}}
+    data = json.loads(run.stdout)
+    return {each["name"]: each for each in data["estimates"]} | {"notes": {"all": " ".join(data["notes"])}}
 
 
 def test_the_command_line_tells_the_truth_of_a_rig_whose_sensors_are_known(readings: ss.Record, tmp_path: Path) -> None:
@@ -93,12 +93,12 @@ def test_what_is_not_known_of_the_sensors_is_found_or_said(readings: ss.Record, 
 
 def test_without_accelerometer_or_load_cell_it_falls_back_and_says_so(readings: ss.Record) -> None:
     record = ss.Record.of({name: readings[name] for name in "xz"}, fs=readings.fs)
-    found = ss.analyze(record, mass=2.42, stiffness=2310)
-    assert found.settings["differentiation"] == "smoother"
-    assert found.stiffness is None
-    assert any("neither an accelerometer nor a load cell" in note for note in found.notes)
-    assert found.level is not None
-    assert found.level.value == pytest.approx(1.1, rel=0.05)
+    findings = ss.analyze(record, mass=2.42, stiffness=2310)
+    assert findings.settings["differentiation"] == "smoother"
+    assert findings.stiffness is None
+    assert any("neither an accelerometer nor a load cell" in note for note in findings.notes)
+    assert findings.level is not None
+    assert findings.level.value == pytest.approx(1.1, rel=0.05)
 
 
 @pytest.mark.parametrize(
@@ -112,25 +112,25 @@ def test_without_accelerometer_or_load_cell_it_falls_back_and_says_so(readings: 
 )
 def test_a_sensor_with_the_wrong_sign_is_named(short: ss.Record, turned: dict[str, float], words: str) -> None:
     samples = {name: turned.get(name, 1.0) * short[name] for name in short}
-    found = ss.analyze(ss.Record.of(samples, fs=short.fs), mass=2.42, stiffness=2310, damping=0)
-    assert words in " ".join(ss.summary(found).cautions)
+    findings = ss.analyze(ss.Record.of(samples, fs=short.fs), mass=2.42, stiffness=2310, damping=0)
+    assert words in " ".join(ss.summary(findings).cautions)
 
 
 def test_swapped_displacements_are_named(readings: ss.Record) -> None:
     samples = {**{name: readings[name] for name in readings}, "x": readings["z"], "z": readings["x"]}
-    found = ss.analyze(ss.Record.of(samples, fs=readings.fs), mass=2.42, stiffness=2310, damping=0)
-    assert "differ by more than noise" in " ".join(ss.summary(found).cautions)
-    assert found.stiffness is None or found.stiffness.status != "ok"
+    findings = ss.analyze(ss.Record.of(samples, fs=readings.fs), mass=2.42, stiffness=2310, damping=0)
+    assert "differ by more than noise" in " ".join(ss.summary(findings).cautions)
+    assert findings.stiffness is None or findings.stiffness.status != "ok"
 
 
 def test_a_load_cell_at_the_end_of_its_range_is_named_and_left_out(short: ss.Record) -> None:
     samples = {**{name: short[name] for name in short}, "load": np.clip(short["load"], -0.6, 0.6)}
-    found = ss.analyze(ss.Record.of(samples, fs=short.fs), mass=2.42, stiffness=2310, damping=0)
-    assert found.level is not None
-    assert found.level.value == pytest.approx(1.1, rel=0.01)
-    assert any(fault.channel == "load" and fault.kind == "clipped" for fault in found.faults)
-    assert found.comparison is not None
-    assert "end of the range" in found.comparison.status
+    findings = ss.analyze(ss.Record.of(samples, fs=short.fs), mass=2.42, stiffness=2310, damping=0)
+    assert findings.level is not None
+    assert findings.level.value == pytest.approx(1.1, rel=0.01)
+    assert any(fault.channel == "load" and fault.kind == "clipped" for fault in findings.faults)
+    assert findings.comparison is not None
+    assert "end of the range" in findings.comparison.status
     stated = ss.Record.of(samples, fs=short.fs).with_details("load", mount=(250.0, 0.05))
     notes = " ".join(ss.analyze(stated, mass=2.42, stiffness=2310, damping=0).notes)
     assert "which are left to the others" in notes
@@ -140,21 +140,21 @@ def test_a_load_cell_at_the_end_of_its_range_is_named_and_left_out(short: ss.Rec
 def test_a_sensor_with_the_wrong_sign_is_named_without_a_load_cell_too(short: ss.Record, turned: str) -> None:
     wrong = {name: (-1.0 if name == turned else 1.0) * short[name] for name in ("x", "z", "a")}
     units = {"x": "m", "z": "m", "a": "m/s^2"}
-    found = ss.analyze(ss.Record.of(wrong, fs=short.fs, units=units), mass=2.42, stiffness=2310)
-    assert found.consistency is not None
-    assert f"{turned} has the wrong sign" in found.consistency.status
-    assert found.loops is not None
-    assert f"{turned} has the wrong sign" in found.loops.level.status
-    assert f"{turned} has the wrong sign" in ss.summary(found).headline[0]
-    assert "slides against" not in " ".join(ss.summary(found).headline)
-    assert "consistency" in [plate.name for plate in ss.summary(found).plates]
+    findings = ss.analyze(ss.Record.of(wrong, fs=short.fs, units=units), mass=2.42, stiffness=2310)
+    assert findings.consistency is not None
+    assert f"{turned} has the wrong sign" in findings.consistency.status
+    assert findings.loops is not None
+    assert f"{turned} has the wrong sign" in findings.loops.level.status
+    assert f"{turned} has the wrong sign" in ss.summary(findings).headline[0]
+    assert "slides against" not in " ".join(ss.summary(findings).headline)
+    assert "consistency" in [plate.name for plate in ss.summary(findings).plates]
 
 
 def test_a_delay_longer_than_a_cycle_is_said(readings: ss.Record) -> None:
     record = ss.Record.of({name: readings[name] for name in ("x", "z")}, fs=readings.fs)
     record = record.with_details("x", delay=1.26).with_details("z", delay=1.26)
-    found = ss.analyze(record, mass=2.42, stiffness=2310)
-    assert "the delay of x and z, 1.26 s (3.15 cycles" in " ".join(ss.summary(found).cautions)
+    findings = ss.analyze(record, mass=2.42, stiffness=2310)
+    assert "the delay of x and z, 1.26 s (3.15 cycles" in " ".join(ss.summary(findings).cautions)
 
 
 def test_the_page_shows_what_its_numbers_say(short: ss.Record) -> None:
@@ -170,9 +170,9 @@ def test_the_page_shows_what_its_numbers_say(short: ss.Record) -> None:
 def test_a_base_that_is_not_measured_is_taken_to_be_at_rest_and_a_spring_found(short: ss.Record) -> None:
     alone = ss.Record.of({"x": short["x"], "a": short["a"]}, fs=short.fs, units={"x": "m", "a": "m/s^2"})
     assert "taken to be at rest" in " ".join(ss.analyze(alone, mass=2.42, stiffness=2310).notes)
-    found = ss.analyze(short, mass=2.42)
-    assert found.settings["stiffness"] == pytest.approx(2310, rel=0.01)
-    assert "is found from how the mass slides" in " ".join(found.notes)
+    findings = ss.analyze(short, mass=2.42)
+    assert findings.settings["stiffness"] == pytest.approx(2310, rel=0.01)
+    assert "is found from how the mass slides" in " ".join(findings.notes)
 
 
 def plain(readings: ss.Record, *names: str, **instead: np.ndarray) -> ss.Record:
@@ -181,11 +181,11 @@ def plain(readings: ss.Record, *names: str, **instead: np.ndarray) -> ss.Record:
 
 
 def test_without_mass_and_spring_both_are_weighed_by_the_load_cell(readings: ss.Record) -> None:
-    found = ss.analyze(plain(readings, "x", "z", "a", "load"))
-    assert found.level is not None
-    assert found.level.value == pytest.approx(1.1, rel=0.005)
-    assert found.settings["mass"] == pytest.approx(2.42, rel=0.02)
-    assert "found from what the load cell measures" in " ".join(found.notes)
+    findings = ss.analyze(plain(readings, "x", "z", "a", "load"))
+    assert findings.level is not None
+    assert findings.level.value == pytest.approx(1.1, rel=0.005)
+    assert findings.settings["mass"] == pytest.approx(2.42, rel=0.02)
+    assert "found from what the load cell measures" in " ".join(findings.notes)
 
 
 def test_without_mass_spring_and_load_cell_the_friction_per_mass_is_said(short: ss.Record) -> None:
@@ -199,23 +199,23 @@ def test_a_base_that_moves_unseen_leaves_the_load_cell_alone(readings: ss.Record
     record = plain(readings, "x", "load").with_details("x", delay=0.0389 / 30.91)
     if stated:
         record = record.with_details("load", mount=(250.0, 0.05), inertia=0.05)
-    found = ss.analyze(record, mass=2.42, stiffness=2310)
-    assert "another force than the load cell measures" in " ".join(found.notes)
-    assert found.level is not None
-    assert found.level.value == pytest.approx(1.1, rel=0.001 if stated else 0.01)
-    assert found.breakaway is not None
-    low, high = found.breakaway.ratio.interval
-    assert (found.breakaway.ratio.status == "ok" and low - 0.01 < 1 < high) or not stated
-    assert stated or "not stated" in found.breakaway.ratio.status
+    findings = ss.analyze(record, mass=2.42, stiffness=2310)
+    assert "another force than the load cell measures" in " ".join(findings.notes)
+    assert findings.level is not None
+    assert findings.level.value == pytest.approx(1.1, rel=0.001 if stated else 0.01)
+    assert findings.breakaway is not None
+    low, high = findings.breakaway.ratio.interval
+    assert (findings.breakaway.ratio.status == "ok" and low - 0.01 < 1 < high) or not stated
+    assert stated or "not stated" in findings.breakaway.ratio.status
 
 
 @pytest.mark.parametrize("name", ["a", "load", "z"])
 def test_a_sensor_that_does_not_change_is_left_out_aloud(short: ss.Record, name: str) -> None:
     still = plain(short, "x", "z", "a", "load", **{name: np.full(len(short), 0.001)})
-    found = ss.analyze(still, mass=2.42, stiffness=2310)
-    assert found.level is not None
-    assert found.level.value == pytest.approx(1.1, rel=0.01)
-    assert f"{name} does not change" in " ".join(found.notes)
+    findings = ss.analyze(still, mass=2.42, stiffness=2310)
+    assert findings.level is not None
+    assert findings.level.value == pytest.approx(1.1, rel=0.01)
+    assert f"{name} does not change" in " ".join(findings.notes)
 
 
 def test_blocks_tell_what_the_whole_tells(readings: ss.Record) -> None:
@@ -225,16 +225,16 @@ def test_blocks_tell_what_the_whole_tells(readings: ss.Record) -> None:
     said: list[str] = []
     rig = ss.rig.rig_settings({"mass": 2.42, "stiffness": 2310, "damping": 0})
     halves = (record.rows(first, first + len(record) // 2) for first in (0, len(record) // 2))
-    found = ss.answers.analyze_blocks(halves, rig=rig, progress=said.append)
+    blocks = ss.answers.analyze_blocks(halves, rig=rig, progress=said.append)
     assert said == ["block 1, from 0 s", f"block 2, from {len(record) // 2 / 4000:.5g} s"]
-    assert found.level is not None
-    assert found.level.value == pytest.approx(1.1, rel=0.0005)
-    assert found.stiffness is not None
-    assert found.stiffness.value == pytest.approx(192000, rel=0.002)
-    assert found.sticks is not None
-    assert found.sticks.events[-1].time > len(record) / 4000 * 0.75
-    assert "2 blocks" in found.notes[0]
-    assert len(found.record) > 0.99 * len(record) // 2  # less what the delays take
+    assert blocks.level is not None
+    assert blocks.level.value == pytest.approx(1.1, rel=0.0005)
+    assert blocks.stiffness is not None
+    assert blocks.stiffness.value == pytest.approx(192000, rel=0.002)
+    assert blocks.sticks is not None
+    assert blocks.sticks.events[-1].time > len(record) / 4000 * 0.75
+    assert "2 blocks" in blocks.notes[0]
+    assert len(blocks.record) > 0.99 * len(record) // 2  # less what the delays take
 
 
 def test_blocks_that_were_asked_are_not_kept() -> None:
@@ -261,7 +261,7 @@ def test_a_block_that_answers_nothing_is_named_and_left_out(short: ss.Record) ->
     moving = ss.Record.of(
         {"x": np.sin(20 * time), "friction": np.sign(np.cos(20 * time)) + 0.01 * np.sin(7919.0 * time)}, fs=4000
     )
-    found = ss.answers.analyze_blocks([moving, still])
-    assert any("Block 2" in note and "answers nothing" in note for note in found.notes)
+    blocks = ss.answers.analyze_blocks([moving, still])
+    assert any("Block 2" in note and "answers nothing" in note for note in blocks.notes)
     with pytest.raises(ss.errors.EstimateError, match="none of 1 blocks"):
         ss.answers.analyze_blocks([still])

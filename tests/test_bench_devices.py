@@ -120,7 +120,7 @@ def test_a_unit_keeps_time_by_the_clock() -> None:
 
 
 def test_devices_are_found_by_name() -> None:
-    assert {found.kind for found in devices()} >= {"sim"}
+    assert {device.kind for device in devices()} >= {"sim"}
     device = find_device("rig", {"rig": {"kind": "sim", "system": "FD-4", "rig": "perfect", "fs": "500 Hz"}})
     assert (device.name, device.kind, device.fs) == ("rig", "sim", 500.0)
     with pytest.raises(ss.errors.ModelError, match="perhaps sim"):

@@ -86,7 +86,7 @@ class Card:
 def test_a_sound_card(monkeypatch: pytest.MonkeyPatch) -> None:
     card = {"name": "USB microphone", "max_input_channels": 2}
     module(monkeypatch, "sounddevice", InputStream=Card, PortAudioError=RuntimeError, query_devices=lambda: [card])
-    assert next(found.there for found in devices() if found.kind == "sound") == ("USB microphone (2 inputs)",)
+    assert next(device.there for device in devices() if device.kind == "sound") == ("USB microphone (2 inputs)",)
     table = {"kind": "sound", "fs": 8000, "channels": {"sound": {"at": "#2 [1] @ 0.1 1/Pa", "serial": "M1"}}}
     device = find_device("ear", {"ear": table})
     with device.open() as stream:
@@ -179,7 +179,7 @@ def test_a_unit_of_national_instruments(ni: None) -> None:
     }  # fmt: skip
     device = find_device("daq", {"daq": table})
     assert device.model == "USB-6211, serial BEEF"
-    assert next(found.there for found in devices() if found.kind == "ni") == ("Dev1: USB-6211",)
+    assert next(device.there for device in devices() if device.kind == "ni") == ("Dev1: USB-6211",)
     with device.open() as stream:
         got = in_si(device, next(blocks(stream, count=20)))
         stream.drive("base", Tone(1e-3, 30.0, 0.5))
@@ -266,7 +266,7 @@ def test_a_record_is_played(tmp_path: Path) -> None:
 
 def test_a_package_that_is_missing_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "LDAQ", None)
-    found = next(found for found in devices() if found.kind == "ldaq")
-    assert found.missing.startswith("LDAQ: pip install")
+    first = next(device for device in devices() if device.kind == "ldaq")
+    assert first.missing.startswith("LDAQ: pip install")
     with pytest.raises(ss.errors.ModelError, match="pip install"):
         find_device("ldaq", {"ldaq": {"acquisition": "a.B", "channels": {"x": "c [mm]"}}})

@@ -23,13 +23,13 @@ def driven(law: ss.laws.Coulomb | ss.laws.CompliantContact, *, noise: float = 2e
 
 @pytest.mark.parametrize("static", [1.0, 1.1, 1.3])
 def test_static_friction_is_found_whether_it_is_higher_or_not(static: float) -> None:
-    found = ss.cycle.breakaway(driven(ss.laws.Coulomb(1.0, static=static)))
-    assert found.forward is not None
-    assert found.back is not None
-    for each in (found.forward, found.back, found.ratio):
+    breakaway = ss.cycle.breakaway(driven(ss.laws.Coulomb(1.0, static=static)))
+    assert breakaway.forward is not None
+    assert breakaway.back is not None
+    for each in (breakaway.forward, breakaway.back, breakaway.ratio):
         assert each.value == pytest.approx(static, rel=0.03)
-    assert found.ringing_forward is None
-    assert found.status == "ok"
+    assert breakaway.ringing_forward is None
+    assert breakaway.status == "ok"
 
 
 def heard(
@@ -55,15 +55,15 @@ def test_a_rig_of_which_nothing_is_stated_never_bears_less_than_it_slides(
     record = ss.friction_force(heard(2.5, law, names), method=method, **RIG)
     refused = ""
     try:
-        found = ss.cycle.breakaway(record)
+        breakaway = ss.cycle.breakaway(record)
     except EstimateError as error:
         refused = str(error)
     if refused:
         assert "strays" in refused
         return
-    assert found.ratio.includes(static)
-    sure = found.ratio.interval[1] - found.ratio.interval[0] < 0.15
-    assert sure or found.status != "ok"
+    assert breakaway.ratio.includes(static)
+    sure = breakaway.ratio.interval[1] - breakaway.ratio.interval[0] < 0.15
+    assert sure or breakaway.status != "ok"
 
 
 def test_a_pull_on_a_mass_that_rings_on_its_contact_is_flagged() -> None:
@@ -106,8 +106,8 @@ def test_a_sensor_whose_zero_is_off_changes_neither_ratio_nor_presliding() -> No
 
 def test_a_slip_at_the_end_of_its_stroke_has_no_swing() -> None:
     record = told(measured(8.7, 0.0, 3.0)[0])
-    found = ss.cycle.breakaway(ss.friction_force(record, method="motion", **RIG))
-    for swing in (found.swing_forward, found.swing_back):
+    breakaway = ss.cycle.breakaway(ss.friction_force(record, method="motion", **RIG))
+    for swing in (breakaway.swing_forward, breakaway.swing_back):
         assert swing is None or np.isfinite(swing.value)
 
 
@@ -126,27 +126,27 @@ def test_breakaway_does_not_hang_on_units_of_motion_or_on_its_sign() -> None:
 
 @pytest.mark.parametrize("stiffness", [2e4, 2e5])
 def test_a_contact_that_gives_way_is_told_with_its_stiffness(stiffness: float) -> None:
-    found = ss.cycle.presliding(driven(ss.laws.CompliantContact(1.0, stiffness=stiffness, damping=20), noise=2e-7))
-    assert found.verdict == "gives way"
-    assert found.stiffness is not None
-    assert found.stiffness.value == pytest.approx(stiffness, rel=0.15)  # low: smoothing blurs the friction alone
-    assert found.backlash is not None
-    assert abs(found.backlash.value) < 0.1 / stiffness * 2
+    presliding = ss.cycle.presliding(driven(ss.laws.CompliantContact(1.0, stiffness=stiffness, damping=20), noise=2e-7))
+    assert presliding.verdict == "gives way"
+    assert presliding.stiffness is not None
+    assert presliding.stiffness.value == pytest.approx(stiffness, rel=0.15)  # low: smoothing blurs the friction alone
+    assert presliding.backlash is not None
+    assert abs(presliding.backlash.value) < 0.1 / stiffness * 2
 
 
 def test_a_rigid_contact_is_called_rigid() -> None:
-    found = ss.cycle.presliding(driven(ss.laws.Coulomb(1.0)))
-    assert found.verdict == "rigid"
-    assert found.stiffness is None
-    assert "would be seen" in found.evidence
+    presliding = ss.cycle.presliding(driven(ss.laws.Coulomb(1.0)))
+    assert presliding.verdict == "rigid"
+    assert presliding.stiffness is None
+    assert "would be seen" in presliding.evidence
 
 
 def test_a_mass_that_moves_against_its_load_leaves_it_open() -> None:
     record = driven(ss.laws.Coulomb(1.0))
     moved = record["x"] - 3e-5 * record["friction"]  # the sensor's foot gives way, not the contact
-    told = ss.cycle.presliding(ss.Record.of({"x": moved, "friction": record["friction"]}, fs=FS))
-    assert told.verdict == "can not be told"
-    assert "against its load" in told.status
+    presliding = ss.cycle.presliding(ss.Record.of({"x": moved, "friction": record["friction"]}, fs=FS))
+    assert presliding.verdict == "can not be told"
+    assert "against its load" in presliding.status
 
 
 def test_play_is_measured() -> None:
@@ -164,11 +164,11 @@ def test_play_is_measured() -> None:
             spring, play = 0.0, -0.5e-3 * np.sign(way)
         friction[row] = spring
     record = ss.Record.of({"x": x, "friction": friction}, fs=1000)
-    found = ss.cycle.presliding(record)
-    assert found.backlash is not None
-    assert found.backlash.value == pytest.approx(1e-3, rel=0.1)
-    assert found.stiffness is not None
-    assert found.stiffness.value == pytest.approx(5000, rel=0.05)
+    presliding = ss.cycle.presliding(record)
+    assert presliding.backlash is not None
+    assert presliding.backlash.value == pytest.approx(1e-3, rel=0.1)
+    assert presliding.stiffness is not None
+    assert presliding.stiffness.value == pytest.approx(5000, rel=0.05)
 
 
 def test_ringing_after_each_breakaway_is_named() -> None:
@@ -178,8 +178,8 @@ def test_ringing_after_each_breakaway_is_named() -> None:
     way = np.sign(v)
     friction = way * (2 + 0.6 * np.exp(-since / 0.1) * np.cos(2 * np.pi * 47 * since))
     friction += np.random.default_rng(0).normal(0, 0.005, time.size)
-    found = ss.cycle.breakaway(ss.Record.of({"x": np.sin(np.pi * time) / np.pi, "friction": friction}, fs=1000))
-    for each in (found.ringing_forward, found.ringing_back):
+    breakaway = ss.cycle.breakaway(ss.Record.of({"x": np.sin(np.pi * time) / np.pi, "friction": friction}, fs=1000))
+    for each in (breakaway.ringing_forward, breakaway.ringing_back):
         assert each is not None
         assert each.value == pytest.approx(47, rel=0.03)
 
@@ -188,11 +188,11 @@ def test_a_friction_that_swings_all_the_while_is_flagged() -> None:
     time = np.arange(12000) / 1000
     v = np.cos(np.pi * time)
     shaken = np.sign(v) * (2 + 1.5 * np.sin(2 * np.pi * 23 * time) * (v < 0))
-    found = ss.cycle.breakaway(ss.Record.of({"x": np.sin(np.pi * time) / np.pi, "friction": shaken}, fs=1000))
-    assert found.swing_forward is not None
-    assert found.swing_forward.status == "ok" or "cycles" in found.swing_forward.status
-    assert found.swing_back is not None
-    assert "no steady friction" in found.swing_back.status
+    breakaway = ss.cycle.breakaway(ss.Record.of({"x": np.sin(np.pi * time) / np.pi, "friction": shaken}, fs=1000))
+    assert breakaway.swing_forward is not None
+    assert breakaway.swing_forward.status == "ok" or "cycles" in breakaway.swing_forward.status
+    assert breakaway.swing_back is not None
+    assert "no steady friction" in breakaway.swing_back.status
 
 
 def test_strokes_are_needed() -> None:
@@ -212,20 +212,20 @@ def sawtooth(rate: float, *, period: float = 0.5, noise: float = 1e-3, fs: float
 
 @pytest.mark.parametrize("rate", [0.1, 3.0])
 def test_a_pulled_slider_is_loaded_at_the_rate_of_its_spring(rate: float) -> None:
-    found = ss.balance.pulled_slider(sawtooth(rate, noise=1e-3 * rate))
-    assert found.regime == "stick-slip"
-    assert found.loading_rate.value == pytest.approx(rate, rel=0.02)
-    assert found.frequency.value == pytest.approx(2.0, rel=0.01)
-    assert found.drop.value == pytest.approx(0.5 * rate, rel=0.1)
+    slider = ss.balance.pulled_slider(sawtooth(rate, noise=1e-3 * rate))
+    assert slider.regime == "stick-slip"
+    assert slider.loading_rate.value == pytest.approx(rate, rel=0.02)
+    assert slider.frequency.value == pytest.approx(2.0, rel=0.01)
+    assert slider.drop.value == pytest.approx(0.5 * rate, rel=0.1)
 
 
 def test_a_slider_that_swings_is_not_called_stick_slip() -> None:
     time = np.arange(20000) / 1000
     wave = 1 + 0.1 * np.sin(2 * np.pi * 3 * time) + np.random.default_rng(2).normal(0, 1e-3, time.size)
-    found = ss.balance.pulled_slider(ss.Record.of({"load": wave}, fs=1000))
-    assert found.regime == "inertial"
-    assert found.rise_over_fall.value == pytest.approx(1.0, abs=0.1)
-    assert "does not stick" in found.loading_rate.status
+    slider = ss.balance.pulled_slider(ss.Record.of({"load": wave}, fs=1000))
+    assert slider.regime == "inertial"
+    assert slider.rise_over_fall.value == pytest.approx(1.0, abs=0.1)
+    assert "does not stick" in slider.loading_rate.status
 
 
 def test_a_force_that_does_not_drop_tells_nothing_of_slips() -> None:
@@ -237,6 +237,6 @@ def test_a_slip_that_the_end_of_the_record_cuts_is_not_counted() -> None:
     """The last drop is half as far: of a few that would be seen in their mean."""
     time = np.arange(1750) / 1000  # five swings and a quarter beyond the last maximum
     wave = 1 + 0.1 * np.cos(2 * np.pi * 3 * time) + np.random.default_rng(3).normal(0, 1e-4, time.size)
-    found = ss.balance.pulled_slider(ss.Record.of({"load": wave}, fs=1000))
-    assert found.drop.value == pytest.approx(0.2, rel=0.02)
-    assert len(found.slips) == 4
+    slider = ss.balance.pulled_slider(ss.Record.of({"load": wave}, fs=1000))
+    assert slider.drop.value == pytest.approx(0.2, rel=0.02)
+    assert len(slider.slips) == 4

@@ -33,22 +33,22 @@ def answered(frequency: float, soft: bool, late: bool) -> ss.contact.Cause:
 @pytest.mark.parametrize("late", [False, True])
 @pytest.mark.parametrize(("frequency", "soft"), [(2.5, True), (5.61, True), (8.7, True), (8.7, False), (11.1, False)])
 def test_each_cause_is_told_from_the_others(frequency: float, soft: bool, late: bool) -> None:
-    found = answered(frequency, soft, late)
+    answer = answered(frequency, soft, late)
     names = {(True, True): "both", (True, False): "contact compliance", (False, True): "sensor lag"}
-    assert found.cause == names.get((soft, late), found.cause)
+    assert answer.cause == names.get((soft, late), answer.cause)
     if not soft and not late:
-        assert found.cause in ("neither", "cannot be told")
-    assert found.lag.includes(LAG if late else 0.0)
+        assert answer.cause in ("neither", "cannot be told")
+    assert answer.lag.includes(LAG if late else 0.0)
     if soft:
-        assert found.stiffness is not None
-        assert found.stiffness.value == pytest.approx(192000, rel=0.12)
-        assert "gives way" in found.reason
+        assert answer.stiffness is not None
+        assert answer.stiffness.value == pytest.approx(192000, rel=0.12)
+        assert "gives way" in answer.reason
 
 
 def test_a_lag_would_pass_for_a_third_of_the_transition_speed() -> None:
-    found = answered(8.7, True, True)
-    assert 0.22 < found.mimicked < 0.4
-    assert "would pass for" in found.reason
+    answer = answered(8.7, True, True)
+    assert 0.22 < answer.mimicked < 0.4
+    assert "would pass for" in answer.reason
 
 
 def test_a_stated_delay_is_no_lag() -> None:
@@ -62,9 +62,9 @@ def test_the_friction_alone_tells_it_less_surely() -> None:
     record = seen(8.7, True, True)
     bare = ss.Record.of({name: record[name] for name in ("x", "load")}, fs=4000)
     bare = bare.with_details("load", mount=(250.0, 0.05), inertia=0.05, discharge=50.0)
-    found = ss.contact.lag_or_compliance(bare)
-    assert found.cause == "both"
-    assert found.lag.includes(LAG)
+    cause = ss.contact.lag_or_compliance(bare)
+    assert cause.cause == "both"
+    assert cause.lag.includes(LAG)
     assert "mount is not stated" in ss.contact.lag_or_compliance(bare.with_details("load", mount=None)).status
 
 
@@ -75,27 +75,27 @@ def test_stiffness_and_give_hold_the_truth(frequency: float) -> None:
     record = told(measured(frequency, seconds=2.0)[0])
     fused = ss.friction_force(record, method="fusion", **RIG)
     for each in (record, fused):
-        found = ss.contact.lag_or_compliance(each)
-        assert found.cause == "contact compliance"
-        assert found.stiffness is not None
-        assert found.stiffness.includes(192000)
-        assert found.give.includes(give)
-        assert found.give.includes(found.give.value)
-        assert f"{1e6 * found.give.value:.3g} um" in found.reason
-    assert found.stiffness == ss.contact_stiffness(fused)
+        cause = ss.contact.lag_or_compliance(each)
+        assert cause.cause == "contact compliance"
+        assert cause.stiffness is not None
+        assert cause.stiffness.includes(192000)
+        assert cause.give.includes(give)
+        assert cause.give.includes(cause.give.value)
+        assert f"{1e6 * cause.give.value:.3g} um" in cause.reason
+    assert cause.stiffness == ss.contact_stiffness(fused)
     assert "a damper in the contact" in ss.contact.lag_or_compliance(record).stiffness.status  # type: ignore[union-attr]
 
 
 def test_the_answer_is_printed() -> None:
-    found = answered(8.7, True, False)
-    assert str(found).startswith(f"{found.cause}: {found.reason}")
+    answer = answered(8.7, True, False)
+    assert str(answer).startswith(f"{answer.cause}: {answer.reason}")
 
 
 def test_of_a_long_record_the_middle_is_looked_at(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("stickslip.contact.cause.MOST", 4000)
-    found = ss.contact.lag_or_compliance(seen(8.7, True, False))
-    assert found.cause == "contact compliance"
-    assert "the 1 s in the middle of 2 s" in found.reason
+    cause = ss.contact.lag_or_compliance(seen(8.7, True, False))
+    assert cause.cause == "contact compliance"
+    assert "the 1 s in the middle of 2 s" in cause.reason
 
 
 def test_a_rigid_contact_that_sticks_tells_nothing() -> None:

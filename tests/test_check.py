@@ -20,8 +20,8 @@ from stickslip.record.flaws import spikes
 from stickslip.signals import repair_clock
 
 SEEDS = (0, 2)
-DAMAGED = [(seed, each) for seed in SEEDS for each in damaged_records(seed)]
-CLEAN = [(seed, *each) for seed in SEEDS for each in clean_records(seed).items()]
+DAMAGED = [(seed, damaged_record) for seed in SEEDS for damaged_record in damaged_records(seed)]
+CLEAN = [(seed, *clean_record) for seed in SEEDS for clean_record in clean_records(seed).items()]
 
 
 def test_the_corpus_is_large_enough():

@@ -41,25 +41,25 @@ def released(truth: dict[str, float], *, noise: float, seed: int, half_cycles: i
 @pytest.mark.parametrize("noise", [2e-4, 1e-3])
 def test_friction_that_wears_is_no_other_damping_without_a_doubt(drift: float, noise: float) -> None:
     """It was told as quadratic damping or as a Stribeck curve, status ok; `drift` is that over the whole motion."""
-    found = released({"damping_ratio": 0.004, "dry_displacement": 0.022, "wear": drift / 20}, noise=noise, seed=5)
-    assert "changes with the way slid (wear)" in found.status
+    release = released({"damping_ratio": 0.004, "dry_displacement": 0.022, "wear": drift / 20}, noise=noise, seed=5)
+    assert "changes with the way slid (wear)" in release.status
 
 
 @pytest.mark.parametrize("name", TRUTHS)
 def test_the_motion_is_found(name: str) -> None:
     """At a noise of a thousandth each of these is told from every simpler one."""
     truth = TRUTHS[name]
-    found = released(truth, noise=1e-3, seed=3, half_cycles=13 if name == "static" else None)
-    assert found.model == name
-    assert found.status == "ok", "and friction that wears does not explain it"
-    assert found.status == "ok"
+    release = released(truth, noise=1e-3, seed=3, half_cycles=13 if name == "static" else None)
+    assert release.model == name
+    assert release.status == "ok", "and friction that wears does not explain it"
+    assert release.status == "ok"
     for parameter in ("damping_ratio", "dry_displacement"):
-        low, high = found.interval(parameter)
+        low, high = release.interval(parameter)
         assert low - 1e-6 <= truth.get(parameter, 0.0) <= high + 1e-6
-    for each in found.candidates:
-        assert each.kept == each.verdict.startswith("kept")
-        contained = set(each.fitted.motion.terms) < set(found.chosen.fitted.motion.terms)
-        assert not (contained and each.kept)
+    for candidate in release.candidates:
+        assert candidate.kept == candidate.verdict.startswith("kept")
+        contained = set(candidate.fitted.motion.terms) < set(release.chosen.fitted.motion.terms)
+        assert not (contained and candidate.kept)
 
 
 @pytest.mark.parametrize(("trials", "most"), [(20, 4), pytest.param(60, 8, marks=pytest.mark.soak)])
@@ -69,18 +69,18 @@ def test_a_true_motion_is_rejected_once_in_twenty(trials: int, most: int) -> Non
         values = np.array([W, 0.02, 0.02, 0.01, 1, 0.27, 0, 0, 0, 0, 0.5, 0])
         times = np.arange(320) / FS
         x = free_decay(times, values)[0] + 1e-3 * np.random.default_rng(seed).standard_normal(times.size)
-        found = choose(times, x, fs=FS, start=values[:6], candidates=("both",))
-        rejected += not found.candidate("both").kept
+        choice = choose(times, x, fs=FS, start=values[:6], candidates=("both",))
+        rejected += not choice.candidate("both").kept
     assert rejected <= most  # more comes of chance once in 400 or 500
 
 
 def test_where_the_record_can_not_tell_the_interval_grows() -> None:
     """In noise a friction that rises by 30 % is not seen, and biases the dry friction of the fit."""
     truth = {"damping_ratio": 0.02, "dry_displacement": 0.02, "rise": 0.3, "stribeck_speed": 0.3 * W}
-    found = released(truth, noise=3e-2, seed=1)
-    assert {"both", "stribeck"} <= {each.name for each in found.kept}
-    low, high = found.interval("dry_displacement")
-    both = next(each for each in found.candidates if each.name == "both")
+    release = released(truth, noise=3e-2, seed=1)
+    assert {"both", "stribeck"} <= {each.name for each in release.kept}
+    low, high = release.interval("dry_displacement")
+    both = next(candidate for candidate in release.candidates if candidate.name == "both")
     assert not both.estimate("dry_displacement").includes(0.02)
     assert low < 0.02 < high
 
@@ -95,13 +95,15 @@ def test_a_joint_in_micro_slip_is_not_called_coulomb() -> None:
     x = ss.simulate(slider, duration=30.0, start={"x": 1.0, "v": 0.0, **loaded}).record(fs=6.0)["x"][:180]
     times = np.arange(x.size) / 6.0
     x = x + 1e-3 * np.random.default_rng(0).standard_normal(x.size)
-    found = choose(times, x, fs=6.0, start=[np.sqrt(1 + joint), 0.01, 1e-3, 0, 1, 0])
-    assert found.model == "micro-slip"
-    assert all("dry_displacement" not in each.fitted.motion.terms for each in found.kept)
+    choice = choose(times, x, fs=6.0, start=[np.sqrt(1 + joint), 0.01, 1e-3, 0, 1, 0])
+    assert choice.model == "micro-slip"
+    assert all("dry_displacement" not in each.fitted.motion.terms for each in choice.kept)
 
 
 def test_a_larger_candidate_never_leaves_more() -> None:
-    found = {each.name: each.fitted for each in released(TRUTHS["stribeck"], noise=1e-2, seed=5).candidates}
+    found = {
+        candidate.name: candidate.fitted for candidate in released(TRUTHS["stribeck"], noise=1e-2, seed=5).candidates
+    }
     for name, fitted in found.items():
         for other in found.values():
             if set(other.motion.terms) < set(MOTIONS[name].terms) and not other.motion.sticks_early:
@@ -123,7 +125,7 @@ def test_the_same_answer_in_other_units(length: float) -> None:
     )
     for parameter, unit in (("damping_ratio", 1.0), ("dry_displacement", length)):
         assert slow.interval(parameter) == pytest.approx([unit * end for end in metres.interval(parameter)], rel=1e-4)
-    assert [each.kept for each in slow.candidates] == [each.kept for each in metres.candidates]
+    assert [candidate.kept for candidate in slow.candidates] == [candidate.kept for candidate in metres.candidates]
 
 
 def test_white_noise_is_called_white_and_nothing_else() -> None:

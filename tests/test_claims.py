@@ -85,29 +85,29 @@ def test_an_estimate_that_can_not_be_has_no_value_and_says_why() -> None:
 def test_a_damper_is_no_contact_that_gives_way(damping: float, seed: int) -> None:
     for frequency in (2.0, 5.0):
         record = seen(rig(damping=damping, frequency=frequency), "x", "z", seed=seed, x=2e-7)
-        found = ss.cycle.presliding(ss.friction_force(record, mass=MASS, stiffness=SPRING))
-        assert found.verdict == "can not be told"
-        assert found.stiffness is None
-        assert not any(each.known for each in found.estimates)
-        assert all(each.status == found.evidence for each in found.estimates)
+        presliding = ss.cycle.presliding(ss.friction_force(record, mass=MASS, stiffness=SPRING))
+        assert presliding.verdict == "can not be told"
+        assert presliding.stiffness is None
+        assert not any(estimate.known for estimate in presliding.estimates)
+        assert all(estimate.status == presliding.evidence for estimate in presliding.estimates)
 
 
 @pytest.mark.parametrize(("elastic", "seed"), [(2e4, 51), (8e4, 52)])
 def test_a_contact_that_gives_way_is_still_told(elastic: float, seed: int) -> None:
     record = seen(rig(elastic=elastic, level=1.2, damping=60.0), "x", "z", seed=seed, x=2e-7)
-    found = ss.cycle.presliding(ss.friction_force(record, mass=MASS, stiffness=SPRING, damping=60.0))
-    assert found.verdict == "gives way"
-    assert found.stiffness is not None
-    assert found.stiffness.value == pytest.approx(elastic, rel=0.2)
+    presliding = ss.cycle.presliding(ss.friction_force(record, mass=MASS, stiffness=SPRING, damping=60.0))
+    assert presliding.verdict == "gives way"
+    assert presliding.stiffness is not None
+    assert presliding.stiffness.value == pytest.approx(elastic, rel=0.2)
 
 
 def test_a_build_up_as_fast_as_the_filter_has_no_stiffness() -> None:
     record = seen(rig(elastic=2e6, level=1.2, amplitude=3e-3, frequency=5.0), "x", "z", seed=53, x=2e-6)
     try:
-        found = ss.cycle.presliding(ss.friction_force(record, mass=MASS, stiffness=SPRING))
+        presliding = ss.cycle.presliding(ss.friction_force(record, mass=MASS, stiffness=SPRING))
     except ss.errors.EstimateError:
         return
-    assert found.stiffness is None
+    assert presliding.stiffness is None
 
 
 # ---- friction and its level
@@ -173,10 +173,10 @@ def test_records_side_by_side_have_no_friction_below_zero_at_no_load() -> None:
         x = np.sin(2 * np.pi * time) / (2 * np.pi)
         return ss.analyze(ss.Record.of({"x": x, "friction": friction, "normal": np.full(time.size, load)}, fs=500))
 
-    found = ss.compare([slide(load) for load in (2.0, 4.0, 8.0)])
-    assert not found.offset.known
-    assert found.coefficient is not None
-    assert found.coefficient.status != "ok"
+    comparison = ss.compare([slide(load) for load in (2.0, 4.0, 8.0)])
+    assert not comparison.offset.known
+    assert comparison.coefficient is not None
+    assert comparison.coefficient.status != "ok"
 
 
 # ---- frequencies
@@ -187,8 +187,8 @@ def test_forces_agree_up_to_no_more_than_half_the_sampling_rate() -> None:
     record = seen(
         {**made, "load": made["friction"]}, "x", "z", "a", "load", seed=81, x=1e-9, a=1e-6, load=1e-6
     )  # fmt: skip
-    found = ss.balance.compare_force(record, mass=MASS, stiffness=SPRING).agree_up_to
-    assert 0 <= found.interval[0] <= found.value <= found.interval[1] <= FS / 2
+    agree_up_to = ss.balance.compare_force(record, mass=MASS, stiffness=SPRING).agree_up_to
+    assert 0 <= agree_up_to.interval[0] <= agree_up_to.value <= agree_up_to.interval[1] <= FS / 2
 
 
 # ---- misfits
@@ -238,8 +238,8 @@ def test_a_unit_that_nobody_stated_is_a_finding_that_leads(tmp_path: Path) -> No
     assert headline[:1] == [str(fault) for fault in unstated]
     assert findings.level is not None
     assert findings.level.status != "ok"
-    told = list(ss.summary(findings).data())
-    assert told.index("faults") < told.index("estimates")
+    items = list(ss.summary(findings).data())
+    assert items.index("faults") < items.index("estimates")
 
 
 def test_a_unit_that_was_stated_is_no_finding(tmp_path: Path) -> None:
@@ -280,8 +280,8 @@ def test_channels_that_contradict_each_other_lead_and_no_force_is_told(scale: fl
     assert not any(f" {unit} " in sentence for sentence in headline for unit in ("N", "kN", "mN", "N/m", "kg"))
     assert findings.loops is not None
     assert findings.loops.level.status.startswith("something is stated wrongly: probably ")
-    told = list(ss.summary(findings).data())
-    assert told.index("contradiction") < told.index("estimates")
+    items = list(ss.summary(findings).data())
+    assert items.index("contradiction") < items.index("estimates")
 
 
 def test_channels_that_agree_contradict_nothing() -> None:
@@ -300,8 +300,8 @@ def test_an_accelerometer_s_noise_is_no_swing_of_the_friction(noise: float, seed
     made = rig(elastic=3e5, level=1.2, damping=60.0, amplitude=2e-3)
     record = seen(made, "x", "z", "a", seed=seed, x=2e-7, a=noise)
     record = ss.friction_force(record.with_details("a", noise=noise), mass=MASS, stiffness=SPRING, damping=60.0)
-    found = ss.cycle.breakaway(record)
-    for swing in (found.swing_forward, found.swing_back):
+    breakaway = ss.cycle.breakaway(record)
+    for swing in (breakaway.swing_forward, breakaway.swing_back):
         assert swing is not None
         assert swing.interval[0] < 0.3 * MASS * noise / 1.2  # it is told from none by no more than that
         assert swing.value < 0.5 * MASS * noise / 1.2
@@ -315,8 +315,10 @@ def test_a_swing_that_is_there_is_told_through_the_noise(share: float, seed: int
     tones, phases = rng.uniform(60, 110, 24), rng.uniform(0, 2 * np.pi, 24)
     vibration = np.sin(2 * np.pi * np.outer(time, tones) + phases).sum(axis=1) / math.sqrt(12)
     friction = made["friction"] - 60.0 * made["v"] + share * 1.2 * vibration
-    found = ss.cycle.breakaway(seen({**made, "friction": friction}, "x", "friction", seed=seed, x=2e-7, friction=0.05))
-    for swing in (found.swing_forward, found.swing_back):
+    breakaway = ss.cycle.breakaway(
+        seen({**made, "friction": friction}, "x", "friction", seed=seed, x=2e-7, friction=0.05)
+    )
+    for swing in (breakaway.swing_forward, breakaway.swing_back):
         assert swing is not None
         assert swing.interval[0] > 0
         assert swing.value == pytest.approx(share, rel=0.2)

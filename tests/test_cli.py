@@ -68,9 +68,9 @@ def test_a_pattern_gives_one_report_with_the_coefficient() -> None:
     loads = [part for load in (1, 2, 4) for part in ("--normal", f"*{load}N*={load}")]
     result = run("analyze", "load_*.csv", *MAP, *loads, "--output", "all")
     assert result.exit_code == 0, result.output
-    told = json.loads(Path("all/results.json").read_text(encoding="utf-8"))
-    assert [record["name"] for record in told["records"]] == ["load_1N.csv", "load_2N.csv", "load_4N.csv"]
-    coefficient = told["comparison"]["estimates"][0]
+    data = json.loads(Path("all/results.json").read_text(encoding="utf-8"))
+    assert [record["name"] for record in data["records"]] == ["load_1N.csv", "load_2N.csv", "load_4N.csv"]
+    coefficient = data["comparison"]["estimates"][0]
     assert coefficient["name"] == "friction coefficient"
     assert coefficient["value"] == pytest.approx(0.3, rel=0.01)
     assert Path("all/figures/0-3-records-compared-friction-load.svg").is_file()
@@ -103,11 +103,11 @@ def test_files_joined_by_plus_are_one_record(dataset: Callable[[str], Path]) -> 
     )
     result = run("analyze", f"{folder}/s_b_*_x.mat+{folder}/s_b_*_y.mat", "--config", "rig.toml", "--json")
     assert result.exit_code == 0, result.output
-    told = json.loads(result.stdout)
-    assert [record["name"] for record in told["records"]] == [
+    data = json.loads(result.stdout)
+    assert [record["name"] for record in data["records"]] == [
         "s_b_250g_x.mat + s_b_250g_y.mat", "s_b_450g_x.mat + s_b_450g_y.mat"
     ]  # fmt: skip
-    levels = [{e["name"]: e["value"] for e in record["estimates"]}["sliding friction"] for record in told["records"]]
+    levels = [{e["name"]: e["value"] for e in record["estimates"]}["sliding friction"] for record in data["records"]]
     assert levels == pytest.approx([0.682, 1.318], rel=0.04)
     assert not [path for path in Path().iterdir() if path.name != "rig.toml"], "--json alone writes nothing"
 
@@ -116,9 +116,9 @@ def test_options_go_before_the_file_of_the_rig() -> None:
     slide("run.csv")
     Path("rig.toml").write_text('mass = 2\nstiffness = 7\nrows = "0:1000"\n[channels]\nx = "pos [mm]"\n')
     result = run("analyze", "run.csv", "--config", "rig.toml", "--mass", "3 kg", "--rows", "500:", "--json")
-    told = json.loads(result.stdout)
-    assert (told["settings"]["mass"], told["settings"]["stiffness"]) == (3.0, 7.0)
-    assert told["history"][0]["arguments"]["rows"] == [500, None]
+    data = json.loads(result.stdout)
+    assert (data["settings"]["mass"], data["settings"]["stiffness"]) == (3.0, 7.0)
+    assert data["history"][0]["arguments"]["rows"] == [500, None]
 
 
 def test_a_load_on_the_command_line_goes_before_those_of_the_file() -> None:
@@ -142,9 +142,9 @@ def test_a_file_that_can_not_answer_is_named_and_left_out() -> None:
     assert [line.split(":")[1].strip() for line in lines] == ["left out", "left out"]
     assert "run_3.csv" in lines[0]
     assert "run_4.csv" in lines[1]
-    told = json.loads(Path("comparison-stickslip/results.json").read_text(encoding="utf-8"))
-    assert [record["name"] for record in told["records"]] == ["run_1.csv", "run_2.csv"]
-    assert [note for note in told["comparison"]["notes"] if "run_4.csv" in note]
+    data = json.loads(Path("comparison-stickslip/results.json").read_text(encoding="utf-8"))
+    assert [record["name"] for record in data["records"]] == ["run_1.csv", "run_2.csv"]
+    assert [note for note in data["comparison"]["notes"] if "run_4.csv" in note]
     assert "run_4.csv" in Path("comparison-stickslip/report.html").read_text(encoding="utf-8")
     alone = run("analyze", "run_1.csv", "run_4.csv", *MAP, "--json")
     assert json.loads(alone.stdout)["name"] == "run_1.csv"
@@ -215,8 +215,8 @@ def test_the_demonstration_needs_nothing_and_shows_the_truth() -> None:
     assert result.exit_code == 0, result.output
     assert "true value" in result.stdout
     assert "True value" in Path("stickslip-demo/report.html").read_text(encoding="utf-8")
-    told = json.loads(run("demo", "--json").stdout)
-    assert told["truth"]["sliding friction"] == 1.1
+    data = json.loads(run("demo", "--json").stdout)
+    assert data["truth"]["sliding friction"] == 1.1
 
 
 def test_a_record_converted_is_the_same_record() -> None:
@@ -245,9 +245,9 @@ def test_a_conversion_writes_over_nothing_unless_told_to() -> None:
 def test_a_record_that_comes_back_whole_is_named_by_its_file() -> None:
     slide("run.csv")
     run("convert", "run.csv", "kept.parquet", *MAP)
-    told = json.loads(run("analyze", "kept.parquet", "--normal", "kept*=3", "--json").stdout)
-    assert (told["name"], told["normal_load"]) == ("kept.parquet", 3.0)
-    digests = [file["sha256"] for step in told["history"] for file in step["arguments"].get("files", ())]
+    data = json.loads(run("analyze", "kept.parquet", "--normal", "kept*=3", "--json").stdout)
+    assert (data["name"], data["normal_load"]) == ("kept.parquet", 3.0)
+    digests = [file["sha256"] for step in data["history"] for file in step["arguments"].get("files", ())]
     assert hashlib.sha256(Path("kept.parquet").read_bytes()).hexdigest() in digests
 
 
@@ -346,9 +346,9 @@ def test_wrong_use_ends_in_one_sentence_and_exit_code_2(arguments: list[str]) ->
 def test_a_load_that_is_none_is_named_by_its_option() -> None:
     slide("run.csv", rows=1000)
     for load in ("-3", "run*=heavy"):
-        told = run("analyze", "run.csv", "--normal", load).stderr
-        assert "--normal: " in told
-        assert "normal.*" not in told
+        stderr = run("analyze", "run.csv", "--normal", load).stderr
+        assert "--normal: " in stderr
+        assert "normal.*" not in stderr
 
 
 def refused(result: Result, code: int) -> None:

@@ -43,11 +43,11 @@ def ask(*words: str) -> Result:
 
 
 def test_stability_names_what_feeds_the_vibration() -> None:
-    told = json.loads(ask("stability", "MC-2 eta=0.02,0.06", "--json").stdout)
+    data = json.loads(ask("stability", "MC-2 eta=0.02,0.06", "--json").stdout)
     scenario = ss.scenarios.get("MC-2 eta=0.02,0.06")
-    found = ss.stability(scenario.system)
-    assert (told["stable"], told["mechanism"]) == (found.stable, found.mechanism)
-    assert told["growth"] == pytest.approx(found.growth)
+    stability = ss.stability(scenario.system)
+    assert (data["stable"], data["mechanism"]) == (stability.stable, stability.mechanism)
+    assert data["growth"] == pytest.approx(stability.growth)
     text = ask("stability", "MC-2 eta=0.02,0.06", "--output", "out").stdout
     assert "Steady sliding is at the border of stability" in text, "the scenario has its critical friction"
     less = ask("stability", "MC-2 eta=0.02,0.06", "--set", "contacts.1.law.kinetic=0.2", "--output", "less").stdout
@@ -59,10 +59,10 @@ def test_stability_names_what_feeds_the_vibration() -> None:
 def test_a_bifurcation_has_its_changes_where_python_has_them() -> None:
     words = ("bifurcation", "DH-3 b=0.5 r=0.8", "law.kinetic", "--from", "200 mN", "--to", "0.8", "--steps", "4")
     text = ask(*words, "--output", "out").stdout
-    told = json.loads(Path("out/results.json").read_text("utf-8"))
+    data = json.loads(Path("out/results.json").read_text("utf-8"))
     system = ss.scenarios.get("DH-3 b=0.5 r=0.8").system
-    found = ss.bifurcation(system, "law.kinetic", values=np.linspace(0.2, 0.8, 4))
-    assert [each["value"] for each in told["changes"]] == pytest.approx([each.value for each in found.changes])
+    diagram = ss.bifurcation(system, "law.kinetic", values=np.linspace(0.2, 0.8, 4))
+    assert [each["value"] for each in data["changes"]] == pytest.approx([change.value for change in diagram.changes])
     assert "the motion changes its kind" in text
     assert "no stops" in text
     assert Path("out/figures/bifurcation.svg").is_file()
@@ -70,9 +70,9 @@ def test_a_bifurcation_has_its_changes_where_python_has_them() -> None:
 
 def test_dither_gives_the_smallest_amplitude() -> None:
     Path("slider.toml").write_text(SLIDER)
-    told = json.loads(ask("dither", "slider.toml", "--frequency", "5", "--json").stdout)
-    assert told["amplitude"]["value"] == pytest.approx(0.000391, rel=0.05)  # as ss.dither's own example
-    assert told["sticks"][1] < 1 / 5
+    data = json.loads(ask("dither", "slider.toml", "--frequency", "5", "--json").stdout)
+    assert data["amplitude"]["value"] == pytest.approx(0.000391, rel=0.05)  # as ss.dither's own example
+    assert data["sticks"][1] < 1 / 5
 
 
 def test_a_tap_tells_whose_resonance_each_is() -> None:
@@ -89,8 +89,8 @@ def test_a_tap_tells_whose_resonance_each_is() -> None:
     text = " ".join(ask("impact", "tap.csv", "--mass", "2.42 kg").stdout.split())
     assert "3 resonances ring after the tap: coupled contact at 47.0" in text
     assert "mount of the accelerometer at 12" in text
-    told = json.loads(ask("impact", "tap.csv", "--mass", "2.42", "--json").stdout)
-    assert told["resonances"][0]["name"] == "coupled contact"
+    data = json.loads(ask("impact", "tap.csv", "--mass", "2.42", "--json").stdout)
+    assert data["resonances"][0]["name"] == "coupled contact"
 
 
 @pytest.mark.parametrize("stated", [(), ("--offset", "-100 ms")])

@@ -27,7 +27,7 @@ def done() -> bench.Commissioned:
 
 
 def run(*arguments: str | Path) -> str:
-    result = CliRunner().invoke(main, [str(each) for each in arguments])
+    result = CliRunner().invoke(main, [str(argument) for argument in arguments])
     assert result.exit_code == 0, result.output
     return result.output
 

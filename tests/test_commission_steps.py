@@ -48,8 +48,8 @@ def test_a_drift_and_a_dead_sensor_are_told() -> None:
 
 def test_a_rig_that_swings_is_not_at_rest() -> None:
     time = np.arange(10_000) / 1000
-    found = bench.at_rest(of("x", 1e-4 * np.sin(2 * time) + 1e-6 * NOISE.standard_normal(time.size)))
-    assert "swings" in found.sensors["x"].status
+    rest = bench.at_rest(of("x", 1e-4 * np.sin(2 * time) + 1e-6 * NOISE.standard_normal(time.size)))
+    assert "swings" in rest.sensors["x"].status
 
 
 @pytest.mark.parametrize(("frequency", "kind"), [(3.0, "moves"), (11.3, "moves"), (50.0, "hums"), (120.0, "hums")])
@@ -135,10 +135,10 @@ def test_mass_and_spring_agree_with_all_that_was_measured() -> None:
     )
     masses = [ss.Estimate.normal("mass", 2.43, sd=0.01, unit="kg", method="")]
     springs = [ss.Estimate.normal("spring stiffness", 2310, sd=2.0, unit="N/m", method="")]
-    found = bench.best_constants(frequency, masses=masses, springs=springs)
-    assert found.stiffness.value / found.mass.value == pytest.approx(2310 / 2.42, rel=1e-6)
-    assert abs(found.mass.value - 2.42) < 0.003  # the spring is known better
-    assert found.status == "ok"
+    constants = bench.best_constants(frequency, masses=masses, springs=springs)
+    assert constants.stiffness.value / constants.mass.value == pytest.approx(2310 / 2.42, rel=1e-6)
+    assert abs(constants.mass.value - 2.42) < 0.003  # the spring is known better
+    assert constants.status == "ok"
     off = [ss.Estimate.normal("mass", 2.6, sd=0.01, unit="kg", method="")]
     assert "agree" in bench.best_constants(frequency, masses=off, springs=springs).status
     with pytest.raises(ss.errors.EstimateError, match="neither"):
@@ -193,8 +193,10 @@ def test_time_constants_shorter_and_longer_than_the_record(constant: float) -> N
 
 def test_a_cell_that_does_not_leak_has_a_lower_bound_only() -> None:
     time = np.arange(40_000) / 1000
-    found = bench.discharge_test(of("load", np.where(time > 10, 5.0, 0.0) + 0.01 * NOISE.standard_normal(time.size)))
-    assert found.time_constant.interval[0] > 1000 or math.isinf(found.time_constant.interval[1])
+    discharge = bench.discharge_test(
+        of("load", np.where(time > 10, 5.0, 0.0) + 0.01 * NOISE.standard_normal(time.size))
+    )
+    assert discharge.time_constant.interval[0] > 1000 or math.isinf(discharge.time_constant.interval[1])
     with pytest.raises(ss.errors.EstimateError, match="step"):
         bench.discharge_test(of("load", NOISE.standard_normal(40_000)))
 
@@ -217,11 +219,11 @@ def _driven(on: str, damping: float, fs: float = 400.0) -> ss.Record:
 
 @pytest.mark.parametrize("damping", [0.2, 12.0])
 def test_modal_fit_finds_a_force_driven_oscillator(damping: float) -> None:
-    found = bench.modal_fit(_driven("force", damping), channels=("force", "x"))
-    assert found.mass.value == pytest.approx(2.42, rel=2e-3)
-    assert found.stiffness.value == pytest.approx(2310, rel=2e-3)
-    assert found.damping.value == pytest.approx(damping, rel=0.02)
-    assert found.status == "ok"
+    modes = bench.modal_fit(_driven("force", damping), channels=("force", "x"))
+    assert modes.mass.value == pytest.approx(2.42, rel=2e-3)
+    assert modes.stiffness.value == pytest.approx(2310, rel=2e-3)
+    assert modes.damping.value == pytest.approx(damping, rel=0.02)
+    assert modes.status == "ok"
 
 
 def test_white_noise_serves_once_the_sensor_s_own_is_stated() -> None:
@@ -231,18 +233,18 @@ def test_white_noise_serves_once_the_sensor_s_own_is_stated() -> None:
     record = ss.Rig.perfect("x", "force").measure(ss.simulate(slider, duration=60.0), fs=200)
     with pytest.raises(ss.errors.EstimateError, match=r"state the sensor's own: with_details\('force', noise=\)"):
         bench.modal_fit(record, channels=("force", "x"))
-    found = bench.modal_fit(record.with_details("force", noise=1e-3), channels=("force", "x"))
-    assert found.damping.value == pytest.approx(3.0, rel=1e-3)
+    modes = bench.modal_fit(record.with_details("force", noise=1e-3), channels=("force", "x"))
+    assert modes.damping.value == pytest.approx(3.0, rel=1e-3)
 
 
 def test_modal_fit_of_a_base_needs_a_mass_and_finds_delays_and_gains() -> None:
     record = _driven("base", 3.0)
     assert bench.modal_fit(record).mass is None
     late = ss.Record.of({"x": record["x"], "z": 1.05 * record["z"]}, fs=record.fs).with_details("x", delay=0.0)
-    found = bench.modal_fit(late, stiffness="2310 ± 1 N/m")
-    assert found.mass.value == pytest.approx(2.42, rel=2e-3)
-    assert found.gain.value == pytest.approx(1 / 1.05, rel=2e-3)
-    assert abs(found.delay.value) < 1e-4
+    modes = bench.modal_fit(late, stiffness="2310 ± 1 N/m")
+    assert modes.mass.value == pytest.approx(2.42, rel=2e-3)
+    assert modes.gain.value == pytest.approx(1 / 1.05, rel=2e-3)
+    assert abs(modes.delay.value) < 1e-4
 
 
 def test_the_doubt_of_both_gains_is_in_that_of_their_ratio() -> None:
@@ -259,13 +261,13 @@ def test_the_doubt_of_both_gains_is_in_that_of_their_ratio() -> None:
 
 def test_h1_is_the_closed_form_where_the_window_is_long_enough() -> None:
     record = _driven("force", 12.0)
-    found = bench.frequency_response(record, channels=("force", "x"), segment=6.0)
-    w = 2 * np.pi * found.frequency
+    response = bench.frequency_response(record, channels=("force", "x"), segment=6.0)
+    w = 2 * np.pi * response.frequency
     exact = 1 / (2310 - 2.42 * w**2 + 12j * w)
-    middle = (found.frequency > 2) & (found.frequency < 9)
-    assert np.median(np.abs(found.h1[middle] / exact[middle] - 1)) < 0.05
-    assert np.all(np.abs(found.h1) <= np.abs(found.h2) * (1 + 1e-9))
-    assert np.median(found.coherence[middle]) > 0.98
+    middle = (response.frequency > 2) & (response.frequency < 9)
+    assert np.median(np.abs(response.h1[middle] / exact[middle] - 1)) < 0.05
+    assert np.all(np.abs(response.h1) <= np.abs(response.h2) * (1 + 1e-9))
+    assert np.median(response.coherence[middle]) > 0.98
 
 
 def test_stepped_sine_is_the_closed_form_at_its_tones() -> None:
@@ -275,10 +277,10 @@ def test_stepped_sine_is_the_closed_form_at_its_tones() -> None:
     drive = ss.drives.Recorded(force, fs, on="force")
     slider = ss.Oscillator(mass=2.42, stiffness=2310, damping=12.0, law=ss.laws.Coulomb(0.0), drive=drive)
     record = ss.Rig.perfect("x", "force").measure(ss.simulate(slider, duration=59.9), fs=fs)
-    found = bench.frequency_response(record, channels=("force", "x"), frequencies=tones)
-    w = 2 * np.pi * found.frequency
-    assert np.abs(found.h1 * (2310 - 2.42 * w**2 + 12j * w) - 1).max() < 0.01
-    assert found.coherence.min() > 0.999
+    response = bench.frequency_response(record, channels=("force", "x"), frequencies=tones)
+    w = 2 * np.pi * response.frequency
+    assert np.abs(response.h1 * (2310 - 2.42 * w**2 + 12j * w) - 1).max() < 0.01
+    assert response.coherence.min() > 0.999
 
 
 # ---- the shaker
@@ -325,7 +327,7 @@ def test_a_force_that_wanders_off_leaves_the_damper_as_it_is(seed: int) -> None:
     slider = ss.Oscillator(mass=2.42, stiffness=2310, damping=3.0, law=ss.laws.Coulomb(0.0), drive=drive)
     record = ss.Rig.perfect("x", "force").measure(ss.simulate(slider, duration=39.0), fs=500)
     shifted = ss.Record.of({"x": record["x"] + 1e-3, "force": record["force"] - 0.5}, fs=record.fs)
-    found = bench.modal_fit(shifted, channels=("force", "x"))
-    assert found.damping.value == pytest.approx(3.0, rel=1e-3)
-    assert found.damping.includes(3.0)
-    assert found.status == "ok"
+    modes = bench.modal_fit(shifted, channels=("force", "x"))
+    assert modes.damping.value == pytest.approx(3.0, rel=1e-3)
+    assert modes.damping.includes(3.0)
+    assert modes.status == "ok"

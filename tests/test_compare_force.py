@@ -52,16 +52,16 @@ def measured_run(frequency: float) -> ss.solve.Trajectory:
 @pytest.mark.parametrize("frequency", list(CASES))
 def test_they_agree_until_the_mounts_swing(frequency: float) -> None:
     """The ratio of the two readings is that of the mounts: 10 % off 1 in the complex plane at 33 Hz."""
-    found = compared(frequency)
+    comparison = compared(frequency)
     grid = np.linspace(10, 60, 2000)
     off = np.abs(resonance(125.0, 0.1).at(grid) / resonance(250.0, 0.05).at(grid) - 1)
-    assert found.agree_up_to.includes(grid[np.argmax(off > 0.1)])
-    assert found.status == "ok"
-    verdicts = [band.verdict for band in found.bands]
+    assert comparison.agree_up_to.includes(grid[np.argmax(off > 0.1)])
+    assert comparison.status == "ok"
+    verdicts = [band.verdict for band in comparison.bands]
     assert verdicts[0] == "agree"
     assert "differ" in verdicts
     assert verdicts[-1] == "noise"  # nothing in common at 2 kHz
-    for band in found.bands:
+    for band in comparison.bands:
         if band.verdict != "noise" and band.low > 20 and band.high < 110:
             true = resonance(125.0, 0.1).at(band.centre) / resonance(250.0, 0.05).at(band.centre)
             assert band.gain * np.exp(1j * band.phase) == pytest.approx(complex(true), rel=0.15)
@@ -77,11 +77,11 @@ def test_sensors_without_fault_agree_everywhere() -> None:
 
 
 def test_the_difference_in_time_is_that_of_the_traces() -> None:
-    found = compared(8.7)
-    assert found.difference.value == pytest.approx(float(np.std(found.direct - found.indirect)))
-    total = np.sqrt(sum(band.difference**2 for band in found.bands))
-    assert total == pytest.approx(found.difference.value, rel=0.02)  # Parseval: the bands leave nothing out
-    assert found.difference.interval[0] < found.difference.value < found.difference.interval[1]
+    comparison = compared(8.7)
+    assert comparison.difference.value == pytest.approx(float(np.std(comparison.direct - comparison.indirect)))
+    total = np.sqrt(sum(band.difference**2 for band in comparison.bands))
+    assert total == pytest.approx(comparison.difference.value, rel=0.02)  # Parseval: the bands leave nothing out
+    assert comparison.difference.interval[0] < comparison.difference.value < comparison.difference.interval[1]
 
 
 def test_unrelated_forces_have_nothing_in_common() -> None:
@@ -130,12 +130,12 @@ def test_what_can_not_be_compared_is_refused() -> None:
 
 
 def test_the_figure_and_the_plain_data() -> None:
-    found = compared(8.7)
-    figure = ss.figures.plot_force_comparison(found)
+    comparison = compared(8.7)
+    figure = ss.figures.plot_force_comparison(comparison)
     words = [text.get_text() for text in figure.axes[2].texts]
-    assert any("accelerometer" in each for each in words)
-    told_ = found.to_dict()
-    assert len(told_["bands"]) == len(found.bands)
+    assert any("accelerometer" in word for word in words)
+    told_ = comparison.to_dict()
+    assert len(told_["bands"]) == len(comparison.bands)
     assert told_["resonances"][0]["name"] == "mount of the accelerometer"
 
 
@@ -180,23 +180,27 @@ TRUE = {
 
 @pytest.mark.parametrize("mass", [None, "2.42 kg"])
 def test_a_tap_shows_the_contact_and_both_mounts(mass: str | None) -> None:
-    found = ss.balance.impact_test(tap(), mass=mass)
-    assert [each.name for each in found.resonances] == list(TRUE)
-    assert [each.channels for each in found.resonances] == [("a", "load"), ("a",), ("load",)]
-    for each in found.resonances:
+    mount = ss.balance.impact_test(tap(), mass=mass)
+    assert [resonance.name for resonance in mount.resonances] == list(TRUE)
+    assert [resonance.channels for resonance in mount.resonances] == [("a", "load"), ("a",), ("load",)]
+    for each in mount.resonances:
         frequency, damping = TRUE[each.name]
         assert each.frequency.value == pytest.approx(frequency, rel=0.003)
         assert each.damping.value == pytest.approx(damping, rel=0.02)
-    assert found.status == "ok"
-    assert 0.102 < found.time < 0.12
+    assert mount.status == "ok"
+    assert 0.102 < mount.time < 0.12
 
 
 def test_the_intervals_of_a_tap_hold() -> None:
     inside = []
     for seed in range(10):
-        found = ss.balance.impact_test(tap(seed, noise=3.0), mass=2.42)
-        inside += [each.frequency.includes(TRUE[each.name][0]) for each in found.resonances]
-        inside += [each.damping.includes(TRUE[each.name][1]) for each in found.resonances if "mount" in each.name]
+        mount = ss.balance.impact_test(tap(seed, noise=3.0), mass=2.42)
+        inside += [resonance.frequency.includes(TRUE[resonance.name][0]) for resonance in mount.resonances]
+        inside += [
+            resonance.damping.includes(TRUE[resonance.name][1])
+            for resonance in mount.resonances
+            if "mount" in resonance.name
+        ]
     assert len(inside) == 50
     assert np.mean(inside) > 0.88
 
@@ -208,7 +212,7 @@ def test_without_a_tap_or_a_second_sensor_it_says_so() -> None:
     with pytest.raises(RecordError, match="a, load"):
         ss.balance.impact_test(ss.Record.of({"x": quiet[0]}, fs=4000))
     alone = ss.balance.impact_test(ss.Record.of({"a": tap()["a"]}, fs=4000))
-    assert {each.name for each in alone.resonances} == {"seen by a"}
+    assert {resonance.name for resonance in alone.resonances} == {"seen by a"}
     assert "can not tell" in alone.resonances[0].evidence
 
 
@@ -216,5 +220,5 @@ def test_a_contact_that_slips_after_the_tap_is_told() -> None:
     record = tap()
     t = record.time
     slipping = record["a"] + np.where((t > 0.13) & (t < 0.145), 1.5, 0.0)
-    found = ss.balance.impact_test(ss.Record.of({"a": slipping, "load": record["load"]}, fs=4000))
-    assert "no sum of decaying oscillations" in found.status
+    mount = ss.balance.impact_test(ss.Record.of({"a": slipping, "load": record["load"]}, fs=4000))
+    assert "no sum of decaying oscillations" in mount.status

@@ -38,9 +38,9 @@ def changed(record: ss.Record, **channels: np.ndarray) -> ss.Record:
 @pytest.mark.parametrize("rough", [0.0, 0.03])
 @pytest.mark.parametrize("frequency", list(CASES))
 def test_a_sound_record_is_consistent(frequency: float, rough: float) -> None:
-    found = ss.consistent.consistency(told(measured(frequency, rough, 3.0)[0]), **RIG)
-    assert found.status == "ok"
-    held = {check.name for check in found.checks if check.verdict == "holds"}
+    consistency = ss.consistent.consistency(told(measured(frequency, rough, 3.0)[0]), **RIG)
+    assert consistency.status == "ok"
+    held = {check.name for check in consistency.checks if check.verdict == "holds"}
     assert held >= {
         "range of the sensors", "acceleration is that of the displacement", "forces balance at the forcing frequency",
         "energy of whole cycles", "mean force is zero", "identity of harmonic forcing", "sliding without stops",
@@ -66,9 +66,9 @@ def test_the_rig_comes_from_the_history() -> None:
 
 @pytest.mark.parametrize("name", ["x", "z", "a", "load"])
 def test_a_wrong_sign_is_found(name: str) -> None:
-    found = ss.consistent.consistency(changed(good(), **{name: -good()[name]}), **RIG)
-    assert found["one slip that explains it"].sentence == f"{name} has the wrong sign"
-    assert f"{name} has the wrong sign" in found.status
+    consistency = ss.consistent.consistency(changed(good(), **{name: -good()[name]}), **RIG)
+    assert consistency["one slip that explains it"].sentence == f"{name} has the wrong sign"
+    assert f"{name} has the wrong sign" in consistency.status
 
 
 def test_a_velocity_of_the_wrong_sign_is_found() -> None:
@@ -83,15 +83,15 @@ def test_a_velocity_of_the_wrong_sign_is_found() -> None:
 @pytest.mark.parametrize("pair", [("x", "z"), ("a", "load"), ("x", "a"), ("z", "load"), ("x", "load"), ("z", "a")])
 def test_exchanged_channels_are_found(pair: tuple[str, str]) -> None:
     one, other = pair
-    found = ss.consistent.consistency(changed(good(), **{one: good()[other], other: good()[one]}), **RIG)
-    assert found["one slip that explains it"].sentence == f"{one} and {other} are exchanged"
+    consistency = ss.consistent.consistency(changed(good(), **{one: good()[other], other: good()[one]}), **RIG)
+    assert consistency["one slip that explains it"].sentence == f"{one} and {other} are exchanged"
 
 
 def test_with_motion_sensors_alone_a_sign_is_still_found() -> None:
     bare = ss.Record.of({name: good()[name] for name in ("x", "z", "a")}, fs=4000)
     for name in ("x", "a"):
-        found = ss.consistent.consistency(changed(bare, **{name: -bare[name]}), **RIG)
-        assert found["one slip that explains it"].sentence == f"{name} has the wrong sign"
+        consistency = ss.consistent.consistency(changed(bare, **{name: -bare[name]}), **RIG)
+        assert consistency["one slip that explains it"].sentence == f"{name} has the wrong sign"
     two = ss.Record.of({name: good()[name] for name in ("x", "z")}, fs=4000)
     swapped = ss.consistent.consistency(changed(two, x=two["z"], z=two["x"]), **RIG)
     assert "exchanged" in swapped["energy of whole cycles"].sentence
@@ -133,11 +133,11 @@ def test_a_lag_of_whole_cycles_is_found_where_cycles_differ(frequency: float, na
     whole = len(record) - rows
     mine, others = (record[name][:whole], slice(rows, None)) if cycles > 0 else (record[name][rows:], slice(0, whole))
     samples = {each: mine if each == name else record[each][others] for each in record}
-    found = ss.consistent.consistency(dataclasses.replace(record, samples=samples), **RIG)
+    consistency = ss.consistent.consistency(dataclasses.replace(record, samples=samples), **RIG)
     word = "late" if cycles > 0 else "early"
-    assert f"{abs(cycles)} whole cycles {word}" in found[f"{name} is of the same cycle as x"].sentence
+    assert f"{abs(cycles)} whole cycles {word}" in consistency[f"{name} is of the same cycle as x"].sentence
     other = "load" if name == "a" else "a"
-    assert found[f"{other} is of the same cycle as x"].verdict != "fails"
+    assert consistency[f"{other} is of the same cycle as x"].verdict != "fails"
 
 
 def test_in_a_steady_motion_whole_cycles_leave_no_trace() -> None:
@@ -169,10 +169,10 @@ def test_a_motion_that_does_not_repeat_is_checked_where_it_can_be() -> None:
     drive = ss.drives.MultiTone(tuple((1e-3 / n, 2.0 + 1.37 * n, 6.28 * rng.random()) for n in range(1, 6)))
     run = ss.simulate(ss.Oscillator(law=ss.laws.Coulomb(1.5), drive=drive, **RIG), duration=20.0)
     record = told(ss.Rig().measure(run, fs=1000, rng=1, start=2.0))
-    found = ss.consistent.consistency(record, **RIG)
-    assert found["mean force is zero"].verdict == "can not be told"
-    assert found["acceleration is that of the displacement"].verdict == "holds"
-    assert "no cycle is like another" in found["energy of whole cycles"].sentence
+    consistency = ss.consistent.consistency(record, **RIG)
+    assert consistency["mean force is zero"].verdict == "can not be told"
+    assert consistency["acceleration is that of the displacement"].verdict == "holds"
+    assert "no cycle is like another" in consistency["energy of whole cycles"].sentence
 
 
 @pytest.mark.parametrize("damper", ["ground", "base"])
@@ -183,23 +183,23 @@ def test_a_mass_that_a_force_drives_is_checked_too(damper: str) -> None:
     )
     record = ss.Rig.perfect().measure(ss.simulate(slider, duration=8.0), fs=4000, rng=1, start=5.0)
     record = record.with_channel("force", 4.0 * np.cos(2 * np.pi * 6.0 * (5.0 + record.time)), unit="N")
-    found = ss.consistent.consistency(record, mass=2.42, stiffness=2310, damping=5.0, damper=damper)
-    assert found.status == "ok"
-    assert found["energy of whole cycles"].verdict == "holds"
+    consistency = ss.consistent.consistency(record, mass=2.42, stiffness=2310, damping=5.0, damper=damper)
+    assert consistency.status == "ok"
+    assert consistency["energy of whole cycles"].verdict == "holds"
     without = ss.consistent.consistency(record, mass=2.42, stiffness=2310)["energy of whole cycles"]
     assert (without.verdict, without.left > without.right) == ("fails", True)
 
 
 def test_plain_data_and_words() -> None:
-    found = ss.consistent.consistency(good(), **RIG)
-    data = found.to_dict()
+    consistency = ss.consistent.consistency(good(), **RIG)
+    data = consistency.to_dict()
     assert data["status"] == "ok"
-    assert len(data["checks"]) == len(found.checks)
+    assert len(data["checks"]) == len(consistency.checks)
     assert all(value is None or not isinstance(value, float) or math.isfinite(value)
                for check in data["checks"] for value in check.values())  # fmt: skip
-    assert "energy of whole cycles: holds" in repr(found)
+    assert "energy of whole cycles: holds" in repr(consistency)
     with pytest.raises(EstimateError, match="no check"):
-        found["magic"]
+        consistency["magic"]
 
 
 def test_what_can_not_be_checked_is_refused() -> None:
@@ -222,10 +222,10 @@ def test_a_sensor_that_does_not_change_is_named_and_left_out() -> None:
 def test_a_sensor_with_gaps_is_named_and_left_out() -> None:
     gaps = good()["a"].copy()
     gaps[500:600] = np.nan
-    found = ss.consistent.consistency(changed(good(), a=gaps), **RIG)
-    assert found.status == "ok"
-    assert "100 values that are not numbers" in found["a is heard"].sentence
-    assert found["a is heard"].verdict == "can not be told"
+    consistency = ss.consistent.consistency(changed(good(), a=gaps), **RIG)
+    assert consistency.status == "ok"
+    assert "100 values that are not numbers" in consistency["a is heard"].sentence
+    assert consistency["a is heard"].verdict == "can not be told"
 
 
 @pytest.mark.parametrize("frequency", [2.5, 8.7])
@@ -253,9 +253,9 @@ def test_the_shaken_frame_is_consistent(dataset: Callable[[str], Path]) -> None:
         [folder / "s_b_450g_x.mat", folder / "s_b_450g_y.mat"], channels={"x": "x [mm]", "z": "y [mm]"}
     )
     rig: dict[str, Any] = {"mass": 3.0799, "stiffness": 1191, "damping": 0.669, "damper": "base"}
-    found = ss.consistent.consistency(ss.friction_force(record, **rig))
-    assert found.status == "ok"
-    assert found["energy of whole cycles"].verdict == "holds"
+    consistency = ss.consistent.consistency(ss.friction_force(record, **rig))
+    assert consistency.status == "ok"
+    assert consistency["energy of whole cycles"].verdict == "holds"
     exchanged = ss.consistent.consistency(changed(record, x=record["z"], z=record["x"]), **rig)
     assert "exchanged" in exchanged.status
 
@@ -263,10 +263,10 @@ def test_the_shaken_frame_is_consistent(dataset: Callable[[str], Path]) -> None:
 def test_of_the_band_brake_it_says_what_can_be_told(dataset: Callable[[str], Path]) -> None:
     path = dataset("band_brake_damper") / "0.5Hz35lbtension.json"
     record = ss.read_record(path, channels={"x": "#2 [in]", "load": "c3 [kip]", "v": "#4 [in/s]"}, time="#1")
-    found = ss.consistent.consistency(record)
-    assert found["energy of whole cycles"].verdict == "holds"
-    assert found["velocity is that of the displacement"].verdict == "holds"
-    assert found["forces balance at the forcing frequency"].verdict == "can not be told"
+    consistency = ss.consistent.consistency(record)
+    assert consistency["energy of whole cycles"].verdict == "holds"
+    assert consistency["velocity is that of the displacement"].verdict == "holds"
+    assert consistency["forces balance at the forcing frequency"].verdict == "can not be told"
     turned = ss.consistent.consistency(changed(record, load=-record["load"]))
     assert "friction gives energy" in turned["energy of whole cycles"].sentence
 
@@ -292,13 +292,13 @@ def row(frequency: float) -> dict[str, Any]:
 
 
 def test_the_rows_at_5_61_hz_contradict_each_other() -> None:
-    found = ss.consistent.consistency(row(5.61))
-    names = {check.name for check in found.failed}
+    consistency = ss.consistent.consistency(row(5.61))
+    names = {check.name for check in consistency.failed}
     assert names == {"energy", "friction that base and amplitude ask for", "sliding without stops"}
-    needed = found["friction that base and amplitude ask for"]
+    needed = consistency["friction that base and amplitude ask for"]
     assert 0.87 < needed.right < 0.89  # as an independent simulation found
     assert "20 % more is stated" in needed.sentence
-    assert found["transition speed"].verdict == "holds"
+    assert consistency["transition speed"].verdict == "holds"
 
 
 @pytest.mark.parametrize("frequency", [8.7, 11.1])

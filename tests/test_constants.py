@@ -70,12 +70,12 @@ def test_an_uncertainty_that_has_no_meaning_is_one_sentence(stated, told):
 
 
 def test_an_estimate_is_a_constant_as_sure_as_it_is():
-    found = Estimate.normal("mass", 2.42, sd=0.02, unit="kg", method="scales")
-    assert Estimate.stated("mass", found, "kg").sd == 0.02
+    estimate = Estimate.normal("mass", 2.42, sd=0.02, unit="kg", method="scales")
+    assert Estimate.stated("mass", estimate, "kg").sd == 0.02
     with pytest.raises(ModelError, match="a stiffness is measured in N/m"):
-        Estimate.stated("stiffness", found, "N/m")
+        Estimate.stated("stiffness", estimate, "N/m")
     with pytest.raises(ModelError, match="not a finite number"):
-        Estimate.stated("mass", found.unknown("it never moved"), "kg")
+        Estimate.stated("mass", estimate.unknown("it never moved"), "kg")
 
 
 @given(st.floats(-1e6, 1e6), st.floats(0, 1e6), st.sampled_from(["±", "+-", "+/-"]))

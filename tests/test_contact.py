@@ -21,10 +21,10 @@ def balanced(frequency: float, rough: float = 0.0, method: str = "fusion") -> ss
     ("frequency", "rough", "within"), [(2.5, 0.0, 5e-4), (2.5, 0.03, 5e-4), (8.7, 0.03, 5e-3), (11.1, 0.03, 0.015)]
 )
 def test_the_likeliest_contact_is_the_true_one(frequency: float, rough: float, within: float) -> None:
-    found = ss.contact_stiffness(balanced(frequency, rough))
-    assert found.value == pytest.approx(STIFFNESS, rel=within)
-    assert abs(found.value - STIFFNESS) < 3.5 * found.sd
-    assert found.sd < within / 2 * STIFFNESS
+    contact = ss.contact_stiffness(balanced(frequency, rough))
+    assert contact.value == pytest.approx(STIFFNESS, rel=within)
+    assert abs(contact.value - STIFFNESS) < 3.5 * contact.sd
+    assert contact.sd < within / 2 * STIFFNESS
 
 
 def test_its_interval_is_neither_too_narrow_nor_too_wide() -> None:
@@ -34,23 +34,23 @@ def test_its_interval_is_neither_too_narrow_nor_too_wide() -> None:
         ss.Oscillator(law=contact, drive=ss.drives.HarmonicBase(1.1e-3, frequency=8.7), **RIG), duration=5.0
     )
     records = [told(ss.Rig().measure(run, fs=4000, rng=seed, start=4.0)) for seed in range(10)]
-    found = [ss.contact_stiffness(ss.friction_force(record, method="fusion", **RIG)) for record in records]
-    strayed = np.mean([((each.value - STIFFNESS) / each.sd) ** 2 for each in found])
+    contacts = [ss.contact_stiffness(ss.friction_force(record, method="fusion", **RIG)) for record in records]
+    strayed = np.mean([((contact.value - STIFFNESS) / contact.sd) ** 2 for contact in contacts])
     assert 0.3 < strayed < 2.7  # chi square of 10: 3 in 1000 on either side
 
 
 def test_of_a_long_record_some_stretches_are_looked_at(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("stickslip.balance.likely_contact.MOST", 6000)
     monkeypatch.setattr("stickslip.balance.likely_contact.PIECES", 2)
-    found = ss.contact_stiffness(balanced(2.5))
-    assert found.value == pytest.approx(STIFFNESS, rel=1e-3)
-    assert abs(found.value - STIFFNESS) < 3.5 * found.sd
+    contact = ss.contact_stiffness(balanced(2.5))
+    assert contact.value == pytest.approx(STIFFNESS, rel=1e-3)
+    assert abs(contact.value - STIFFNESS) < 3.5 * contact.sd
 
 
 def test_its_damping_too() -> None:
-    found = ss.contact.contact_damping(balanced(2.5))
-    assert found.value == pytest.approx(DAMPING, rel=0.02)
-    assert abs(found.value - DAMPING) < 3.5 * found.sd
+    damping = ss.contact.contact_damping(balanced(2.5))
+    assert damping.value == pytest.approx(DAMPING, rel=0.02)
+    assert abs(damping.value - DAMPING) < 3.5 * damping.sd
 
 
 def test_the_thesis_s_slopes_scatter_by_13_percent_and_are_low() -> None:
@@ -60,9 +60,9 @@ def test_the_thesis_s_slopes_scatter_by_13_percent_and_are_low() -> None:
     assert len(slopes) > 40
     assert 0.09 < slopes.std(ddof=1) / slopes.mean() < 0.18
     assert -0.35 < slopes.mean() / STIFFNESS - 1 < -0.15
-    found = ss.contact_stiffness(record, method="slope")
-    assert found.value == pytest.approx(slopes.mean(), rel=0.1)
-    assert "scatter" in found.checks[1]
+    contact = ss.contact_stiffness(record, method="slope")
+    assert contact.value == pytest.approx(slopes.mean(), rel=0.1)
+    assert "scatter" in contact.checks[1]
 
 
 def test_the_slope_is_right_where_nothing_lies() -> None:
@@ -78,8 +78,8 @@ def test_a_stick_within_one_count_of_the_sensor_has_no_slope() -> None:
 def test_loops_tell_the_slope_of_their_mean_cycle() -> None:
     record = ss.Rig.perfect("x", "z", "load").measure(_run(), fs=20_000)
     record = record.with_channel("friction", record["load"], unit="N")
-    found = ss.contact_stiffness(ss.friction_loops(record))
-    assert found.value == pytest.approx(STIFFNESS, rel=0.3)
+    contact = ss.contact_stiffness(ss.friction_loops(record))
+    assert contact.value == pytest.approx(STIFFNESS, rel=0.3)
     with pytest.raises(EstimateError, match="slope"):
         ss.contact_stiffness(ss.friction_loops(record), method="stick")
 
@@ -113,17 +113,17 @@ CONTACT = ss.laws.CompliantContact(1.1, stiffness=STIFFNESS, damping=DAMPING)
 
 
 def test_a_rigid_contact_gets_a_lower_bound() -> None:
-    found = ss.contact_stiffness(ss.friction_force(record_of(ss.laws.Coulomb(1.1)), method="fusion", **RIG))
-    assert found.interval[0] > 1e8
-    assert found.interval[1] == np.inf
-    assert "not told from a rigid contact" in found.status
+    contact = ss.contact_stiffness(ss.friction_force(record_of(ss.laws.Coulomb(1.1)), method="fusion", **RIG))
+    assert contact.interval[0] > 1e8
+    assert contact.interval[1] == np.inf
+    assert "not told from a rigid contact" in contact.status
 
 
 def test_a_stiff_contact_is_told_while_it_rings_below_half_the_rate() -> None:
     law = ss.laws.CompliantContact(1.1, stiffness=1e7, damping=200)
-    found = ss.contact_stiffness(ss.friction_force(record_of(law), method="fusion", **RIG))
-    assert found.value == pytest.approx(1e7, rel=2e-3)
-    assert found.status == "ok"
+    contact = ss.contact_stiffness(ss.friction_force(record_of(law), method="fusion", **RIG))
+    assert contact.value == pytest.approx(1e7, rel=2e-3)
+    assert contact.status == "ok"
 
 
 def test_in_sliding_a_contact_that_holds_for_no_three_samples_is_refused() -> None:
@@ -133,17 +133,17 @@ def test_in_sliding_a_contact_that_holds_for_no_three_samples_is_refused() -> No
 
 
 def test_a_rate_too_low_for_the_transition_is_named() -> None:
-    found = ss.contact_stiffness(ss.friction_force(record_of(CONTACT, fs=250), method="fusion", **RIG))
-    assert "samples to a cycle" in found.status
+    contact = ss.contact_stiffness(ss.friction_force(record_of(CONTACT, fs=250), method="fusion", **RIG))
+    assert "samples to a cycle" in contact.status
 
 
 def test_a_delay_that_is_not_stated_is_named_with_its_sensor() -> None:
     record = record_of(CONTACT)
     for name in ("x", "z"):
         record = record.with_details(name, delay=0.0)
-    found = ss.contact_stiffness(ss.friction_force(record, method="fusion", **RIG))
-    assert "times its noise" in found.status
-    assert found.sd > 1e-3 * STIFFNESS  # of 2e-4 with the delay stated
+    contact = ss.contact_stiffness(ss.friction_force(record, method="fusion", **RIG))
+    assert "times its noise" in contact.status
+    assert contact.sd > 1e-3 * STIFFNESS  # of 2e-4 with the delay stated
 
 
 def test_a_load_cell_of_the_wrong_sign_is_refused() -> None:
@@ -157,8 +157,8 @@ def test_displacement_alone_does_not_pass_for_sure() -> None:
     drive = ss.drives.HarmonicBase(0.65e-3, frequency=2.5)
     run = ss.simulate(ss.Oscillator(law=CONTACT, drive=drive, **RIG), duration=6.0)
     record = rig.measure(run, fs=4000, rng=3, start=4.0)
-    found = ss.contact_stiffness(ss.friction_force(record, method="motion", **RIG))
-    assert "displacement alone" in found.status
+    contact = ss.contact_stiffness(ss.friction_force(record, method="motion", **RIG))
+    assert "displacement alone" in contact.status
 
 
 def test_an_unknown_mass_is_named() -> None:
@@ -184,11 +184,11 @@ def test_sensors_that_are_not_stated_leave_the_contact_as_unsure_as_it_is() -> N
         for name in "xz" if late else "":
             record = record.with_details(name, delay=LAG)
         fused = ss.friction_force(record, method="fusion", **RIG)
-        found = ss.contact_stiffness(fused)
-        assert "strays" in found.status
-        assert found.includes(192000)
+        contact = ss.contact_stiffness(fused)
+        assert "strays" in contact.status
+        assert contact.includes(192000)
         if late:
-            assert "negative" in found.status
+            assert "negative" in contact.status
             with pytest.raises(EstimateError, match="state the sensors' lags and mounts"):
                 ss.contact.contact_damping(fused)
 

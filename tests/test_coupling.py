@@ -153,9 +153,9 @@ def test_friction_takes_energy_from_the_sliding_motion() -> None:
 def test_it_is_plain_data() -> None:
     import json
 
-    told = json.loads(json.dumps(virtual()[1].to_dict(), allow_nan=False))
-    assert len(told["pairs"]) == 10
-    (tied,) = (pair for pair in told["pairs"] if pair["tied"])
+    data = json.loads(json.dumps(virtual()[1].to_dict(), allow_nan=False))
+    assert len(data["pairs"]) == 10
+    (tied,) = (pair for pair in data["pairs"] if pair["tied"])
     assert (tied["first"], tied["second"], tied["delay"], tied["adds"]) == ("a", "friction", None, False)
 
 
@@ -182,15 +182,15 @@ def test_the_work_on_torsion_and_normal_motion_is_that_of_the_closed_form() -> N
         "torsion_velocity": 0.4 * inside * np.cos(turn + lag), "normal": 6.0 + 1.5 * inside * np.cos(turn),
         "normal_acceleration": -0.02 * 2 * np.pi * frequency * inside * np.sin(turn + lag),
     }  # fmt: skip
-    found = ss.squeak.coupling(ss.Record.of(channels, fs=fs), lever="3 mm")
+    coupled = ss.squeak.coupling(ss.Record.of(channels, fs=fs), lever="3 mm")
     share = float(np.mean([np.mean(inside[(t >= b.start) & (t < b.end)] ** 2) for b in found_bursts(channels, fs)]))
     expected = {
         "energy_per_cycle": -2.0 * 0.01 * math.cos(2.0), "energy_to_torsion": -0.003 * 2.0 * 0.4 * math.cos(lag),
         "energy_to_normal": -1.5 * 0.02 * math.cos(lag),
     }  # fmt: skip
     for name, amplitude in expected.items():
-        assert getattr(found, name).value == pytest.approx(0.5 * share * amplitude / frequency, rel=0.02)
-    assert found.energy_per_cycle.value > 0 > found.energy_to_torsion.value
+        assert getattr(coupled, name).value == pytest.approx(0.5 * share * amplitude / frequency, rel=0.02)
+    assert coupled.energy_per_cycle.value > 0 > coupled.energy_to_torsion.value
     assert ss.squeak.coupling(ss.Record.of(channels, fs=fs)).energy_to_torsion is None
 
 
@@ -203,7 +203,7 @@ def test_friction_feeds_the_torsion_of_the_virtual_rig() -> None:
     run = ss.simulate(ss.squeak.squeak_rig(), duration=1.6)
     record = ss.squeak.squeak_record(run, snr=40, rng=1)
     levers = [contact.tangent[2] for contact in run.system.contacts]
-    found = ss.squeak.coupling(record, lever=float(np.mean(levers)))
+    coupled = ss.squeak.coupling(record, lever=float(np.mean(levers)))
     motion, _ = run.sample(record.time, ("v", "friction"))
     bursts = ss.find_squeaks(record).of("squeak", "squeal")
     spinning = motion[2]
@@ -211,7 +211,7 @@ def test_friction_feeds_the_torsion_of_the_virtual_rig() -> None:
         -np.mean(sum(lever * force[rows] for lever, force in zip(levers, motion[3:], strict=True)) * spinning[rows])
         for rows in (slice(*np.searchsorted(record.time, [b.start, b.end])) for b in bursts)
     ]
-    exact = float(np.mean(work)) / found.frequency
-    assert found.energy_to_torsion.value == pytest.approx(exact, rel=0.25)
-    assert found.energy_to_torsion.interval[0] > 0
-    assert found.energy_to_torsion.value > 50 * abs(found.energy_per_cycle.value)
+    exact = float(np.mean(work)) / coupled.frequency
+    assert coupled.energy_to_torsion.value == pytest.approx(exact, rel=0.25)
+    assert coupled.energy_to_torsion.interval[0] > 0
+    assert coupled.energy_to_torsion.value > 50 * abs(coupled.energy_per_cycle.value)

@@ -68,9 +68,9 @@ def test_lugre_presliding_is_a_damped_spring() -> None:
 def test_lugre_stick_slip_has_the_reference_period() -> None:
     run = ss.simulate(ss.Oscillator(mass=1, stiffness=2, law=LUGRE, drive=ss.drives.Ramp(0.1)), duration=28)
     known = [7.540397463024532, 13.903117284079828, 20.265837105140747, 26.62855692620443]
-    found = upcrossings(run, "v", 0.05, 4)
-    assert found == pytest.approx(known, rel=1e-9)
-    assert found[3] - found[2] == pytest.approx(6.36271982, abs=1e-8)
+    crossings = upcrossings(run, "v", 0.05, 4)
+    assert crossings == pytest.approx(known, rel=1e-9)
+    assert crossings[3] - crossings[2] == pytest.approx(6.36271982, abs=1e-8)
 
 
 @pytest.mark.parametrize(("rate", "force"), [(1.0, 1.460734471242172), (5.0, 1.379927337908279),
@@ -138,8 +138,8 @@ def test_rate_and_state_loses_stability_at_the_critical_stiffness(
     def growth(value: float) -> float:
         return float(ss.solve.steady_sliding(system.having(stiffness=value)).eigenvalues[0].real)
 
-    found = brentq(growth, 0.9 * stiffness, 1.1 * stiffness, rtol=1e-13)
-    assert found == pytest.approx(stiffness, rel=1e-6 if mass < 1 else 1e-10)
+    root = brentq(growth, 0.9 * stiffness, 1.1 * stiffness, rtol=1e-13)
+    assert root == pytest.approx(stiffness, rel=1e-6 if mass < 1 else 1e-10)
     fastest = ss.solve.steady_sliding(system).eigenvalues[0]
     assert abs(fastest.imag) == pytest.approx(turn, rel=1e-6 if mass < 1 else 1e-11)
 

@@ -142,9 +142,9 @@ def test_a_branch_of_a_curved_law_ends_at_the_orbit_found_there() -> None:
 
 def test_the_exponent_of_a_stable_orbit_is_the_logarithm_of_its_multiplier() -> None:
     system = SMOOTH.having(law=ss.laws.Stribeck(1.1, 1.3, speed=1e-3, viscous=0.4), frequency=8.7)
-    found = ss.solve.lyapunov(system, cycles=50, transient=20)
+    exponent = ss.solve.lyapunov(system, cycles=50, transient=20)
     multiplier = abs(ss.steady_state(system).multipliers[0])
-    assert found.value == pytest.approx(math.log(multiplier) * 8.7, rel=1e-6)
+    assert exponent.value == pytest.approx(math.log(multiplier) * 8.7, rel=1e-6)
 
 
 def test_starts_that_lead_to_one_orbit_find_it_once() -> None:

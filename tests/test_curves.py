@@ -31,20 +31,20 @@ def sweep(seed: int = 0, *, noise: float = 0.02, cycles: float = CYCLES, fs: flo
 
 
 def test_a_stribeck_curve_comes_back_to_rounding() -> None:
-    found = fit_curve(sweep(noise=1e-9))
+    fit = fit_curve(sweep(noise=1e-9))
     for name, value in STRIBECK.items():
-        assert found.parameters[name].value == pytest.approx(value, rel=1e-5)
-    assert isinstance(found.law, Stribeck)
-    assert found.law.friction(0.02) == pytest.approx(1.0 + 0.4 / np.e + 0.01, rel=1e-5)
-    assert found.unexplained < 1e-8
+        assert fit.parameters[name].value == pytest.approx(value, rel=1e-5)
+    assert isinstance(fit.law, Stribeck)
+    assert fit.law.friction(0.02) == pytest.approx(1.0 + 0.4 / np.e + 0.01, rel=1e-5)
+    assert fit.unexplained < 1e-8
 
 
 def test_intervals_hold_the_truth() -> None:
     held = dict.fromkeys(STRIBECK, 0)
     for seed in range(25):
-        found = fit_curve(sweep(seed, noise=0.01))
+        fit = fit_curve(sweep(seed, noise=0.01))
         for name, value in STRIBECK.items():
-            held[name] += found.parameters[name].includes(value)
+            held[name] += fit.parameters[name].includes(value)
     assert all(count >= 21 for count in held.values()), held
     assert sum(held.values()) >= 0.92 * 25 * len(held)
 
@@ -52,9 +52,9 @@ def test_intervals_hold_the_truth() -> None:
 @pytest.mark.parametrize("factor", [10.0, 1e-4])
 def test_units_of_force_change_nothing(factor: float) -> None:
     record = sweep()
-    found = fit_curve(record)
+    fit = fit_curve(record)
     other = fit_curve(Record.of({"v": record["v"], "friction": factor * record["friction"]}, fs=FS))
-    for name, each in found.parameters.items():
+    for name, each in fit.parameters.items():
         times = 1.0 if name in ("speed", "exponent") else factor
         assert other.parameters[name].value == pytest.approx(times * each.value, rel=1e-6)
         assert other.parameters[name].interval == pytest.approx(tuple(times * end for end in each.interval), rel=1e-4)
@@ -68,13 +68,13 @@ def test_the_sampling_rate_changes_nothing() -> None:
 
 def test_coulomb_and_viscous_are_ordinary_least_squares() -> None:
     record = sweep(static=1.0)
-    found = fit_curve(record, curve="viscous")
-    assert isinstance(found.law, LinearSlope)
+    fit = fit_curve(record, curve="viscous")
+    assert isinstance(fit.law, LinearSlope)
     for name, value in (("kinetic", 1.0), ("viscous", 0.5), ("offset", 0.05)):
-        assert found.parameters[name].includes(value)
-    v, f = found.at, found.measured
+        assert fit.parameters[name].includes(value)
+    v, f = fit.at, fit.measured
     by_hand = np.linalg.lstsq(np.column_stack([np.sign(v), v, np.ones_like(v)]), f, rcond=None)[0]
-    assert [each.value for each in found.estimates] == pytest.approx(by_hand, rel=1e-9)
+    assert [estimate.value for estimate in fit.estimates] == pytest.approx(by_hand, rel=1e-9)
     flat = fit_curve(sweep(static=1.0, viscous=0.0), curve="coulomb")
     assert flat.parameters["kinetic"].includes(1.0)
     assert flat.law is not None
@@ -84,19 +84,19 @@ def test_both_directions_on_their_own() -> None:
     record = sweep(static=1.0, viscous=0.0, offset=0.0)
     v, f = record["v"], record["friction"]
     uneven = np.where(v > 0, f + 0.2 + 3 * v, f + 1 * v)
-    found = fit_curve(Record.of({"v": v, "friction": uneven}, fs=FS), curve="asymmetric")
+    fit = fit_curve(Record.of({"v": v, "friction": uneven}, fs=FS), curve="asymmetric")
     truth = {"kinetic_forward": 1.2, "viscous_forward": 3.0, "kinetic_back": 1.0, "viscous_back": 1.0}
     for name, value in truth.items():
-        assert found.parameters[name].value == pytest.approx(value, rel=0.02)
-    assert found.law is None
+        assert fit.parameters[name].value == pytest.approx(value, rel=0.02)
+    assert fit.law is None
 
 
 def test_a_table_falls_all_the_way_though_the_noise_does_not() -> None:
-    found = fit_curve(sweep(noise=0.3, viscous=0.0), curve="tabulated", elements=12)
-    forces = [found.parameters[f"force_{number}"].value for number in range(1, 13)]
+    fit = fit_curve(sweep(noise=0.3, viscous=0.0), curve="tabulated", elements=12)
+    forces = [fit.parameters[f"force_{number}"].value for number in range(1, 13)]
     assert all(a >= b - 1e-12 for a, b in pairwise(forces))
-    truth = 1 + 0.4 * np.exp(-((found.law.speeds[6] / 0.02) ** 1.3))
-    assert found.law.forces[6] == pytest.approx(truth, abs=0.03)
+    truth = 1 + 0.4 * np.exp(-((fit.law.speeds[6] / 0.02) ** 1.3))
+    assert fit.law.forces[6] == pytest.approx(truth, abs=0.03)
 
 
 def test_loops_are_fitted_by_their_mean_cycle() -> None:
@@ -123,9 +123,9 @@ def test_an_angle_has_a_torque() -> None:
     theta = 0.1 * np.sin(2 * np.pi * t)
     torque = 0.4 * np.sign(np.cos(2 * np.pi * t)) + np.random.default_rng(0).normal(0, 0.01, t.size)
     record = Record.of({"theta": theta, "friction": torque}, units={"friction": "N m"}, fs=500)
-    found = fit_curve(record, curve="viscous")
-    assert [each.unit for each in found.estimates] == ["N m", "N m s/rad", "N m"]
-    assert found.parameters["kinetic"].includes(0.4)
+    fit = fit_curve(record, curve="viscous")
+    assert [estimate.unit for estimate in fit.estimates] == ["N m", "N m s/rad", "N m"]
+    assert fit.parameters["kinetic"].includes(0.4)
 
 
 def one_speed(both_ways: bool) -> Record:
@@ -169,25 +169,25 @@ def test_what_can_only_just_be_told_is_flagged() -> None:
 @pytest.mark.parametrize("curve", ["coulomb", "asymmetric"])
 def test_friction_that_drives_is_told(curve: str) -> None:
     record = sweep()
-    found = fit_curve(Record.of({"v": record["v"], "friction": -record["friction"]}, fs=FS), curve=curve)
-    assert "friction drives the motion" in found.status
-    assert found.law is None
+    fit = fit_curve(Record.of({"v": record["v"], "friction": -record["friction"]}, fs=FS), curve=curve)
+    assert "friction drives the motion" in fit.status
+    assert fit.law is None
 
 
 def test_friction_that_does_not_rise_has_a_law_without_viscosity() -> None:
     kinds = [fit_curve(sweep(seed, viscous=0.0)) for seed in range(6)]
-    assert all(found.law is not None for found in kinds)
-    assert any("viscous" not in found.parameters for found in kinds)
+    assert all(kind.law is not None for kind in kinds)
+    assert any("viscous" not in kind.parameters for kind in kinds)
 
 
 def test_a_curve_that_friction_does_not_follow_is_said_so() -> None:
     """What repeats in every cycle is the curve's own error; noise is not, however loud."""
     record = sweep(static=3.0, viscous=0.0)
-    found = fit_curve(record, curve="coulomb")
-    assert not found.follows
-    assert found.model_error == pytest.approx(found.unexplained, rel=0.1)
-    assert "does not follow the curve" in found.status
-    assert {each.status for each in found.estimates} == {"of a curve that the friction does not follow"}
+    fit = fit_curve(record, curve="coulomb")
+    assert not fit.follows
+    assert fit.model_error == pytest.approx(fit.unexplained, rel=0.1)
+    assert "does not follow the curve" in fit.status
+    assert {estimate.status for estimate in fit.estimates} == {"of a curve that the friction does not follow"}
     assert fit_curve(record, curve="stribeck").follows
     loud = fit_curve(sweep(static=1.0, viscous=0.0, noise=0.4), curve="coulomb")
     assert loud.follows
@@ -210,7 +210,7 @@ def test_a_coefficient_is_fitted_as_it_is_or_under_its_load() -> None:
     given = {"v": record["v"], "coefficient": record["friction"] / 10}
     wanted = fit_curve(record, curve="viscous")
     alone = fit_curve(Record.of(given, fs=FS), curve="viscous")
-    assert (alone.unit, [each.unit for each in alone.estimates]) == ("1", ["1", "s/m", "1"])
+    assert (alone.unit, [estimate.unit for estimate in alone.estimates]) == ("1", ["1", "s/m", "1"])
     assert alone.parameters["kinetic"].value == pytest.approx(wanted.parameters["kinetic"].value / 10)
     loaded = fit_curve(Record.of(given, fs=FS), curve="viscous", normal="10 N")
     assert (loaded.unit, loaded.estimates[1].unit) == ("N", "N s/m")
@@ -220,8 +220,8 @@ def test_a_coefficient_is_fitted_as_it_is_or_under_its_load() -> None:
 def test_samples_that_were_filled_in_are_told() -> None:
     record = sweep()
     lost = np.where(np.arange(1, len(record) + 1) % 5 > 2, np.nan, record["friction"])
-    found = fit_curve(fill_missing(Record.of({"v": record["v"], "friction": lost}, fs=FS)), curve="coulomb")
-    assert "40 % of the samples were not measured" in found.status
+    fit = fit_curve(fill_missing(Record.of({"v": record["v"], "friction": lost}, fs=FS)), curve="coulomb")
+    assert "40 % of the samples were not measured" in fit.status
     assert "measured" not in fit_curve(record, curve="coulomb").status
 
 
@@ -231,10 +231,10 @@ def test_one_speed_one_way_tells_no_curve() -> None:
     record = Record.of(
         {"x": 5e-3 * t + rng.normal(0, 1e-7, t.size), "friction": 1 + rng.normal(0, 0.02, t.size)}, fs=FS
     )
-    found = fit_curve(record, curve="coulomb")
-    assert "let it reverse" in found.status
-    assert "let the speed vary" in found.status
-    assert "constant force is not told" in found.parameters["kinetic"].status
+    fit = fit_curve(record, curve="coulomb")
+    assert "let it reverse" in fit.status
+    assert "let the speed vary" in fit.status
+    assert "constant force is not told" in fit.parameters["kinetic"].status
     for curve in ("stribeck", "viscous", "asymmetric", "dahl", "jenkins"):
         with pytest.raises(EstimateError, match=r"let the speed vary|give a record that reverses"):
             fit_curve(record, curve=curve)
@@ -249,7 +249,7 @@ def test_what_is_no_record_of_friction_is_refused() -> None:
         fit_curve(lost, curve="coulomb")
     loud = fit_curve(sweep(noise=5.0), curve="coulomb")
     assert "noise is above the friction" in loud.status
-    assert all("ok" not in each.status for each in loud.estimates)
+    assert all("ok" not in estimate.status for estimate in loud.estimates)
 
 
 def test_loops_know_their_motion_themselves() -> None:

@@ -23,11 +23,11 @@ def emps(dataset: Sets) -> ss.Record:
 
 @pytest.mark.parametrize(("symmetric", "published", "most"), [(True, SYMMETRIC, 0.0412), (False, UNEVEN, 0.0312)])
 def test_emps_as_published(dataset: Sets, symmetric: bool, published: dict[str, float], most: float) -> None:
-    found = ss.cycle.regress_friction(emps(dataset), symmetric=symmetric)
-    assert found.residual <= most
+    regression = ss.cycle.regress_friction(emps(dataset), symmetric=symmetric)
+    assert regression.residual <= most
     for name, value in published.items():
-        assert getattr(found, name).value == pytest.approx(value, rel=0.01)
-        assert getattr(found, name).includes(value)
+        assert getattr(regression, name).value == pytest.approx(value, rel=0.01)
+        assert getattr(regression, name).includes(value)
 
 
 def test_emps_by_its_curves(dataset: Sets) -> None:
@@ -37,13 +37,13 @@ def test_emps_by_its_curves(dataset: Sets) -> None:
     assert even["kinetic"].includes(20.3935)
     assert even["viscous"].includes(203.5034)
     assert even["offset"].includes(-3.1648)
-    found = ss.fit_curve(record, curve="asymmetric")
+    fit = ss.fit_curve(record, curve="asymmetric")
     for name, published in (("viscous_forward", 166.706), ("viscous_back", 240.424)):
-        assert found.parameters[name].value == pytest.approx(published, rel=0.03)
+        assert fit.parameters[name].value == pytest.approx(published, rel=0.03)
     for name, published in (("kinetic_forward", 20.144), ("kinetic_back", 20.628)):
-        assert found.parameters[name].value == pytest.approx(published, rel=0.03)
-        assert found.parameters[name].includes(published)
-    assert "static and" not in found.status
+        assert fit.parameters[name].value == pytest.approx(published, rel=0.03)
+        assert fit.parameters[name].includes(published)
+    assert "static and" not in fit.status
 
 
 @pytest.mark.parametrize(("law", "rows"), [("aging", 2500), ("slip", 2500), ("aging", 5184), ("slip", 5184)])
@@ -51,11 +51,11 @@ def test_basalt_after_a_step(dataset: Sets, law: str, rows: int) -> None:
     """a is about 0.009 and b as large; friction in shares of the load."""
     path = dataset("rate_state_step") / "velstep4_BRAVA_expb819_basalt.txt"
     record = ss.read_record(path, channels={"x": "Displ", "friction": "Friction [N]"}, rows=(665, 665 + rows))
-    found = ss.fit_curve(record, curve=law).parameters
-    assert found["direct"].value == pytest.approx(0.009, rel=0.05)
-    assert abs(found["rate_dependence"].value) < 0.001
-    assert found["rate_dependence"].includes(0.0)
-    assert 4e-6 < found["distance"].value < 2e-5
+    parameters = ss.fit_curve(record, curve=law).parameters
+    assert parameters["direct"].value == pytest.approx(0.009, rel=0.05)
+    assert abs(parameters["rate_dependence"].value) < 0.001
+    assert parameters["rate_dependence"].includes(0.0)
+    assert 4e-6 < parameters["distance"].value < 2e-5
 
 
 def seal(dataset: Sets, bar: int) -> ss.Record:

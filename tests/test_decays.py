@@ -45,8 +45,8 @@ def test_the_command_answers_and_leaves_a_page(release, method):
     page = (folder / "report.html").read_text("utf-8")
     assert "Recorded and identified" in page
     assert ("by decrements" in page) == (method == "all")
-    told = json.loads((folder / "results.json").read_text("utf-8"))
-    estimates = {each["name"]: each for each in told["estimates"]}
+    data = json.loads((folder / "results.json").read_text("utf-8"))
+    estimates = {each["name"]: each for each in data["estimates"]}
     low, high = estimates["damping ratio"]["interval"]
     assert low < 0.0316 < high
     low, high = estimates["dry friction force"]["interval"]
@@ -54,14 +54,14 @@ def test_the_command_answers_and_leaves_a_page(release, method):
     drawn = {path.name for path in (folder / "figures").iterdir()}
     assert {"decay.svg", "decay.png", "identified.svg"} <= drawn
     assert ("differences.svg" in drawn) == (method != "waveform")
-    assert set(told["files"]) >= {"report.html", "results.json"}
+    assert set(data["files"]) >= {"report.html", "results.json"}
 
 
 def test_json_alone_writes_nothing(release):
     answer = run(release, *READ, "--json", "--method", "thesis")
-    told = json.loads(answer.output)
-    assert told["releases"][0]["stopped"]
-    bounds = told["decrements"]["bounds"]
+    data = json.loads(answer.output)
+    assert data["releases"][0]["stopped"]
+    bounds = data["decrements"]["bounds"]
     assert len(bounds["m"]) == len(bounds["rate_worst"])
     assert bounds["best_m"] in bounds["m"]
     assert sorted(path.name for path in release.parent.iterdir()) == ["release.csv"]
@@ -91,13 +91,13 @@ def test_several_releases_of_one_rig_are_fitted_together(release):
     said = " ".join(answer.output.split())
     assert "The 2 records agree within their own intervals." in said
     assert "damping ratio, again.csv" in said
-    told = json.loads((release.parent / "out" / "results.json").read_text("utf-8"))
-    assert told["comparison"]["joint"]
-    estimates = {each["name"]: each for each in told["comparison"]["estimates"]}
+    data = json.loads((release.parent / "out" / "results.json").read_text("utf-8"))
+    assert data["comparison"]["joint"]
+    estimates = {each["name"]: each for each in data["comparison"]["estimates"]}
     for name, true in (("damping ratio", 0.0316), ("dry friction force", 0.2)):
         low, high = estimates[name]["interval"]
         assert low < true < high
-    assert [each["name"] for each in told["records"]] == ["release.csv", "again.csv"]
+    assert [each["name"] for each in data["records"]] == ["release.csv", "again.csv"]
 
 
 def test_every_file_that_can_not_answer_has_its_reason(release):
@@ -175,16 +175,16 @@ def test_too_few_extremes_for_any_method_are_refused():
 
 def test_a_pendulum_is_read_with_its_sine_and_by_its_own_waveform(dataset):
     record = ss.read_record(dataset("pendulum_decay") / "pend1.csv", channels={"theta": "#2 [rad]"}, time="#1")
-    found = ss.analyze_decay(record, restoring="pendulum", stiffness="0.6956 N m/rad")
-    assert found.decay.best is found.decay.waveform
-    assert found.decay.thesis is None
-    assert set(found.decay.comparisons[0].name.split(", ")) == {"damping ratio", "extremes alone"}
-    assert 3.6e-3 < found.decay.dry_force.value < 4.9e-3
-    low, high = found.decay.as_force(found.decay.whichever[1], "").interval
+    findings = ss.analyze_decay(record, restoring="pendulum", stiffness="0.6956 N m/rad")
+    assert findings.decay.best is findings.decay.waveform
+    assert findings.decay.thesis is None
+    assert set(findings.decay.comparisons[0].name.split(", ")) == {"damping ratio", "extremes alone"}
+    assert 3.6e-3 < findings.decay.dry_force.value < 4.9e-3
+    low, high = findings.decay.as_force(findings.decay.whichever[1], "").interval
     assert low < 3.6e-3 < 4.8e-3 < high
-    other = found.decay.as_force(found.decay.older["extremes alone"].dry_displacement, "")
+    other = findings.decay.as_force(findings.decay.older["extremes alone"].dry_displacement, "")
     assert low < other.value < high
-    assert [plate.name for plate in ss.summary(found).plates] == ["decay", "identified"]
+    assert [plate.name for plate in ss.summary(findings).plates] == ["decay", "identified"]
     with pytest.raises(ss.errors.EstimateError, match="hold for a linear spring"):
         ss.analyze_decay(record, restoring="pendulum", method="thesis")
 
@@ -193,14 +193,14 @@ def test_a_pendulum_is_read_with_its_sine_and_by_its_own_waveform(dataset):
 def test_a_clock_that_can_not_be_trusted_leaves_the_extremes(dataset, name):
     path = dataset("pendulum_bad_clock") / name
     record = ss.signals.repair_clock(ss.read_record(path, channels={"theta": "Angle [deg]"}, time="Time_Elapsed"))
-    found = ss.analyze_decay(record, restoring="pendulum")
-    assert found.decay.waveform is None
-    assert found.decay.best is found.decay.older["extremes alone"]
-    assert 0.0051 < found.decay.best.damping_ratio.value < 0.0065
-    low, high = np.degrees(found.decay.best.dry_displacement.interval)
+    findings = ss.analyze_decay(record, restoring="pendulum")
+    assert findings.decay.waveform is None
+    assert findings.decay.best is findings.decay.older["extremes alone"]
+    assert 0.0051 < findings.decay.best.damping_ratio.value < 0.0065
+    low, high = np.degrees(findings.decay.best.dry_displacement.interval)
     assert low < 0.0155
     assert high > 0.0115
-    told = " ".join(ss.summary(found).headline)
+    told = " ".join(ss.summary(findings).headline)
     assert "read from its extremes alone" in told
     assert "mend the clock, or trust the extremes" in told
     assert "choose restoring" not in told
@@ -218,32 +218,32 @@ def test_a_clock_that_runs_unevenly_is_told_by_what_the_waveform_leaves():
 def test_the_pendulum_has_a_page(dataset, tmp_path):
     path = dataset("pendulum_decay") / "pend1.csv"
     record = ss.read_record(path, channels={"theta": "#2 [rad]"}, time="#1")
-    found = ss.analyze_decay(record, stiffness=0.2235 * 9.82 * 0.31692)
-    assert found.decay.dry_force.unit == "N m"
-    folder = ss.publish(found, folder=tmp_path / "out")
+    findings = ss.analyze_decay(record, stiffness=0.2235 * 9.82 * 0.31692)
+    assert findings.decay.dry_force.unit == "N m"
+    folder = ss.publish(findings, folder=tmp_path / "out")
     assert "not linear" in (folder / "report.html").read_text("utf-8")
 
 
 def test_viscous_damping_alone_leaves_ten_times_the_residual_of_a_real_pendulum(dataset):
     record = ss.read_record(dataset("pendulum_decay") / "pend1.csv", channels={"theta": "#2 [rad]"}, time="#1")
-    found = ss.analyze_decay(record, method="waveform", restoring="pendulum", stiffness="0.6956 N m/rad")
-    assert found.decay.viscous_residual > 10
-    told = ss.summary(found)
-    assert f"alone leaves {found.decay.viscous_residual:.3g} times the residual" in " ".join(told.headline)
-    assert [row[0] for row in told.tables[-1].rows] == [words for _, words, _ in found.decay.motion.candidates]
-    low, high = found.decay.as_force(found.decay.motion.dry_displacement_any, "").interval
+    findings = ss.analyze_decay(record, method="waveform", restoring="pendulum", stiffness="0.6956 N m/rad")
+    assert findings.decay.viscous_residual > 10
+    story = ss.summary(findings)
+    assert f"alone leaves {findings.decay.viscous_residual:.3g} times the residual" in " ".join(story.headline)
+    assert [row[0] for row in story.tables[-1].rows] == [words for _, words, _ in findings.decay.motion.candidates]
+    low, high = findings.decay.as_force(findings.decay.motion.dry_displacement_any, "").interval
     assert low < 3.6e-3 < 4.8e-3 < high
 
 
 def test_a_record_without_noise_is_no_digitiser_however_long_it_rests():
     slider = ss.Oscillator(mass=1.0, stiffness=10.0, damping=0.2, law=ss.laws.Coulomb(0.2))
     record = ss.simulate(slider, duration=80.0, start={"x": 1.0}).record(fs=200)
-    found = ss.analyze_decay(record, method="waveform", stiffness=10.0)
-    assert found.decay.releases.ring_downs[0].step == 0
-    assert found.decay.waveform.damping_ratio.value == pytest.approx(0.1 / 10**0.5, rel=1e-5)
-    assert found.decay.waveform.damping_ratio.sd < 1e-5
-    assert found.decay.motion.model == "both"
-    told = " ".join(ss.summary(found).headline)
+    findings = ss.analyze_decay(record, method="waveform", stiffness=10.0)
+    assert findings.decay.releases.ring_downs[0].step == 0
+    assert findings.decay.waveform.damping_ratio.value == pytest.approx(0.1 / 10**0.5, rel=1e-5)
+    assert findings.decay.waveform.damping_ratio.sd < 1e-5
+    assert findings.decay.motion.model == "both"
+    told = " ".join(ss.summary(findings).headline)
     assert "within within" not in told
 
 
@@ -253,9 +253,9 @@ def test_every_release_is_drawn():
     pull = np.linspace(values[-1], values[0], 150)
     twice = np.concatenate([values, np.full(100, values[-1]), pull, np.full(200, values[0]), values])
     twice += 1e-5 * np.random.default_rng(1).standard_normal(len(twice))
-    found = ss.analyze_decay(ss.Record.of({"x": twice}, fs=fs), method="waveform")
-    assert len(found.decay.releases.ring_downs) == 2
-    assert [plate.name for plate in ss.summary(found).plates] == ["decay", "identified", "identified-2"]
+    findings = ss.analyze_decay(ss.Record.of({"x": twice}, fs=fs), method="waveform")
+    assert len(findings.decay.releases.ring_downs) == 2
+    assert [plate.name for plate in ss.summary(findings).plates] == ["decay", "identified", "identified-2"]
 
 
 def analyzed(values, fs, *, method="waveform", noise=1e-3):
@@ -301,20 +301,22 @@ def test_the_headline_names_the_motion_that_the_record_leaves():
     t = np.arange(4000) / 500
     w, damping, quadratic, length = 20.0, 0.01, 20.0, 0.03
     x = any_decay(t, [w, damping, 0, 0, length, 0, quadratic, 0, 0, 0, 0.5, 0])[0]
-    found = ss.analyze_decay(ss.Record.of({"x": x + 3e-5 * np.random.default_rng(7).standard_normal(t.size)}, fs=500))
-    assert found.decay.best is found.decay.motion
-    assert found.decay.motion.model == "air"
-    told = " ".join(ss.summary(found).headline)
+    findings = ss.analyze_decay(
+        ss.Record.of({"x": x + 3e-5 * np.random.default_rng(7).standard_normal(t.size)}, fs=500)
+    )
+    assert findings.decay.best is findings.decay.motion
+    assert findings.decay.motion.model == "air"
+    told = " ".join(ss.summary(findings).headline)
     assert "dies away by viscous and quadratic (air) damping, no dry friction: a damping ratio of 0.01" in told
     assert "quadratic damping of " in told
-    estimates = {each.name: each for each in found.estimates}
+    estimates = {estimate.name: estimate for estimate in findings.estimates}
     assert estimates["damping ratio"].includes(damping)
     assert estimates["quadratic damping"].includes(quadratic)
     assert estimates["quadratic damping"].unit == "1/m"
     assert "dry friction displacement" not in estimates
     # what takes the motion for another one had stood beside it without a doubt, ten deviations off
     assert not stands(estimates["damping ratio, by decrements"].status)
-    assert ss.summary(found).plates
+    assert ss.summary(findings).plates
 
 
 def test_a_pendulum_read_with_a_straight_spring_is_told_so():
@@ -326,30 +328,30 @@ def test_a_pendulum_read_with_a_straight_spring_is_told_so():
     told = " ".join(ss.summary(ss.analyze_decay(record)).headline)
     assert 'of a pendulum ask with restoring="pendulum"' in told
     assert "dies away by dry" not in told
-    found = ss.analyze_decay(record, restoring="pendulum")
-    assert found.decay.best.dry_displacement.includes(0.01)
-    assert "straight spring" not in " ".join(ss.summary(found).headline)
+    findings = ss.analyze_decay(record, restoring="pendulum")
+    assert findings.decay.best.dry_displacement.includes(0.01)
+    assert "straight spring" not in " ".join(ss.summary(findings).headline)
 
 
 def test_a_friction_below_zero_is_never_told_as_friction():
-    found = analyzed(np.asarray(free_decay()[0]), free_decay()[1])
-    estimate = replace(found.decay.waveform.dry_displacement, value=-1e-3, interval=(-2e-3, -1e-4))
-    waveform = replace(found.decay.waveform, dry_displacement=estimate)
-    below = found.having(decay=replace(found.decay, waveform=waveform, motion=None))
+    findings = analyzed(np.asarray(free_decay()[0]), free_decay()[1])
+    estimate = replace(findings.decay.waveform.dry_displacement, value=-1e-3, interval=(-2e-3, -1e-4))
+    waveform = replace(findings.decay.waveform, dry_displacement=estimate)
+    below = findings.having(decay=replace(findings.decay, waveform=waveform, motion=None))
     assert "which the record speaks against" in ss.summary(below).headline[0]
 
 
 def test_a_motion_rejected_by_chance_is_not_denied_as_a_fact():
     values, fs, _ = free_decay()
-    found = analyzed(values, fs)
-    choice = found.decay.motion.choice
-    weak = replace(choice, candidates=tuple(replace(each, p_value=0.01) for each in choice.candidates))
-    motion = replace(found.decay.motion, choice=weak)
-    told = " ".join(ss.summary(found.having(decay=replace(found.decay, motion=motion))).headline)
+    findings = analyzed(values, fs)
+    choice = findings.decay.motion.choice
+    weak = replace(choice, candidates=tuple(replace(candidate, p_value=0.01) for candidate in choice.candidates))
+    motion = replace(findings.decay.motion, choice=weak)
+    told = " ".join(ss.summary(findings.having(decay=replace(findings.decay, motion=motion))).headline)
     assert "dies away by viscous and dry friction" in told
     assert "but weakly (p = 0.01)" in told
     assert "friction of another kind too" not in told
-    assert all("p = 0)" not in verdict for _, _, verdict in found.decay.motion.candidates)
+    assert all("p = 0)" not in verdict for _, _, verdict in findings.decay.motion.candidates)
 
 
 def test_what_no_repair_bridges_is_not_sent_to_a_repair():
@@ -373,9 +375,9 @@ def test_the_release_is_told_by_one_number_everywhere():
         (noisy[120:], ("under way when the record begins (it is fitted from", "time of the first turn")),
         (np.clip(noisy, -0.7, 0.7), ("(swings are left out: it is fitted from", "time of the first turn")),
     ):
-        found = ss.analyze_decay(ss.Record.of({"x": motion}, fs=fs))
-        begin, far = found.decay.waveform.release_time, found.decay.waveform.amplitude
-        sentence = next(each for each in ss.summary(found).headline if "extremes from" in each)
+        findings = ss.analyze_decay(ss.Record.of({"x": motion}, fs=fs))
+        begin, far = findings.decay.waveform.release_time, findings.decay.waveform.amplitude
+        sentence = next(each for each in ss.summary(findings).headline if "extremes from" in each)
         assert words[0] in sentence
         assert begin.name == words[1]
         assert f"at {value_of(begin)}" in sentence

@@ -32,14 +32,14 @@ def virtual(zeta: float, dry: float, *, step: float = 0.01e-3, seed: int = 0, no
 )
 def test_the_rigs_of_the_thesis_are_recovered(zeta, dry, quoted):
     """The scatter that the thesis quotes is far larger than how far the answer is off."""
-    found = [ss.decrement(virtual(zeta, dry, seed=seed)) for seed in range(12)]
-    assert sum(decay.damping_ratio.includes(zeta) for decay in found) >= 11
-    assert sum(decay.dry_displacement.includes(dry) for decay in found) >= 11
-    off = np.array([decay.damping_ratio.value - zeta for decay in found])
-    scatter = np.array([decay.scatter.damping_ratio.std(ddof=1) for decay in found])
+    decrements = [ss.decrement(virtual(zeta, dry, seed=seed)) for seed in range(12)]
+    assert sum(decay.damping_ratio.includes(zeta) for decay in decrements) >= 11
+    assert sum(decay.dry_displacement.includes(dry) for decay in decrements) >= 11
+    off = np.array([decay.damping_ratio.value - zeta for decay in decrements])
+    scatter = np.array([decay.scatter.damping_ratio.std(ddof=1) for decay in decrements])
     assert np.sqrt(np.mean(off**2)) < 5e-4 < scatter.mean() < quoted
-    assert all(decay.model == "viscous and dry" for decay in found)
-    assert "not the uncertainty" in found[0].damping_ratio.checks[0]
+    assert all(decay.model == "viscous and dry" for decay in decrements)
+    assert "not the uncertainty" in decrements[0].damping_ratio.checks[0]
 
 
 @pytest.mark.parametrize("location", ["fit", "sample"])
@@ -194,11 +194,11 @@ def test_a_noisy_acceleration_tells_what_the_displacement_does(hold, side):
     held, waves = [], []
     for seed in range(12):
         noisy = motion + 0.03 * np.random.default_rng(seed).standard_normal(len(motion))
-        found = ss.decrement(of(noisy, 500.0, "a"))
-        assert found.bias.name == "sensor offset"
-        assert abs(found.ring_down.amplitude) == pytest.approx(11.3, rel=0.06)  # (k x - f) / m, or the next turn's
-        assert np.median(found.bounds.dry) == pytest.approx(1e-3, rel=0.3)
-        held.append((found.damping_ratio.includes(0.02), found.dry_displacement.includes(1e-3)))
+        decrement = ss.decrement(of(noisy, 500.0, "a"))
+        assert decrement.bias.name == "sensor offset"
+        assert abs(decrement.ring_down.amplitude) == pytest.approx(11.3, rel=0.06)  # (k x - f) / m, or the next turn's
+        assert np.median(decrement.bounds.dry) == pytest.approx(1e-3, rel=0.3)
+        held.append((decrement.damping_ratio.includes(0.02), decrement.dry_displacement.includes(1e-3)))
         fit = ss.fit_decay(of(noisy, 500.0, "a"))
         waves.append((fit.damping_ratio.includes(0.02), fit.dry_displacement.includes(1e-3)))
         assert fit.release_time.value == pytest.approx(hold / 500, abs=0.002)

@@ -89,18 +89,18 @@ def test_a_ring_says_where_to_dither() -> None:
     slider = ss.Oscillator(2.42, 2310, contact, ss.drives.HarmonicBase(0.65e-3, frequency=2.5))
     record = ss.simulate(slider, cycles=8).record(fs=4000).between(1.0, 3.2)
     rings = ss.contact.transition(record, mass=2.42, stiffness=2310)
-    found = ss.dither(slider, transition=rings, cycles=12)
-    assert found.frequency > 1.9 * rings.frequency.value
-    assert found.amplitude.value == pytest.approx(1.1 / 192000, rel=0.2)
-    assert found.sticks[1] * found.frequency < 1
-    assert any("rings at 45" in check for check in found.checks)
+    dithered = ss.dither(slider, transition=rings, cycles=12)
+    assert dithered.frequency > 1.9 * rings.frequency.value
+    assert dithered.amplitude.value == pytest.approx(1.1 / 192000, rel=0.2)
+    assert dithered.sticks[1] * dithered.frequency < 1
+    assert any("rings at 45" in check for check in dithered.checks)
 
 
 def test_of_several_frequencies_the_smallest_amplitude_is_taken() -> None:
-    found = ss.dither(BELT, frequency=[4.0, 8.0])
-    assert found.frequency == 8.0
-    assert [f for f, _ in found.tried] == [4.0, 8.0]
-    assert found.amplitude.value == min(amplitude for _, amplitude in found.tried)
+    dithered = ss.dither(BELT, frequency=[4.0, 8.0])
+    assert dithered.frequency == 8.0
+    assert [f for f, _ in dithered.tried] == [4.0, 8.0]
+    assert dithered.amplitude.value == min(amplitude for _, amplitude in dithered.tried)
 
 
 def test_the_longest_stick_is_put_together_across_pieces() -> None:

@@ -47,18 +47,18 @@ def test_each_takes_the_other_friction_for_its_own_and_says_so() -> None:
 @pytest.mark.parametrize("pendulum", [False, True])
 def test_extremes_alone_tell_both(pendulum: bool) -> None:
     record = released(0.01, 0.01, noise=1e-4, pendulum=pendulum, first=2.0 if pendulum else 1.0)
-    found = ss.decay.extreme_decay(record, restoring="pendulum" if pendulum else "linear")
-    assert found.damping_ratio.value == pytest.approx(0.01, rel=0.02)
-    assert found.dry_displacement.value == pytest.approx(0.01, rel=0.02)
+    decay = ss.decay.extreme_decay(record, restoring="pendulum" if pendulum else "linear")
+    assert decay.damping_ratio.value == pytest.approx(0.01, rel=0.02)
+    assert decay.dry_displacement.value == pytest.approx(0.01, rel=0.02)
 
 
 def test_extremes_do_not_ask_the_clock() -> None:
     record = released(0.0177, 0.005)
     rate = 200 * (1 + 0.05 * np.sin(TIMES))  # a clock that runs fast and slow
     warped = np.interp(np.cumsum(1 / rate), TIMES, record["x"])
-    found = ss.decay.extreme_decay(ss.Record.of({"x": warped}, fs=200))
-    assert found.damping_ratio.value == pytest.approx(0.0177, rel=0.01)
-    assert found.dry_displacement.value == pytest.approx(0.005, rel=0.01)
+    decay = ss.decay.extreme_decay(ss.Record.of({"x": warped}, fs=200))
+    assert decay.damping_ratio.value == pytest.approx(0.0177, rel=0.01)
+    assert decay.dry_displacement.value == pytest.approx(0.005, rel=0.01)
 
 
 READ = [("60.txt", 0.0063, 0.0169), ("100.txt", 0.0054, 0.0122)]
@@ -68,11 +68,11 @@ READ = [("60.txt", 0.0063, 0.0169), ("100.txt", 0.0054, 0.0122)]
 def test_pendulums_whose_clock_is_broken(dataset: Callable[[str], Path], name: str, ratio: float, band: float) -> None:
     """Crude methods gave 0.0051 to 0.0065 and 0.011 to 0.016 deg, a sixth of the encoder's step."""
     record = ss.signals.repair_clock(read_pendulum(dataset("pendulum_bad_clock") / name))
-    found = ss.decay.extreme_decay(record, restoring="pendulum")
-    assert found.damping_ratio.value == pytest.approx(ratio, abs=1e-4)
-    assert 0.0051 < found.damping_ratio.value < 0.0065
-    assert np.degrees(found.dry_displacement.value) == pytest.approx(band, abs=3e-4)
-    low, high = np.degrees(found.dry_displacement.interval)
+    decay = ss.decay.extreme_decay(record, restoring="pendulum")
+    assert decay.damping_ratio.value == pytest.approx(ratio, abs=1e-4)
+    assert 0.0051 < decay.damping_ratio.value < 0.0065
+    assert np.degrees(decay.dry_displacement.value) == pytest.approx(band, abs=3e-4)
+    low, high = np.degrees(decay.dry_displacement.interval)
     assert low < 0.016
     assert high > 0.011
 

@@ -133,21 +133,21 @@ def elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 @pytest.mark.usefixtures("elsewhere")
 @pytest.mark.parametrize("form", ["csv", "h5", "parquet"])
 def test_the_command_writes_the_record_with_its_truth(form: str) -> None:
-    found = invoke("slider.toml", "--fs", "1000", "--seed", "7", "--start", "0.5", "--format", form, "--stated")
-    assert found.exit_code == 0, found.output
+    result = invoke("slider.toml", "--fs", "1000", "--seed", "7", "--start", "0.5", "--format", form, "--stated")
+    assert result.exit_code == 0, result.output
     record = ss.read_record(Path("slider-rig") / f"record.{form}")
     same = ss.Rig().measure(run(), fs=1000, rng=7, start=0.5)
     assert all(np.array_equal(record[name], same[name]) for name in same)
     assert record.truth["contact stiffness"] == 192000
     assert record.channels["a"].mount == (125, 0.1)
-    assert "sliding friction" in found.output
+    assert "sliding friction" in result.output
 
 
 @pytest.mark.usefixtures("elsewhere")
 def test_the_command_changes_sensors() -> None:
-    found = invoke("slider.toml", "--sensor", "load.limit=1.05", "--sensor", "x.lag=0", "--json")
-    assert found.exit_code == 0, found.output
-    assert any("channel load has" in fault and "clipped" in fault for fault in json.loads(found.output)["faults"])
+    result = invoke("slider.toml", "--sensor", "load.limit=1.05", "--sensor", "x.lag=0", "--json")
+    assert result.exit_code == 0, result.output
+    assert any("channel load has" in fault and "clipped" in fault for fault in json.loads(result.output)["faults"])
     assert not Path("slider-rig").exists()
 
 
@@ -155,15 +155,15 @@ def test_the_command_changes_sensors() -> None:
 @pytest.mark.usefixtures("elsewhere")
 def test_the_command_plans() -> None:
     asked = ["slider.toml", "--plan", "--fs", "500", "--draws", "1", "--start", "0.8", "--output", "out"]
-    found = invoke(*asked, "--need", "contact stiffness=100 kN/m", "--need", "friction=1 uN")
-    assert found.exit_code == 0, found.output
-    said = " ".join(found.output.split())
+    result = invoke(*asked, "--need", "contact stiffness=100 kN/m", "--need", "friction=1 uN")
+    assert result.exit_code == 0, result.output
+    said = " ".join(result.output.split())
     assert "contact stiffness within 100 kN/m: x, z at 500 Hz; friction within 1 uN: none of these" in said
-    told = json.loads(Path("out/results.json").read_text())
-    assert told["setups"][0]["sensors"] == ["x", "z"]
+    data = json.loads(Path("out/results.json").read_text())
+    assert data["setups"][0]["sensors"] == ["x", "z"]
     assert Path("out/figures/plan.svg").is_file()
     silent = json.loads(invoke(*asked[:-2], "--json").output)
-    assert silent["setups"] == told["setups"]
+    assert silent["setups"] == data["setups"]
     assert math.isfinite(silent["setups"][0]["accuracy"]["friction"]["error"])
 
 
@@ -180,7 +180,7 @@ def test_the_command_plans() -> None:
     ],
 )
 def test_wrong_use_ends_in_a_sentence(arguments: list[str], match: str) -> None:
-    found = invoke("slider.toml", *arguments)
-    assert found.exit_code == 2
-    assert match in found.output
-    assert "Traceback" not in found.output
+    result = invoke("slider.toml", *arguments)
+    assert result.exit_code == 2
+    assert match in result.output
+    assert "Traceback" not in result.output

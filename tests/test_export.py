@@ -129,8 +129,8 @@ def test_python_of_a_contact_has_the_friction_of_each_mode(name: str) -> None:
         contact = kind(values["x"], values["v"])
         values |= {name: getattr(contact, name) for name in law.memory}
         contact.mode = mode.name
-        found = contact.force(*(values[each] for each in inputs if each != "self"))
-        assert found == (0.3 if mode.friction is None else pytest.approx(at(mode.friction, values), rel=1e-14))
+        force = contact.force(*(values[each] for each in inputs if each != "self"))
+        assert force == (0.3 if mode.friction is None else pytest.approx(at(mode.friction, values), rel=1e-14))
 
 
 def test_python_names_what_a_contact_must_be_told() -> None:
@@ -146,9 +146,9 @@ def test_python_along_a_motion_is_the_friction_of_the_exact_solver(name: str) ->
     system = ss.Oscillator(mass=2.42, stiffness=2310, law=LAWS[name], drive=ss.drives.HarmonicBase(2e-3, frequency=5.0))
     record = ss.simulate(system, duration=0.3).record(fs=200_000)
     contact = run_as_it_stands(name)["Friction"](record["x"][0], record["v"][0])
-    found = np.array([contact.step(x, v, 5e-6) for x, v in zip(record["x"], record["v"], strict=True)])
+    values = np.array([contact.step(x, v, 5e-6) for x, v in zip(record["x"], record["v"], strict=True)])
     wanted = record["friction"]
-    assert np.sqrt(np.mean((found - wanted) ** 2)) < 0.01 * np.abs(wanted).max()
+    assert np.sqrt(np.mean((values - wanted) ** 2)) < 0.01 * np.abs(wanted).max()
 
 
 def built(law: object, folder: Path, *more: str, main: str = "") -> Path:
@@ -215,9 +215,9 @@ def test_c_code_along_a_motion_is_the_friction_of_the_exact_solver(name: str, tm
     rows = "\n".join(f"{t:.17g} {a:.17g} {b:.17g}" for t, a, b in zip(record.time, x, v, strict=True))
     program = built(LAWS[name], tmp_path, main=MARCH)
     run = subprocess.run([program], input=f"motion\n{rows}\n", capture_output=True, text=True, check=True)
-    found = np.array(run.stdout.split(), dtype=float)
-    assert len(found) == len(wanted)
-    assert np.sqrt(np.mean((found - wanted) ** 2)) < 0.005 * np.abs(wanted).max()
+    values = np.array(run.stdout.split(), dtype=float)
+    assert len(values) == len(wanted)
+    assert np.sqrt(np.mean((values - wanted) ** 2)) < 0.005 * np.abs(wanted).max()
 
 
 def test_mujoco_has_coulomb_and_viscous_joints() -> None:
@@ -229,8 +229,8 @@ def test_mujoco_has_coulomb_and_viscous_joints() -> None:
         assert [part.tag for part in file] in (["joint"], ["custom"], ["actuator"])
         assert all(part.get("name") and part.get("data") for part in file.iterfind("custom/*"))
     lugre = LAWS["LuGre"]
-    found = ElementTree.fromstring(ss.laws.export_law(replace(lugre, exponent=1.5), format="mujoco"))
-    given = {each.get("name"): float(each.get("data")) for each in found.iter("numeric")}
+    root = ElementTree.fromstring(ss.laws.export_law(replace(lugre, exponent=1.5), format="mujoco"))
+    given = {each.get("name"): float(each.get("data")) for each in root.iter("numeric")}
     assert given["LuGre_damping"] == 316.23
     (motor,) = ElementTree.fromstring(ss.laws.export_law(lugre, format="mujoco")).iter("dcmotor")  # its exponent is 2
     levels = [lugre.stiffness, lugre.damping, lugre.kinetic, lugre.static, lugre.speed]
@@ -254,7 +254,7 @@ def test_modelica_is_one_class_whose_statements_end(name: str) -> None:
         value = rf"Real \w+ = {number}|Real \w+\[\] = {{[^}}]*}}|Boolean \w+ = (true|false)|String \w+ = \"[^\"]*\""
         friction = rf"extends [\w.]+\.SupportFriction\( +f_pos = \[\], +peak = {number}\)"
         assert re.fullmatch(rf"parameter ({value})|{friction}", statement), statement
-    assert (kind == "model") == any(each.startswith("extends") for each in statements)
+    assert (kind == "model") == any(statement.startswith("extends") for statement in statements)
     if kind == "model":
         points = np.array([row.split(",") for row in re.search(r"f_pos = \[(.*?)\]", code)[1].split(";")], dtype=float)
         assert (np.diff(points[:, 0]) > 0).all()

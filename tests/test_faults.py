@@ -247,10 +247,10 @@ def results_in(folder: Path) -> str | None:
     """Whose results a folder holds, all of them, or None."""
     if not (folder / "results.json").exists():
         return None
-    told = json.loads((folder / "results.json").read_text())
-    assert {*told["files"]} <= {*contents(folder)}
-    assert (folder / "report.html").read_text() == f"<title>{told['name']}</title>"
-    return str(told["name"])
+    data = json.loads((folder / "results.json").read_text())
+    assert {*data["files"]} <= {*contents(folder)}
+    assert (folder / "report.html").read_text() == f"<title>{data['name']}</title>"
+    return str(data["name"])
 
 
 @pytest.mark.parametrize("swaps", [True, False])

@@ -110,9 +110,9 @@ def test_a_caution_stands_once_and_rows_bear_its_number() -> None:
     lines = [line("one", shared), line("two", "ok"), line("three", f"{shared} fast")]
     general = Caution("no delay is stated")
     story = Story("record", ["It slides."], [Caution(shared, ["one"]), general], lines=lines)
-    assert [story.marks(each) for each in lines] == ["1", "", "2"]
-    assert [each.reason for each in story.notices] == [shared, f"{shared} fast", "no delay is stated"]
-    assert [story.mark(each) for each in story.notices] == ["1", "2", ""]
+    assert [story.marks(line) for line in lines] == ["1", "", "2"]
+    assert [notice.reason for notice in story.notices] == [shared, f"{shared} fast", "no delay is stated"]
+    assert [story.mark(notice) for notice in story.notices] == ["1", "2", ""]
     said = Story("record", [f"It slides, but {shared}."], lines=lines[:1])
     assert not said.notices, "the headline says it already"
 

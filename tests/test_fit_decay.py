@@ -94,13 +94,13 @@ def test_every_channel_gives_the_truth_within_its_interval(order: int, amplitude
     truth[4] = amplitude
     samples, dt, bound = ring_down(order=order, truth=truth)
     record = ss.Record.of({("x", "v", "a")[order]: samples}, fs=1 / dt)
-    found = ss.fit_decay(record)
-    answers = [found.frequency, found.damping_ratio, found.dry_displacement, found.bias, found.amplitude]
+    decay = ss.fit_decay(record)
+    answers = [decay.frequency, decay.damping_ratio, decay.dry_displacement, decay.bias, decay.amplitude]
     for answer, true, sd in zip(answers, [1.0, *truth[1:5]], [bound[0] / 2 / math.pi, *bound[1:5]], strict=True):
         assert abs(answer.value - true) < 4 * sd, answer.name
         assert 0.7 * 1.96 * sd < (answer.interval[1] - answer.interval[0]) / 2 < 1.5 * 1.96 * sd, answer.name
-    assert found.half_cycles == (13,)
-    assert found.status == "ok"
+    assert decay.half_cycles == (13,)
+    assert decay.status == "ok"
 
 
 def test_the_answer_does_not_depend_on_the_rate() -> None:
@@ -134,8 +134,8 @@ def test_the_fit_reaches_the_bound(damping: float, dry: float, noise: float, per
 
 def test_static_friction_is_bracketed() -> None:
     samples, dt, _ = ring_down()
-    found = ss.fit_decay(ss.Record.of({"x": samples}, fs=1 / dt))
-    assert found.static_displacement.includes(DRY)
+    decay = ss.fit_decay(ss.Record.of({"x": samples}, fs=1 / dt))
+    assert decay.static_displacement.includes(DRY)
 
 
 def test_a_force_needs_the_stiffness_or_the_mass() -> None:
@@ -191,40 +191,40 @@ def test_a_pendulum_of_large_swings_is_fitted_with_its_sine(draws: int, share: f
     """Values, and intervals of 95 % less three deviations; the straight spring is far off and says so."""
     inside = []
     for seed in range(draws):
-        found = ss.fit_decay(pendulum(seed=seed), restoring="pendulum", stiffness=2.0)
-        answers = (found.damping_ratio, found.dry_displacement, found.bias, found.amplitude, found.release_time)
+        decay = ss.fit_decay(pendulum(seed=seed), restoring="pendulum", stiffness=2.0)
+        answers = (decay.damping_ratio, decay.dry_displacement, decay.bias, decay.amplitude, decay.release_time)
         inside.append([each.includes(true) for each, true in zip(answers, PENDULUM[1:6], strict=True)])
-        assert abs(found.dry_displacement.value - 0.015) < 4.5 * found.dry_displacement.sd
-    assert found.status == "ok"
-    assert "sin x" in found.model
-    assert found.frequency.value == pytest.approx(1.0, abs=1e-4)
-    assert found.dry_force is not None
-    assert found.dry_force.includes(0.03)
+        assert abs(decay.dry_displacement.value - 0.015) < 4.5 * decay.dry_displacement.sd
+    assert decay.status == "ok"
+    assert "sin x" in decay.model
+    assert decay.frequency.value == pytest.approx(1.0, abs=1e-4)
+    assert decay.dry_force is not None
+    assert decay.dry_force.includes(0.03)
     assert np.all(np.mean(inside, axis=0) > share)
-    assert np.std(found.residual[0]) == pytest.approx(1e-3 / math.sqrt(5), rel=0.15)
-    assert found.noise_level == pytest.approx(1e-3, rel=0.1)
+    assert np.std(decay.residual[0]) == pytest.approx(1e-3 / math.sqrt(5), rel=0.15)
+    assert decay.noise_level == pytest.approx(1e-3, rel=0.1)
     straight = ss.fit_decay(pendulum())
     assert "times the noise" in straight.status
 
 
 def test_a_pendulum_s_static_friction_is_bracketed() -> None:
     """Its dry friction is static too: the sine of where it stays lies below it, that of where it turned above."""
-    found = ss.fit_decay(pendulum(seconds=40.0), restoring="pendulum")
-    assert found.static_displacement.includes(0.015)
-    assert found.static_displacement.status == "ok"
+    decay = ss.fit_decay(pendulum(seconds=40.0), restoring="pendulum")
+    assert decay.static_displacement.includes(0.015)
+    assert decay.static_displacement.status == "ok"
     early = ss.fit_decay(pendulum(seconds=6.0), restoring="pendulum")
     assert "only an upper bound" in early.static_displacement.status
 
 
 def test_a_pendulum_s_fit_is_that_of_the_choice_among_motions() -> None:
     record = pendulum()
-    found = ss.fit_decay(record, restoring="pendulum", candidates=("both", "viscous"))
+    decay = ss.fit_decay(record, restoring="pendulum", candidates=("both", "viscous"))
     chosen = ss.decay.choose_motion(record, restoring="pendulum", candidates=("both", "static"))
     for name in ("damping_ratio", "dry_displacement", "frequency"):
-        one, other = getattr(found, name), getattr(chosen, name)
+        one, other = getattr(decay, name), getattr(chosen, name)
         assert (one.value, one.interval, one.sd) == (other.value, other.interval, other.sd)
-    assert found.dry_displacement_any is not None
-    assert found.dry_displacement_any.includes(found.dry_displacement.value)
+    assert decay.dry_displacement_any is not None
+    assert decay.dry_displacement_any.includes(decay.dry_displacement.value)
 
 
 def test_a_real_pendulum(dataset: Callable[[str], Path]) -> None:
@@ -232,21 +232,21 @@ def test_a_real_pendulum(dataset: Callable[[str], Path]) -> None:
     path = dataset("pendulum_decay") / "pend1.csv"
     record = ss.read_record(path, channels={"theta": "#2 - 3.141592653589793 [rad]"}, time="#1 [s]")
     inertia = 0.2235 * 0.31692**2
-    found = ss.fit_decay(record, restoring="pendulum", mass=inertia, candidates="all")
-    assert found.dry_force is not None
-    assert 3.6e-3 < found.dry_force.value < 4.9e-3
-    w = 2 * math.pi * found.frequency.value
-    assert 2e-4 < 2 * w * inertia * found.damping_ratio.value < 6e-4
-    dry, damping = found.dry_displacement_any, found.damping_ratio_any
+    decay = ss.fit_decay(record, restoring="pendulum", mass=inertia, candidates="all")
+    assert decay.dry_force is not None
+    assert 3.6e-3 < decay.dry_force.value < 4.9e-3
+    w = 2 * math.pi * decay.frequency.value
+    assert 2e-4 < 2 * w * inertia * decay.damping_ratio.value < 6e-4
+    dry, damping = decay.dry_displacement_any, decay.damping_ratio_any
     assert dry is not None
     assert damping is not None
     for torque in (3.7e-3, 4.1e-3, 4.89e-3):
         assert dry.includes(torque / (w**2 * inertia))
     for viscous in (2.6e-4, 5e-4, 5.5e-4):
         assert damping.includes(viscous / (2 * w * inertia))
-    tried = {each.name: each.fitted.cost for each in found.motions[0].choice.candidates}
-    assert tried["viscous"] > 10**2 * float(sum(each @ each for each in found.residual))
-    assert "Stribeck" in found.status
+    tried = {candidate.name: candidate.fitted.cost for candidate in decay.motions[0].choice.candidates}
+    assert tried["viscous"] > 10**2 * float(sum(each @ each for each in decay.residual))
+    assert "Stribeck" in decay.status
 
 
 def test_the_interval_that_counts_the_model_s_form_stands_beside_the_statistical_one() -> None:
@@ -276,17 +276,17 @@ def test_several_releases_reject_a_motion_together() -> None:
         samples, dt, _ = ring_down(seed=seed, truth=truth)
         records.append(ss.Record.of({"x": samples}, fs=1 / dt))
     alone = ss.fit_decay(records[0], candidates=("both", "quadratic"))
-    found = ss.fit_decay(records, candidates=("both", "quadratic"))
-    assert len(found.motions) == 3
-    assert found.status == "ok"
+    decay = ss.fit_decay(records, candidates=("both", "quadratic"))
+    assert len(decay.motions) == 3
+    assert decay.status == "ok"
     for one, all_ in (
-        (alone.damping_ratio_any, found.damping_ratio_any), (alone.dry_displacement_any, found.dry_displacement_any)
+        (alone.damping_ratio_any, decay.damping_ratio_any), (alone.dry_displacement_any, decay.dry_displacement_any)
     ):  # fmt: skip
         assert one is not None
         assert all_ is not None
         assert all_.sd < one.sd
-    assert found.dry_displacement_any is not None
-    assert found.dry_displacement_any.includes(DRY)
+    assert decay.dry_displacement_any is not None
+    assert decay.dry_displacement_any.includes(DRY)
 
 
 def test_what_a_pendulum_s_fit_does_not_do_is_refused() -> None:
@@ -298,8 +298,8 @@ def test_what_a_pendulum_s_fit_does_not_do_is_refused() -> None:
 
 def test_a_lost_extreme_is_said_in_the_status() -> None:
     samples, dt, _ = ring_down(per_period=200)
-    found = ss.fit_decay(ss.Record.of({"x": np.delete(samples, slice(430, 480))}, fs=1 / dt))
-    assert "an extreme was lost" in found.status
+    decay = ss.fit_decay(ss.Record.of({"x": np.delete(samples, slice(430, 480))}, fs=1 / dt))
+    assert "an extreme was lost" in decay.status
 
 
 def test_the_noise_of_every_release_is_told() -> None:
@@ -349,14 +349,14 @@ def test_a_slider_seen_in_hundredths_of_a_millimetre(
     for seed in range(3):
         noise = 5e-7 * np.random.default_rng(seed).standard_normal(len(motion) + 200)
         seen = np.round((np.concatenate([np.full(200, amplitude), motion]) + noise) / 1e-5) * 1e-5
-        found = ss.fit_decay(ss.Record.of({"x": seen}, fs=1000.0), stiffness=stiffness)
-        assert found.dry_force is not None
+        decay = ss.fit_decay(ss.Record.of({"x": seen}, fs=1000.0), stiffness=stiffness)
+        assert decay.dry_force is not None
         ratio = damping / 2 / math.sqrt(stiffness * mass)
-        assert found.status == "ok"
-        assert found.dry_force.value == pytest.approx(kinetic, rel=1.5e-3)
-        assert found.damping_ratio.value == pytest.approx(ratio, rel=3e-3)
-        assert abs(found.dry_force.value - kinetic) < 4 * found.dry_force.sd
-        assert abs(found.damping_ratio.value - ratio) < 4 * found.damping_ratio.sd
+        assert decay.status == "ok"
+        assert decay.dry_force.value == pytest.approx(kinetic, rel=1.5e-3)
+        assert decay.damping_ratio.value == pytest.approx(ratio, rel=3e-3)
+        assert abs(decay.dry_force.value - kinetic) < 4 * decay.dry_force.sd
+        assert abs(decay.damping_ratio.value - ratio) < 4 * decay.damping_ratio.sd
 
 
 @pytest.mark.parametrize("corner", [1.0, 10.0])
@@ -365,9 +365,9 @@ def test_drift_widens_the_interval(corner: float) -> None:
     for seed in range(40):
         clean, dt, _ = ring_down(noise=0.0)
         samples = clean + 1e-3 * drift(len(clean), dt, corner, np.random.default_rng(seed))
-        found = ss.fit_decay(ss.Record.of({"x": samples}, fs=1 / dt))
+        decay = ss.fit_decay(ss.Record.of({"x": samples}, fs=1 / dt))
         inside.append(
-            ["drift" in found.noise, found.damping_ratio.includes(DAMPING), found.dry_displacement.includes(DRY)]
+            ["drift" in decay.noise, decay.damping_ratio.includes(DAMPING), decay.dry_displacement.includes(DRY)]
         )
     assert np.all(np.mean(inside, axis=0) > 0.84)
 
@@ -387,14 +387,14 @@ def test_several_releases_share_the_friction_and_narrow_the_bracket() -> None:
         truth[3:] = random.normal(), random.uniform(0.5, 1.0) * random.choice([-1, 1]), 0.3 + random.random()
         samples, dt, _ = ring_down(seed=seed, truth=truth)
         records.append(ss.Record.of({"x": samples}, fs=1 / dt))
-    alone = [ss.fit_decay(each) for each in records]
-    found = ss.fit_decay(records)
-    assert len(found.half_cycles) == len(found.time) == 6
-    assert found.damping_ratio.includes(DAMPING)
-    assert found.dry_displacement.includes(DRY)
-    assert found.damping_ratio.sd < 0.6 * min(each.damping_ratio.sd for each in alone)
-    assert found.static_displacement.includes(DRY)
-    assert found.static_displacement.sd <= min(each.static_displacement.sd for each in alone)
+    alone = [ss.fit_decay(record) for record in records]
+    decay = ss.fit_decay(records)
+    assert len(decay.half_cycles) == len(decay.time) == 6
+    assert decay.damping_ratio.includes(DAMPING)
+    assert decay.dry_displacement.includes(DRY)
+    assert decay.damping_ratio.sd < 0.6 * min(each.damping_ratio.sd for each in alone)
+    assert decay.static_displacement.includes(DRY)
+    assert decay.static_displacement.sd <= min(each.static_displacement.sd for each in alone)
 
 
 @pytest.mark.parametrize(("index", "value"), [(2, 0.03), (1, 0.05), (0, 7.0)], ids=["dry", "damping", "frequency"])
@@ -404,9 +404,9 @@ def test_releases_that_share_no_friction_are_said_to(index: int, value: float) -
         truth[index] = value if seed else truth[index]
         samples, dt, _ = ring_down(seed=seed, truth=truth)
         records.append(ss.Record.of({"x": samples}, fs=1 / dt))
-    found = ss.fit_decay(records)
-    assert found.status.startswith("the releases do not share one friction and frequency")
-    assert all(np.isfinite(each.interval).all() for each in found.estimates)
+    decay = ss.fit_decay(records)
+    assert decay.status.startswith("the releases do not share one friction and frequency")
+    assert all(np.isfinite(estimate.interval).all() for estimate in decay.estimates)
 
 
 def test_several_releases_in_one_file_are_fitted_together() -> None:
@@ -421,12 +421,12 @@ def test_several_releases_in_one_file_are_fitted_together() -> None:
             pull = before + (samples[0] - before) * (1 - np.cos(np.linspace(0, math.pi, 300))) / 2
             parts.append(pull + 1e-3 * random.standard_normal(300))
         parts.append(samples)
-    found = ss.fit_decay(ss.Record.of({"x": np.concatenate(parts)}, fs=1 / dt))
-    assert len(found.ring_downs) == 3
-    assert len(found.half_cycles) == 3
-    assert found.status == "ok"
-    assert abs(found.damping_ratio.value - DAMPING) < 4 * found.damping_ratio.sd
-    assert abs(found.dry_displacement.value - DRY) < 4 * found.dry_displacement.sd
+    decay = ss.fit_decay(ss.Record.of({"x": np.concatenate(parts)}, fs=1 / dt))
+    assert len(decay.ring_downs) == 3
+    assert len(decay.half_cycles) == 3
+    assert decay.status == "ok"
+    assert abs(decay.damping_ratio.value - DAMPING) < 4 * decay.damping_ratio.sd
+    assert abs(decay.dry_displacement.value - DRY) < 4 * decay.dry_displacement.sd
 
 
 @pytest.mark.parametrize("extremes", [3, 4])
@@ -440,8 +440,8 @@ def test_three_or_four_extremes_are_enough(extremes: int) -> None:
             samples, dt, _ = ring_down(seed=seed, truth=truth)
             if dry == DRY:
                 samples = samples[: int((truth[5] + (extremes - 1) / 2 + 0.2) / dt)]
-            found = ss.fit_decay(ss.Record.of({"x": samples}, fs=1 / dt))
-            inside.append([found.damping_ratio.includes(DAMPING), found.dry_displacement.includes(dry)])
+            decay = ss.fit_decay(ss.Record.of({"x": samples}, fs=1 / dt))
+            inside.append([decay.damping_ratio.includes(DAMPING), decay.dry_displacement.includes(dry)])
     assert np.all(np.mean(inside, axis=0) >= 0.85)
 
 
@@ -461,17 +461,17 @@ def test_a_hand_that_pulls_and_touches_is_left_out() -> None:
     pull = np.linspace(samples[-1], samples[0], 150) + 1e-3 * np.random.default_rng(3).standard_normal(150)
     touch = samples[-1] + 0.3 * np.sin(np.linspace(0, 1, 100)) + 1e-3 * np.random.default_rng(5).standard_normal(100)
     whole = np.concatenate([pull, samples, samples[-50:], touch])
-    found = ss.fit_decay(ss.Record.of({"x": whole}, fs=1 / dt))
-    assert abs(found.damping_ratio.value - DAMPING) < 4 * bound[1]
-    assert abs(found.dry_displacement.value - DRY) < 4 * bound[2]
+    decay = ss.fit_decay(ss.Record.of({"x": whole}, fs=1 / dt))
+    assert abs(decay.damping_ratio.value - DAMPING) < 4 * bound[1]
+    assert abs(decay.dry_displacement.value - DRY) < 4 * bound[2]
 
 
 def test_clipped_swings_are_left_out() -> None:
     samples, dt, bound = ring_down()
-    found = ss.fit_decay(ss.Record.of({"x": np.clip(samples, REST - 0.7, REST + 0.7)}, fs=1 / dt))
-    assert "clipped swings are left out" in found.status
-    assert abs(found.damping_ratio.value - DAMPING) < 8 * bound[1]
-    assert abs(found.dry_displacement.value - DRY) < 8 * bound[2]
+    decay = ss.fit_decay(ss.Record.of({"x": np.clip(samples, REST - 0.7, REST + 0.7)}, fs=1 / dt))
+    assert "clipped swings are left out" in decay.status
+    assert abs(decay.damping_ratio.value - DAMPING) < 8 * bound[1]
+    assert abs(decay.dry_displacement.value - DRY) < 8 * bound[2]
 
 
 @pytest.mark.parametrize(("damping", "dry"), [(DAMPING, 0.0), (0.0, DRY)], ids=["viscous", "dry"])
@@ -481,18 +481,18 @@ def test_one_friction_alone_is_told_from_both(damping: float, dry: float) -> Non
     count = 40 if dry == 0 else half_cycles(damping, dry)
     clean, _ = motion(truth, count, 1200, 0.01)
     samples = clean + 1e-3 * np.random.default_rng(2).standard_normal(1200)
-    found = ss.fit_decay(ss.Record.of({"x": samples}, fs=100.0))
-    assert abs(found.damping_ratio.value - damping) < 4 * found.damping_ratio.sd
-    assert abs(found.dry_displacement.value - dry) < 4 * found.dry_displacement.sd
-    assert found.status == "ok"
+    decay = ss.fit_decay(ss.Record.of({"x": samples}, fs=100.0))
+    assert abs(decay.damping_ratio.value - damping) < 4 * decay.damping_ratio.sd
+    assert abs(decay.dry_displacement.value - dry) < 4 * decay.dry_displacement.sd
+    assert decay.status == "ok"
 
 
 def test_static_friction_above_the_kinetic_is_bracketed() -> None:
     slider = ss.Oscillator(mass=1.0, stiffness=1000.0, damping=2.0, law=ss.laws.Coulomb(0.3, 1.5))
     seen = ss.simulate(slider, duration=4.0, start={"x": 0.01}).record(fs=500)["x"]
-    found = ss.fit_decay(ss.Record.of({"x": seen + 1e-5 * np.random.default_rng(0).standard_normal(len(seen))}, fs=500))
-    assert abs(found.dry_displacement.value - 3e-4) < 4 * found.dry_displacement.sd
-    assert found.static_displacement.includes(1.5e-3)
+    decay = ss.fit_decay(ss.Record.of({"x": seen + 1e-5 * np.random.default_rng(0).standard_normal(len(seen))}, fs=500))
+    assert abs(decay.dry_displacement.value - 3e-4) < 4 * decay.dry_displacement.sd
+    assert decay.static_displacement.includes(1.5e-3)
 
 
 def test_another_motion_is_flagged() -> None:
@@ -522,22 +522,22 @@ def test_the_same_answer_in_other_units(length: float) -> None:
 def test_counts_at_a_high_rate_are_counts_still() -> None:
     """Without noise a count's error is steady over many samples, and no part of it averages out."""
     x = np.round(free_decay(np.arange(36000) / 4000, [2 * math.pi, DAMPING, DRY, 0.013, 1.0, 0.3, *[0] * 6])[0], 2)
-    found = ss.fit_decay(ss.Record.of({"x": x}, fs=4000.0))
-    assert "counts" in found.noise
-    assert found.status == "ok"
-    assert found.damping_ratio.includes(DAMPING)
-    assert found.dry_displacement.includes(DRY)
+    decay = ss.fit_decay(ss.Record.of({"x": x}, fs=4000.0))
+    assert "counts" in decay.noise
+    assert decay.status == "ok"
+    assert decay.damping_ratio.includes(DAMPING)
+    assert decay.dry_displacement.includes(DRY)
 
 
 def test_a_motion_without_noise_that_came_to_rest_is_not_taken_for_counts() -> None:
     slider = ss.Oscillator(mass=1, stiffness=10, damping=0.2, law=ss.laws.Coulomb(0.2))
     run = ss.simulate(slider, duration=60, start={"x": 1.0})
-    found = ss.fit_decay(run.record(fs=200), stiffness=10)
-    assert found.noise == "white"
-    assert found.damping_ratio.value == pytest.approx(0.1 / math.sqrt(10), rel=1e-9)
-    assert found.dry_force is not None
-    assert found.dry_force.value == pytest.approx(0.2, rel=1e-9)
-    assert found.dry_displacement.sd < 1e-8
+    decay = ss.fit_decay(run.record(fs=200), stiffness=10)
+    assert decay.noise == "white"
+    assert decay.damping_ratio.value == pytest.approx(0.1 / math.sqrt(10), rel=1e-9)
+    assert decay.dry_force is not None
+    assert decay.dry_force.value == pytest.approx(0.2, rel=1e-9)
+    assert decay.dry_displacement.sd < 1e-8
 
 
 HALF, NOISY = 78.5, 3e-5  # samples in half a cycle, standard deviation [m]
@@ -554,9 +554,9 @@ def covered(motion: np.ndarray, trials: int = 20) -> tuple[int, int]:
     """How often of so many records the intervals hold the damping ratio and the dry friction of `swinging`."""
     random = np.random.default_rng(5)
     noises = NOISY * random.standard_normal((trials, len(motion)))
-    found = [ss.fit_decay(ss.Record.of({"x": motion + noise}, fs=500)) for noise in noises]
-    return sum(each.damping_ratio.includes(0.02) for each in found), sum(
-        each.dry_displacement.includes(1e-3) for each in found
+    decays = [ss.fit_decay(ss.Record.of({"x": motion + noise}, fs=500)) for noise in noises]
+    return sum(decay.damping_ratio.includes(0.02) for decay in decays), sum(
+        decay.dry_displacement.includes(1e-3) for decay in decays
     )
 
 
@@ -584,9 +584,9 @@ def test_no_half_cycle_is_added_before_a_record_that_begins_with_the_release(dam
     for seed in (0, 1, 49):
         noise = np.random.default_rng(seed).standard_normal(len(motion))
         for level in (1e-5, 2e-4):
-            found = ss.fit_decay(ss.Record.of({"x": motion + level * noise}, fs=500))
-            assert found.release_time.value == pytest.approx(0.0, abs=0.004)
-            assert found.amplitude.value == pytest.approx(start, abs=5 * level)
+            decay = ss.fit_decay(ss.Record.of({"x": motion + level * noise}, fs=500))
+            assert decay.release_time.value == pytest.approx(0.0, abs=0.004)
+            assert decay.amplitude.value == pytest.approx(start, abs=5 * level)
 
 
 def test_the_mean_of_several_candidates_lies_within_its_interval():

@@ -27,17 +27,17 @@ def measured(law: Any, frequency: float, seconds: float = 0.8, seed: int = 3) ->
 
 def test_a_compliant_contact_is_found_from_far_away() -> None:
     start = ss.Oscillator(law=ss.laws.CompliantContact(2.0, stiffness=60000, damping=5.0), **RIG)
-    found = ss.fit_law(measured(CONTACT, 2.5), start)
-    assert found.status == "ok"
+    fit = ss.fit_law(measured(CONTACT, 2.5), start)
+    assert fit.status == "ok"
     usual = {"damping", "stiffness", "x.gain", "a.gain", "load.gain", "x.delay"}
-    assert set(found.parameters) == {"kinetic", "law.stiffness", "law.damping"} | usual
-    assert found.law.kinetic == pytest.approx(1.1, rel=2e-3)
-    assert found.law.stiffness == pytest.approx(192000, rel=1e-2)
+    assert set(fit.parameters) == {"kinetic", "law.stiffness", "law.damping"} | usual
+    assert fit.law.kinetic == pytest.approx(1.1, rel=2e-3)
+    assert fit.law.stiffness == pytest.approx(192000, rel=1e-2)
     for name, true in (("kinetic", 1.1), ("law.stiffness", 192000), ("law.damping", 23.9)):
-        each = found.parameters[name]
+        each = fit.parameters[name]
         assert abs(each.value - true) < 4 * each.sd
-    assert all(0.8 < value < 1.2 for value in found.misfit.values())
-    assert np.allclose(np.diag(found.correlations), 1)
+    assert all(0.8 < value < 1.2 for value in fit.misfit.values())
+    assert np.allclose(np.diag(fit.correlations), 1)
 
 
 @pytest.mark.parametrize(
@@ -53,29 +53,29 @@ def test_a_compliant_contact_is_found_from_far_away() -> None:
     ids=["rigid", "static", "state variable"],
 )
 def test_a_law_is_found_in_three_records(law: Any, start: Any) -> None:
-    found = ss.fit_law([measured(law, frequency) for frequency in SWINGS], ss.Oscillator(law=start, **RIG))
-    assert found.status == "ok"
+    fit = ss.fit_law([measured(law, frequency) for frequency in SWINGS], ss.Oscillator(law=start, **RIG))
+    assert fit.status == "ok"
     for name, true in {**RIG, **vars(law)}.items():
-        if name in found.parameters:
-            each = found.parameters[name]
+        if name in fit.parameters:
+            each = fit.parameters[name]
             assert abs(each.value - true) < 4 * each.sd
-    assert len(found.traces) == 3
+    assert len(fit.traces) == 3
 
 
 @pytest.mark.parametrize(("kinetic", "static"), [(1.1, 1.2), (1.5, 1.6), (0.5, 0.8)])
 def test_a_parameter_that_is_held_stays_as_it_was_given(kinetic: float, static: float) -> None:
     record = measured(ss.laws.Coulomb(0.9, static=1.2), 2.5)
     start = ss.Oscillator(law=ss.laws.Coulomb(kinetic, static=static), **RIG)
-    found = ss.fit_law(record, start, free=["kinetic"], intervals=False)
-    assert found.law.static == static
+    fit = ss.fit_law(record, start, free=["kinetic"], intervals=False)
+    assert fit.law.static == static
     if static == 1.2:
-        assert found.law.kinetic == pytest.approx(0.9, rel=2e-3)
-    assert found.law.kinetic <= static
+        assert fit.law.kinetic == pytest.approx(0.9, rel=2e-3)
+    assert fit.law.kinetic <= static
 
 
 def test_another_record_is_predicted() -> None:
-    found = ss.fit_law(measured(CONTACT, 8.7), ss.Oscillator(law=CONTACT, **RIG))
-    other = ss.fit_law(measured(CONTACT, 2.5), found.oscillator, free=(), intervals=False)
+    fit = ss.fit_law(measured(CONTACT, 8.7), ss.Oscillator(law=CONTACT, **RIG))
+    other = ss.fit_law(measured(CONTACT, 2.5), fit.oscillator, free=(), intervals=False)
     assert not other.parameters
     assert all(value < 1.2 for value in other.misfit.values())
 
@@ -85,24 +85,24 @@ def test_a_gain_is_fitted_beside_the_law() -> None:
     wrong = record.with_samples(
         {name: record[name] * (1.02 if name == "load" else 1.0) for name in record}, Step("wrong")
     )
-    found = ss.fit_law(wrong, ss.Oscillator(law=ss.laws.Coulomb(1.0), **RIG), nuisance=["load.gain"])
-    assert found.parameters["load.gain"].value == pytest.approx(1.02, abs=4 * found.parameters["load.gain"].sd)
-    assert found.parameters["kinetic"].value == pytest.approx(1.0, abs=4 * found.parameters["kinetic"].sd)
+    fit = ss.fit_law(wrong, ss.Oscillator(law=ss.laws.Coulomb(1.0), **RIG), nuisance=["load.gain"])
+    assert fit.parameters["load.gain"].value == pytest.approx(1.02, abs=4 * fit.parameters["load.gain"].sd)
+    assert fit.parameters["kinetic"].value == pytest.approx(1.0, abs=4 * fit.parameters["kinetic"].sd)
 
 
 def test_a_wrong_law_is_told_by_what_it_leaves() -> None:
-    found = ss.fit_law(measured(CONTACT, 2.5), ss.Oscillator(law=ss.laws.Coulomb(1.0), **RIG))
-    assert "times its noise" in found.status
+    fit = ss.fit_law(measured(CONTACT, 2.5), ss.Oscillator(law=ss.laws.Coulomb(1.0), **RIG))
+    assert "times its noise" in fit.status
 
 
 def test_a_rough_surface_is_fitted_with_its_profile() -> None:
     rough = ss.laws.RoughSurface(CONTACT, share=0.03, length=2e-4, span=2e-3, seed=4)
     record = measured(rough, 8.7, 0.5)
     start = ss.Oscillator(law=ss.laws.CompliantContact(1.2, stiffness=150000, damping=15.0), **RIG)
-    found = ss.fit_law(record, start, law=ss.laws.RoughSurface)
-    assert found.surface == "rough"
-    assert found.law.stiffness == pytest.approx(192000, rel=1e-2)
-    kinetic = found.parameters["kinetic"]
+    fit = ss.fit_law(record, start, law=ss.laws.RoughSurface)
+    assert fit.surface == "rough"
+    assert fit.law.stiffness == pytest.approx(192000, rel=1e-2)
+    kinetic = fit.parameters["kinetic"]
     assert kinetic.sd > 0.005  # as unsure as the mean of a few places is
     assert kinetic.includes(1.1)
 
@@ -111,8 +111,8 @@ def test_a_stiffness_that_can_not_be_told_has_an_open_interval() -> None:
     record = measured(ss.laws.Coulomb(1.0), 11.1)
     record = ss.Record.of({name: record[name] for name in "xz"}, fs=record.fs)
     start = ss.Oscillator(law=ss.laws.CompliantContact(1.0, stiffness=1e6, damping=30.0), **RIG)
-    found = ss.fit_law(record, start, free=["kinetic", "law.stiffness"])
-    each = found.parameters["law.stiffness"]
+    fit = ss.fit_law(record, start, free=["kinetic", "law.stiffness"])
+    each = fit.parameters["law.stiffness"]
     assert np.isinf(each.interval[1])
     assert each.interval[0] > 1e4
     assert "can not be told from infinite here" in each.status
@@ -122,9 +122,9 @@ def test_a_free_decay_needs_no_drive() -> None:
     slider = ss.Oscillator(law=ss.laws.Coulomb(0.4), **RIG)
     run = ss.simulate(slider, duration=3.0, start={"x": 5e-3})
     record = ss.Rig.perfect("x").having("x", white=1e-6).measure(run, fs=2000, rng=2)
-    found = ss.fit_law(record, slider.having(kinetic=0.5), nuisance=["stiffness"])
-    assert found.law.kinetic == pytest.approx(0.4, rel=2e-3)
-    assert found.parameters["stiffness"].value == pytest.approx(2310, rel=1e-3)
+    fit = ss.fit_law(record, slider.having(kinetic=0.5), nuisance=["stiffness"])
+    assert fit.law.kinetic == pytest.approx(0.4, rel=2e-3)
+    assert fit.parameters["stiffness"].value == pytest.approx(2310, rel=1e-3)
 
 
 def test_a_base_of_any_motion_drives() -> None:
@@ -133,8 +133,8 @@ def test_a_base_of_any_motion_drives() -> None:
     base = 1e-3 * np.sin(2 * np.pi * 5.3 * time) + 0.6e-3 * np.sin(2 * np.pi * 8.1 * time + 1)
     slider = ss.Oscillator(law=ss.laws.Coulomb(1.0), drive=ss.drives.Recorded(base, fs=fs), **RIG)
     record = ss.Rig.perfect("x", "z").having("x", white=1e-6).measure(ss.simulate(slider, duration=3.9), fs=fs, rng=5)
-    found = ss.fit_law(record.rows(2000, 6000), ss.Oscillator(law=ss.laws.Coulomb(0.8), **RIG))
-    assert found.law.kinetic == pytest.approx(1.0, rel=2e-3)
+    fit = ss.fit_law(record.rows(2000, 6000), ss.Oscillator(law=ss.laws.Coulomb(0.8), **RIG))
+    assert fit.law.kinetic == pytest.approx(1.0, rel=2e-3)
 
 
 def test_progress_is_told_and_ends() -> None:

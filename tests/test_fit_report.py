@@ -106,8 +106,8 @@ def test_a_single_fitted_law_is_shown_and_written_too(tmp_path: Path) -> None:
     found = ss.fit_law(record, slider.having(kinetic=1.0))
     assert [plate.name for plate in ss.summary(found).plates] == ["fit-1"]
     folder = ss.publish(found, folder=tmp_path / "fit", record=record)
-    told = json.loads((folder / "results.json").read_text(encoding="utf-8"))
-    assert (told["law"], told["estimates"][0]["value"]) == ("Coulomb", found.law.kinetic)
+    data = json.loads((folder / "results.json").read_text(encoding="utf-8"))
+    assert (data["law"], data["estimates"][0]["value"]) == ("Coulomb", found.law.kinetic)
     assert ss.systems.read_system(folder / "law" / "law.toml").system.law == found.law
     assert ss.summary(found, record=record).headline[0] == (
         f"The law Coulomb, fitted to x: kinetic {found.law.kinetic:.3f} N."
@@ -142,7 +142,7 @@ def test_friction_is_found_from_the_mass_and_the_force() -> None:
     write("robot.csv", x_m=x, force_N=force)
     result = fit("robot.csv", "--mass", "5", "--stiffness", "0", "--curve", "viscous", "--json")
     assert result.exit_code == 0, result.output
-    found = {each["name"]: each for each in json.loads(result.stdout)["estimates"]}
+    found = {load["name"]: load for load in json.loads(result.stdout)["estimates"]}
     assert found["sliding friction"]["value"] == pytest.approx(4, rel=0.02)
     assert found["viscous friction"]["value"] == pytest.approx(3, rel=0.05)
     refused = fit("robot.csv", "--curve", "viscous")

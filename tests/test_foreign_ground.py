@@ -101,8 +101,8 @@ def test_a_record_is_analysed_to_the_same_numbers(abroad: Path) -> None:
     write = "import stickslip as ss; ss.write_record(ss.datasets.demo().between(0, 4), 'run.csv')"
     python("-c", write, folder=abroad)
     words = ["analyze", "run.csv", "--mass", "2.42", "--stiffness", "2310", "--json"]
-    told = json.loads(python("-m", "stickslip", *words, folder=abroad))
-    (friction,) = [estimate for estimate in told["estimates"] if estimate["name"] == "sliding friction"]
+    data = json.loads(python("-m", "stickslip", *words, folder=abroad))
+    (friction,) = [estimate for estimate in data["estimates"] if estimate["name"] == "sliding friction"]
     assert friction["value"] == pytest.approx(1.1, abs=0.03)  # the truth of the bundled record
 
 

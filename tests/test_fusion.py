@@ -23,16 +23,16 @@ def error(record: ss.Record, truth: NDArray[np.float64], method: str) -> tuple[f
 
 @pytest.mark.parametrize("rough", [0.0, 0.03])
 def test_all_sensors_together_find_the_friction_and_its_band(rough: float) -> None:
-    found = [error(told(measured(f, rough)[0]), measured(f, rough)[1], "fusion") for f in CASES]
-    assert max(rms for rms, _ in found) < 0.012
-    assert 0.93 < np.mean([share for _, share in found]) < 0.97
-    assert all(0.9 < share < 0.99 for _, share in found)
+    errors = [error(told(measured(f, rough)[0]), measured(f, rough)[1], "fusion") for f in CASES]
+    assert max(rms for rms, _ in errors) < 0.012
+    assert 0.93 < np.mean([share for _, share in errors]) < 0.97
+    assert all(0.9 < share < 0.99 for _, share in errors)
 
 
 def test_motion_sensors_alone_come_near() -> None:
-    found = [error(told(measured(f)[0]), measured(f)[1], "motion") for f in CASES]
-    assert max(rms for rms, _ in found) < 0.026
-    assert 0.93 < np.mean([share for _, share in found]) < 0.97
+    errors = [error(told(measured(f)[0]), measured(f)[1], "motion") for f in CASES]
+    assert max(rms for rms, _ in errors) < 0.026
+    assert 0.93 < np.mean([share for _, share in errors]) < 0.97
 
 
 @pytest.mark.parametrize("frequency", list(CASES))

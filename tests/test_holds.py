@@ -79,9 +79,9 @@ def test_onsets_are_as_sure_as_they_say() -> None:
         for which in (0, 1):
             ratios[which] += list(compared(ours[which], true[which])[3])
     assert len(ratios[0]) > 40
-    for each in ratios:
-        assert 0.5 < rms(np.array(each)) < 1.4
-        assert np.mean(np.abs(each) < 2) > 0.9
+    for ratio in ratios:
+        assert 0.5 < rms(np.array(ratio)) < 1.4
+        assert np.mean(np.abs(ratio) < 2) > 0.9
 
 
 @pytest.mark.parametrize("frequency", [2.5, 11.1])

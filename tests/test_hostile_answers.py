@@ -30,9 +30,9 @@ def test_what_is_too_short_is_told_of_what_was_asked(samples, names):
 def test_a_side_question_without_an_answer_refuses_no_other(samples):
     demo = ss.datasets.demo()
     short = ss.Record.of({name: demo[name][::50][:samples] for name in ("x", "z", "a")}, fs=demo.fs / 50)
-    found = ss.analyze(short, mass=2.42, stiffness=2310, damping=0.12)
-    assert found.level is not None
-    assert found.level.value == pytest.approx(1.1, rel=0.1)
+    findings = ss.analyze(short, mass=2.42, stiffness=2310, damping=0.12)
+    assert findings.level is not None
+    assert findings.level.value == pytest.approx(1.1, rel=0.1)
 
 
 def free_decay():
@@ -44,13 +44,13 @@ def free_decay():
 
 @pytest.mark.figures
 def test_findings_outlive_a_figure_that_can_not_be_drawn(tmp_path, monkeypatch):
-    found = ss.analyze_decay(free_decay(), method="thesis")
+    findings = ss.analyze_decay(free_decay(), method="thesis")
 
     def fails(*_, **__):
         raise ValueError("Axis limits cannot be NaN or Inf")
 
     monkeypatch.setattr("stickslip.figures.decay.plot_differences", fails)
-    folder = ss.publish(found, folder=tmp_path / "results")
+    folder = ss.publish(findings, folder=tmp_path / "results")
     page = (folder / "report.html").read_text(encoding="utf-8")
     assert "The figure &#39;Amplitude differences&#39; can not be drawn: Axis limits cannot be NaN or Inf." in page
     names = sorted(path.name for path in (folder / "figures").iterdir())
@@ -61,11 +61,11 @@ def test_findings_outlive_a_figure_that_can_not_be_drawn(tmp_path, monkeypatch):
 
 @pytest.mark.figures
 def test_a_decay_without_a_finite_worst_case_is_drawn_and_written(tmp_path):
-    found = ss.analyze_decay(free_decay(), method="thesis")
-    unbounded = {name: np.full(len(found.decay.thesis.bounds.m), np.inf) for name in ("rate_worst", "dry_worst")}
-    bounds = replace(found.decay.thesis.bounds, **unbounded)
-    decay = replace(found.decay, thesis=replace(found.decay.thesis, bounds=bounds))
-    folder = ss.publish(found.having(decay=decay), folder=tmp_path / "results")
+    findings = ss.analyze_decay(free_decay(), method="thesis")
+    unbounded = {name: np.full(len(findings.decay.thesis.bounds.m), np.inf) for name in ("rate_worst", "dry_worst")}
+    bounds = replace(findings.decay.thesis.bounds, **unbounded)
+    decay = replace(findings.decay, thesis=replace(findings.decay.thesis, bounds=bounds))
+    folder = ss.publish(findings.having(decay=decay), folder=tmp_path / "results")
     assert (folder / "figures" / "bounds.svg").exists()
 
 
@@ -87,7 +87,9 @@ def questions() -> dict[str, Callable[..., object]]:
         if not inspect.isfunction(function) or function.__module__.split(".")[1] not in ROOMS or name in LONG:
             continue
         first, *others = inspect.signature(function).parameters.values()
-        needed = {each.name for each in others if each.default is each.empty and each.kind is not each.VAR_POSITIONAL}
+        needed = {
+            other.name for other in others if other.default is other.empty and other.kind is not other.VAR_POSITIONAL
+        }
         if "Record" in str(first.annotation) and needed <= STATED.keys():
             chosen[name] = function
     return chosen

@@ -261,9 +261,9 @@ def test_every_law_of_the_package_is_far_from_that_limit() -> None:
 
 
 def test_a_hostile_file_is_one_sentence_and_makes_nothing(tmp_path: Path) -> None:
-    told = FOREIGN.replace("\\", "\\\\").replace('"', '\\"').replace("\n", "\\n")
+    changed = FOREIGN.replace("\\", "\\\\").replace('"', '\\"').replace("\n", "\\n")
     (tmp_path / "slider.toml").write_text(
-        f'system = {{ mass = 1, stiffness = 4 }}\nlaw = {{ name = "FrictionCurve", curve = "{told}" }}\n'
+        f'system = {{ mass = 1, stiffness = 4 }}\nlaw = {{ name = "FrictionCurve", curve = "{changed}" }}\n'
     )
     outcome = civil(program("simulate", "slider.toml", folder=tmp_path))
     assert outcome.code == 2

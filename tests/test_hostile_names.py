@@ -71,8 +71,8 @@ def test_every_format_is_read_whatever_bytes_name_it(tmp_path: Path, name: str) 
     fs = None if name == "tone.wav" else 250
     known = ss.read_record(tmp_path / name, fs=fs)
     moved = (tmp_path / name).rename(tmp_path / f"{BYTES}{Path(name).suffix}")
-    found = ss.read_record(moved, fs=fs)
-    assert {key: list(found[key]) for key in found} == {key: list(known[key]) for key in known}
+    record = ss.read_record(moved, fs=fs)
+    assert {key: list(record[key]) for key in record} == {key: list(known[key]) for key in known}
 
 
 def test_what_is_refused_is_named_in_one_line(tmp_path: Path) -> None:

@@ -94,8 +94,8 @@ def test_at_a_terminal_it_asks_and_takes_what_is_typed() -> None:
     ]  # fmt: skip
     text = typed([sys.executable, "-m", "stickslip", "init", "versuch.csv"], answers)
     assert "rig.toml is written." in text, text
-    told = tomllib.loads(Path("rig.toml").read_text())
-    assert told == {
+    data = tomllib.loads(Path("rig.toml").read_text())
+    assert data == {
         "mass": "2 kg", "stiffness": "2.31 N/mm", "channels": {"x": "`Kanal A` [mm]", "friction": "`Kanal B` [N]"}
     }  # fmt: skip
 

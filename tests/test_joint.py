@@ -44,16 +44,15 @@ def log(noise=0.0, seed=0, **changes):
 
 
 def test_truth_without_noise():
-    found = regress_joint(log())
+    regression = regress_joint(log())
     for name, value in TRUTH.items():
-        assert getattr(found, name).value == pytest.approx(value, rel=2e-3), name
-    weight = np.abs(found.weight(log()["theta"]))
-    assert found.carried == pytest.approx(weight.mean(), rel=0.1)
-    assert found.level.value == pytest.approx(0.06 + 0.15 * found.carried, rel=1e-3)
-    assert found.residual < 1e-3
-    assert [found.level.unit, found.viscous.unit, found.load.unit, found.inertia.unit, found.sine.unit] == [
-        "N m", "N m s/rad", "1", "kg m^2", "N m",
-    ]  # fmt: skip
+        assert getattr(regression, name).value == pytest.approx(value, rel=2e-3), name
+    weight = np.abs(regression.weight(log()["theta"]))
+    assert regression.carried == pytest.approx(weight.mean(), rel=0.1)
+    assert regression.level.value == pytest.approx(0.06 + 0.15 * regression.carried, rel=1e-3)
+    assert regression.residual < 1e-3
+    columns = ("level", "viscous", "load", "inertia", "sine")
+    assert [getattr(regression, name).unit for name in columns] == ["N m", "N m s/rad", "1", "kg m^2", "N m"]
 
 
 @pytest.mark.parametrize("torque", [True, False], ids=["torque", "controller"])
@@ -64,11 +63,15 @@ def test_intervals_hold_on_joints_of_another_integrator(torque, draws, least):
     for seed in range(draws):
         joint = joints.drawn(seed, torque=torque)
         try:
-            found = regress_joint(joint.record, **({} if torque else {"kp": joint.kp}))
+            regression = regress_joint(joint.record, **({} if torque else {"kp": joint.kp}))
         except EstimateError:
             continue
         true = joint.truth
-        pairs = [(found.level, joint.level(found.time)), (found.load, true["load"]), (found.viscous, true["viscous"])]
+        pairs = [
+            (regression.level, joint.level(regression.time)),
+            (regression.load, true["load"]),
+            (regression.viscous, true["viscous"]),
+        ]
         held += [each.includes(value) for each, value in pairs if each is not None and stands(each.status)]
     assert len(held) > 2 * draws
     assert np.mean(held) >= least
@@ -81,13 +84,13 @@ def test_constants_that_are_stated_go_through():
     assert (known.inertia.value, known.inertia.sd) == (0.02, 0.001)
     assert known.level.includes(0.06 + 0.15 * known.carried)
     by_current = ss.Record.of({"theta": q, "current": force / 0.8}, fs=200.0)
-    found = regress_joint(by_current, torque_constant="0.8 ± 0.04 N m/A")
-    assert found.source == "current"
-    assert found.forward.value == pytest.approx(0.07, rel=2e-3)
-    assert found.level.sd == pytest.approx(0.05 * found.level.value, rel=0.05)
+    regression = regress_joint(by_current, torque_constant="0.8 ± 0.04 N m/A")
+    assert regression.source == "current"
+    assert regression.forward.value == pytest.approx(0.07, rel=2e-3)
+    assert regression.level.sd == pytest.approx(0.05 * regression.level.value, rel=0.05)
     reference = q + force / 18.0
-    told = ss.Record.of({"theta": q, "reference": reference}, fs=200.0, units={"reference": "rad"})
-    controlled = regress_joint(told, kp="18 N m/rad", kd=0.0)
+    record = ss.Record.of({"theta": q, "reference": reference}, fs=200.0, units={"reference": "rad"})
+    controlled = regress_joint(record, kp="18 N m/rad", kd=0.0)
     assert controlled.source == "reference"
     assert controlled.damping is None
     assert controlled.forward.value == pytest.approx(0.07, rel=0.02)
@@ -95,8 +98,8 @@ def test_constants_that_are_stated_go_through():
 
 def test_a_load_part_is_not_made_up():
     """Without one its interval holds zero, as often as it should: in 27 of 30 draws or more."""
-    found = [regress_joint(log(noise=0.02, seed=seed, load=0.0)).load for seed in range(30)]
-    assert sum(each.interval[0] <= 0 for each in found) >= 26
+    loads = [regress_joint(log(noise=0.02, seed=seed, load=0.0)).load for seed in range(30)]
+    assert sum(load.interval[0] <= 0 for load in loads) >= 26
 
 
 def test_what_the_log_can_not_tell_is_said_with_the_motion_that_would():
@@ -104,9 +107,9 @@ def test_what_the_log_can_not_tell_is_said_with_the_motion_that_would():
     q = 0.02 * np.sin(2 * np.pi * 0.5 * t)
     v, a = np.gradient(q, 1 / 200), np.gradient(np.gradient(q, 1 / 200), 1 / 200)
     small = ss.Record.of({"theta": q, "force": torque(q, v, a)}, fs=200.0, units={"force": "N m"})
-    found = regress_joint(small)
-    assert found.left_out
-    assert "turn farther" in " ".join(found.left_out)
+    regression = regress_joint(small)
+    assert regression.left_out
+    assert "turn farther" in " ".join(regression.left_out)
     one_way = ss.Record.of({"theta": t, "force": np.sin(t)}, fs=200.0, units={"force": "N m"})
     with pytest.raises(EstimateError, match="back and forth"):
         regress_joint(one_way)
@@ -133,11 +136,11 @@ def test_breakaway_of_a_joint_that_creeps_away():
     angle, motor = joints.march(p, reference, np.gradient(reference, t), 20, 20, 1000.0)
     size = 2 * np.pi / 2**18
     written = {"theta": np.round(angle / size) * size, "force": motor + 0.02 * rng.standard_normal(len(motor))}
-    found = analyze_joint(ss.Record.of(written, fs=1000.0, units={"force": "N m"}), gravity=False)
-    assert found.joint.level.value == pytest.approx(3.45, rel=0.02)
-    assert found.breakaway.ratio.value == pytest.approx(1.4, rel=0.05)
-    assert found.breakaway.ratio.includes(1.4)
-    assert found.breakaway.static.value == pytest.approx(1.4 * 3.45, rel=0.05)
+    joint = analyze_joint(ss.Record.of(written, fs=1000.0, units={"force": "N m"}), gravity=False)
+    assert joint.joint.level.value == pytest.approx(3.45, rel=0.02)
+    assert joint.breakaway.ratio.value == pytest.approx(1.4, rel=0.05)
+    assert joint.breakaway.ratio.includes(1.4)
+    assert joint.breakaway.static.value == pytest.approx(1.4 * 3.45, rel=0.05)
 
 
 def test_breakaway_is_not_told_of_a_fast_joint():
@@ -207,22 +210,24 @@ def test_emps(dataset):
 
     While it surely slides it rubs against 1 N more, and less by the speed: friction is no straight line near rest.
     """
-    found = regress_joint(emps(dataset))
-    assert found.inertia.value == pytest.approx(95.1089, rel=0.01)
-    assert found.level.value == pytest.approx(20.386, rel=0.06)
-    assert found.viscous_forward.value == pytest.approx(166.706, rel=0.09)
-    assert found.viscous_back.value == pytest.approx(240.424, rel=0.05)
-    assert found.sine is None
-    assert found.level.unit == "N"
-    assert found.residual < 0.02  # published: 0.0311
+    regression = regress_joint(emps(dataset))
+    assert regression.inertia.value == pytest.approx(95.1089, rel=0.01)
+    assert regression.level.value == pytest.approx(20.386, rel=0.06)
+    assert regression.viscous_forward.value == pytest.approx(166.706, rel=0.09)
+    assert regression.viscous_back.value == pytest.approx(240.424, rel=0.05)
+    assert regression.sine is None
+    assert regression.level.unit == "N"
+    assert regression.residual < 0.02  # published: 0.0311
 
 
 def test_emps_is_predicted_inside_its_loop(dataset):
     """The controller makes ``gtau kv (kp (qg - qm) - v)``: a spring to the reference and a damper to the ground."""
-    found = regress_joint(emps(dataset))
-    law = ss.laws.Geared(found.forward.value, found.back.value, found.viscous_forward.value, found.viscous_back.value)
+    regression = regress_joint(emps(dataset))
+    law = ss.laws.Geared(
+        regression.forward.value, regression.back.value, regression.viscous_forward.value, regression.viscous_back.value
+    )
     damping = 35.1507 * 243.45
-    loop = ss.Oscillator(mass=found.inertia.value, stiffness=160.18 * damping, damping=damping, law=law)
+    loop = ss.Oscillator(mass=regression.inertia.value, stiffness=160.18 * damping, damping=damping, law=law)
     channels = {"x": "qm [m]", "z": "qg [m]"}
     record = ss.read_record(dataset("emps") / "DATA_EMPS.mat", channels=channels, fs=1000.0)
     (part,) = ss.answers.predict(record, loop, plain=False).parts
@@ -291,8 +296,8 @@ def test_command(written, tmp_path, monkeypatch):
     assert "The joint slides against" in run.output
     folder = Path("shoulder-joint")
     assert (folder / "report.html").is_file()
-    told = json.loads((folder / "results.json").read_text())
-    levels = {each["name"]: each for each in told["estimates"]}
+    data = json.loads((folder / "results.json").read_text())
+    levels = {each["name"]: each for each in data["estimates"]}
     assert levels["Coulomb friction forward"]["interval"][0] <= joint.truth["forward"]
     assert (
         levels["friction per load"]["interval"][0] <= joint.truth["load"] <= levels["friction per load"]["interval"][1]
@@ -309,8 +314,8 @@ def test_command_by_the_gains_alone(written, tmp_path, monkeypatch):
     channels = ["--channels", "theta=position", "--channels", "reference=goal_position"]
     run = CliRunner().invoke(main, ["joint", str(path), "--json", "--kp", f"{joint.truth['kp']} N m/rad", *channels])
     assert run.exit_code == 0, run.output
-    told = json.loads(run.stdout)
-    assert told["source"] == "reference"
+    data = json.loads(run.stdout)
+    assert data["source"] == "reference"
     assert not Path("shoulder-joint").exists()
     lacking = CliRunner().invoke(main, ["joint", str(path), "--json", *channels])
     assert lacking.exit_code == 1
@@ -332,10 +337,10 @@ def test_the_motion_proposed_tells_what_the_log_did_not(written, tmp_path, monke
         {"theta": np.round(angle / size) * size, "force": motor, "reference": reference[:-1]},
         fs=1000.0, units={"force": "N m", "reference": "rad"},
     )  # fmt: skip
-    found = regress_joint(followed)
-    assert not found.left_out
+    regression = regress_joint(followed)
+    assert not regression.left_out
     for name, value in {"forward": 0.05, "back": 0.06, "load": 0.2, "viscous": 0.03, "inertia": 0.03}.items():
-        assert getattr(found, name).value == pytest.approx(value, rel=0.05), name
+        assert getattr(regression, name).value == pytest.approx(value, rel=0.05), name
     monkeypatch.chdir(tmp_path)
     run = CliRunner().invoke(main, ["joint", str(written[1]), "--json", "--propose", "next.csv"])
     assert run.exit_code == 0, run.output
@@ -345,10 +350,10 @@ def test_the_motion_proposed_tells_what_the_log_did_not(written, tmp_path, monke
 def test_a_unit_that_nobody_stated_is_flagged():
     q, v, a = motion()
     record = ss.Record.of({"position": q, "effort": torque(q, v, a)}, fs=200.0)
-    found = analyze_joint(record)
-    assert "nobody stated a unit" in found.joint.level.status
-    assert not stands(found.joint.level.status)
-    assert kinds(found.joint.level.status) == {""}
+    joint = analyze_joint(record)
+    assert "nobody stated a unit" in joint.joint.level.status
+    assert not stands(joint.joint.level.status)
+    assert kinds(joint.joint.level.status) == {""}
 
 
 @pytest.mark.parametrize(
@@ -391,9 +396,9 @@ def test_a_log_of_lerobot(tmp_path):
     record = axis_record(ss.read_record(path), axis="1")
     assert list(record) == ["theta", "reference"]
     assert record["theta"] == pytest.approx(q, abs=1e-6)
-    found = regress_joint(record, kp=18.0, kd=0.0)
-    assert found.forward.value == pytest.approx(0.07, rel=0.1)
-    assert found.load.value == pytest.approx(0.15, rel=0.1)
+    regression = regress_joint(record, kp=18.0, kd=0.0)
+    assert regression.forward.value == pytest.approx(0.07, rel=0.1)
+    assert regression.load.value == pytest.approx(0.15, rel=0.1)
 
 
 def test_cells_that_are_not_alike_are_refused_in_a_sentence(tmp_path):

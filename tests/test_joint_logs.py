@@ -94,9 +94,9 @@ def test_command(tmp_path, monkeypatch) -> None:
     run = CliRunner().invoke(main, ["joint", "0.csv", "1.csv", "2.csv", "--output", "out"])
     assert run.exit_code == 0, run.output
     assert "Each log by the others" in run.output
-    told = json.loads((tmp_path / "out/results.json").read_text())
-    assert len(told["records"]) == 3
-    assert all(one["error"] < one["plain"] for one in told["comparison"]["predictions"])
+    data = json.loads((tmp_path / "out/results.json").read_text())
+    assert len(data["records"]) == 3
+    assert all(one["error"] < one["plain"] for one in data["comparison"]["predictions"])
     assert (tmp_path / "out/report.html").is_file()
 
 

@@ -81,8 +81,8 @@ def link(page: Page, state: dict[str, Any]) -> str:
 
 def state_of(page: Page) -> dict[str, Any]:
     text = page.evaluate("location.hash.slice(1)")
-    told: dict[str, Any] = json.loads(base64.urlsafe_b64decode(text + "=" * (-len(text) % 4)))
-    return told
+    data: dict[str, Any] = json.loads(base64.urlsafe_b64decode(text + "=" * (-len(text) % 4)))
+    return data
 
 
 def open_data(page: Page) -> None:
@@ -401,7 +401,7 @@ def test_values_stand_under_the_pointer_on_all_traces(page: Page, lab: Lab) -> N
     page.mouse.move(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
     readings = page.locator(".trace .reading").all_inner_texts()
     assert len(readings) == 4
-    assert all(re.search(r"-?[\d.]+.* at 1\.[56]\d* s", each) for each in readings), readings
+    assert all(re.search(r"-?[\d.]+.* at 1\.[56]\d* s", reading) for reading in readings), readings
 
 
 def test_a_session_comes_back_from_its_file(page: Page, lab: Lab, tmp_path: Path) -> None:
@@ -452,8 +452,8 @@ def test_nothing_that_axe_knows_keeps_anybody_out_and_it_fits_a_phone(page: Page
     for theme in ("light", "dark"):
         for tab in ("Play", "Map", "Data", "Live"):
             page.get_by_role("tab", name=tab).click()
-            found = Axe().run(page)
-            assert found.violations_count == 0, f"{tab}, {theme}: {found.generate_report()}"
+            run = Axe().run(page)
+            assert run.violations_count == 0, f"{tab}, {theme}: {run.generate_report()}"
         page.get_by_role("button", name="Dark or light").click()
     for width in (360, 768):
         page.set_viewport_size({"width": width, "height": 800})

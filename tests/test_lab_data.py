@@ -76,9 +76,9 @@ def ended(client: Client, job: str, patience: float = 1200.0) -> dict[str, Any]:
 
 
 def answered(client: Client, question: str, *keys: str, **more: Any) -> dict[str, Any]:
-    told = ended(client, ask(client, question, *keys, **more))
-    assert told["state"] == "done", told["message"]
-    return told["answer"]
+    result = ended(client, ask(client, question, *keys, **more))
+    assert result["state"] == "done", result["message"]
+    return result["answer"]
 
 
 def rubbing() -> ss.Record:
@@ -176,11 +176,11 @@ def test_the_answer_is_the_librarys_to_the_last_printed_digit(client: Client, tm
     job = ask(client, "analyze", send(client, path))
     with client.stream("GET", f"/jobs/{job}/events") as stream:
         steps = [json.loads(line.removeprefix("data: ")) for line in stream.iter_lines() if line.startswith("data: ")]
-    told = ended(client, job)
+    result = ended(client, job)
     findings = ss.analyze(ss.read_record(path))
     words = ss.summary(findings)
-    assert told["state"] == "done", told["message"]
-    assert told["answer"]["lines"] == [
+    assert result["state"] == "done", result["message"]
+    assert result["answer"]["lines"] == [
         [line.name, line.value, line.interval, words.marks(line)] for line in words.lines
     ]
     kept = client.get(f"/jobs/{job}/results.json").json()
@@ -199,18 +199,18 @@ def test_only_what_the_library_can_not_infer_is_asked_for(client: Client, tmp_pa
     path = tmp_path / "bare.csv"
     path.write_text("disp [mm],F\n" + "".join(f"{np.sin(n / 9):.6f},{n % 7}\n" for n in range(400)))
     key = send(client, path)
-    told = answered(client, "describe", key)
-    assert told["needs"] == ["fs"]
-    assert told["records"][0]["fs"] is None
-    assert told["records"][0]["unknown"] == ["F"]
+    answer = answered(client, "describe", key)
+    assert answer["needs"] == ["fs"]
+    assert answer["records"][0]["fs"] is None
+    assert answer["records"][0]["unknown"] == ["F"]
     reading = {"fs": "0.5 kHz", "channels": {"x": "`disp`", "force": "`F` [N]"}}
-    told = answered(client, "describe", key, reading=reading)
-    assert told["needs"] == []
-    assert told["records"][0]["fs"] == 500
-    assert told["questions"]["analyze"]["needs"] == []
-    told = answered(client, "describe", key, reading={"fs": 500, "channels": {"x": "`disp`"}})
-    assert told["questions"]["analyze"]["needs"] == ["mass", "stiffness"]
-    assert not told["questions"]["decay"]["needs"]
+    answer = answered(client, "describe", key, reading=reading)
+    assert answer["needs"] == []
+    assert answer["records"][0]["fs"] == 500
+    assert answer["questions"]["analyze"]["needs"] == []
+    answer = answered(client, "describe", key, reading={"fs": 500, "channels": {"x": "`disp`"}})
+    assert answer["questions"]["analyze"]["needs"] == ["mass", "stiffness"]
+    assert not answer["questions"]["decay"]["needs"]
     assert not answered(client, "describe", key, reading={"fs": 500, "channels": {"q": "`disp`"}})["questions"][
         "analyze"
     ]["able"]
@@ -222,8 +222,8 @@ def test_a_free_decay_comes_with_its_fitted_motion(client: Client, tmp_path: Pat
     record = ss.Record.of({"x": x + np.random.default_rng(1).normal(0, 3e-3, len(x))}, fs=20)
     path = ss.write_record(record, tmp_path / "release.csv")
     answer = answered(client, "decay", send(client, path), options={"method": "waveform", "stiffness": 10})
-    found = ss.analyze_decay(ss.read_record(path), method="waveform", stiffness=10)
-    assert answer["lines"][0][1] == ss.summary(found).lines[0].value
+    findings = ss.analyze_decay(ss.read_record(path), method="waveform", stiffness=10)
+    assert answer["lines"][0][1] == ss.summary(findings).lines[0].value
     (curve,) = answer["overlay"]
     assert curve["record"] == "release.csv"
     measured, fitted = (np.array(curve[name], dtype=float) for name in ("measured", "fitted"))
@@ -275,11 +275,11 @@ def test_files_of_one_record_are_read_together(client: Client, tmp_path: Path) -
 )  # fmt: skip
 def test_a_bad_file_is_one_sentence_with_its_own_name(client: Client, name: str, contents: bytes) -> None:
     answer = client.post("/files", params={"name": name}, content=contents)
-    told = ended(client, ask(client, "describe", answer.json()["id"]))
-    assert told["state"] == "refused"
-    assert told["message"].count("\n") == 0
-    assert name in told["message"]
-    assert answer.json()["id"] not in told["message"]
+    result = ended(client, ask(client, "describe", answer.json()["id"]))
+    assert result["state"] == "refused"
+    assert result["message"].count("\n") == 0
+    assert name in result["message"]
+    assert answer.json()["id"] not in result["message"]
 
 
 def test_a_file_that_is_too_large_ends_as_it_comes_and_leaves_nothing() -> None:
@@ -379,10 +379,10 @@ def test_a_worker_that_fails_is_one_message_to_one_user(
         jobs = client.app.state.data.jobs
         jobs.worker = "failing"
         job = ask(client, "describe", key)
-        told = ended(client, job)
-        assert told["state"] == "broken"
-        assert SAID[fate] in told["message"]
-        assert "\n" not in told["message"]
+        result = ended(client, job)
+        assert result["state"] == "broken"
+        assert SAID[fate] in result["message"]
+        assert "\n" not in result["message"]
 
 
 @pytest.mark.parametrize(
@@ -403,9 +403,9 @@ def test_limits_hold_an_analysis_that_asks_for_too_much(tmp_path: Path) -> None:
         path = tmp_path / "large.h5"
         with h5py.File(path, "w") as file:  # a few kB that ask for 8 GB
             file.create_dataset("x", (1_000_000_000,), float, chunks=(1_000_000,), fillvalue=1.0, compression="gzip")
-        told = ended(client, ask(client, "analyze", send(client, path), reading={"fs": 1000.0}))
-        assert told["state"] in ("refused", "broken")
-        assert told["message"]
+        result = ended(client, ask(client, "analyze", send(client, path), reading={"fs": 1000.0}))
+        assert result["state"] in ("refused", "broken")
+        assert result["message"]
         assert client.get("/files").status_code == 200
 
 
@@ -426,9 +426,9 @@ def zip_bomb(size: int) -> bytes:
 def test_what_unpacks_to_more_than_there_is_ends_as_one_sentence() -> None:
     with TestClient(app_with(limits=Limits(memory=700 << 20))) as client:
         key = client.post("/files", params={"name": "bomb.mat"}, content=zip_bomb(1 << 30)).json()["id"]
-        told = ended(client, ask(client, "describe", key, reading={"fs": 100}))
-        assert told["state"] == "refused"
-        assert "would become" in told["message"]
+        result = ended(client, ask(client, "describe", key, reading={"fs": 100}))
+        assert result["state"] == "refused"
+        assert "would become" in result["message"]
 
 
 def test_answers_that_are_kept_are_bounded(tmp_path: Path) -> None:
@@ -446,9 +446,9 @@ def test_a_curve_is_fitted_to_one_record(tmp_path: Path) -> None:
     with TestClient(app_with()) as client:
         keys = [[send(client, ss.write_record(ss.datasets.demo(), tmp_path / name))] for name in ("a.csv", "b.csv")]
         asked = {"question": "fit", "records": keys, "options": {"curve": "stribeck"}}
-        told = ended(client, client.post("/jobs", json=asked).json()["id"])
-        assert told["state"] == "refused"
-        assert "2 records" in told["message"]
+        result = ended(client, client.post("/jobs", json=asked).json()["id"])
+        assert result["state"] == "refused"
+        assert "2 records" in result["message"]
 
 
 def test_a_record_of_velocity_and_friction_is_fitted_without_mass_and_spring(client: Client, tmp_path: Path) -> None:
@@ -532,9 +532,9 @@ def test_a_question_that_makes_no_sense_is_refused_with_its_field(
 
 def test_a_fault_of_the_rig_is_told_in_words_of_the_page(client: Client, tmp_path: Path) -> None:
     key = send(client, written(tmp_path, ".csv"))
-    told = ended(client, ask(client, "analyze", key, options={"mass": "-2 kg"}))
-    assert told["state"] == "refused"
-    assert "mass" in told["message"]
+    result = ended(client, ask(client, "analyze", key, options={"mass": "-2 kg"}))
+    assert result["state"] == "refused"
+    assert "mass" in result["message"]
 
 
 @pytest.mark.parametrize(

@@ -46,9 +46,9 @@ def drawn(client: TestClient, request: dict[str, Any]) -> list[tuple[dict[str, A
 
 @pytest.fixture(scope="module")
 def parts(client: TestClient) -> list[tuple[dict[str, Any], dict[str, Any]]]:
-    found = drawn(client, ASKED)
-    assert found[-1][0]["kind"] == "done"
-    return found[:-1]
+    rig = drawn(client, ASKED)
+    assert rig[-1][0]["kind"] == "done"
+    return rig[:-1]
 
 
 def test_the_coarse_map_is_that_of_a_sweep(parts: list[tuple[dict[str, Any], dict[str, Any]]]) -> None:
@@ -114,7 +114,7 @@ def test_a_map_that_can_not_be_drawn_is_refused_in_one_sentence(client: TestClie
 
 
 def test_a_map_of_a_share_is_not_refined(client: TestClient) -> None:
-    found = drawn(client, {**ASKED, "measure": "stick_share"})
-    assert {header.get("level") for header, _ in found} == {"coarse", None}
-    values = np.concatenate([arrays["values"] for header, arrays in found if header["kind"] == "part"])
+    rig = drawn(client, {**ASKED, "measure": "stick_share"})
+    assert {header.get("level") for header, _ in rig} == {"coarse", None}
+    values = np.concatenate([arrays["values"] for header, arrays in rig if header["kind"] == "part"])
     assert 0 < np.max(values) < 1

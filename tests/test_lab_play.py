@@ -224,12 +224,12 @@ def test_word_that_a_worker_compiles_is_passed_on_to_the_page(
     client: TestClient, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     async def ask(request: bytes, *, tell: Any, **more: Any) -> bytes:
-        told = json.loads(request)
-        await tell(frame({"id": told["id"], "want": told["want"], "kind": "compiling"}))
-        return frame({"id": told["id"], "want": told["want"], "kind": "run"})
+        data = json.loads(request)
+        await tell(frame({"id": data["id"], "want": data["want"], "kind": "compiling"}))
+        return frame({"id": data["id"], "want": data["want"], "kind": "run"})
 
     monkeypatch.setattr(client.app.state.workers, "ask", ask)
     with client.websocket_connect("ws://127.0.0.1:8723/play", headers=BEARER) as socket:
         socket.send_text(json.dumps({"id": 3, "want": "run", "state": STATE}))
         kinds = [unframed(socket.receive_bytes())[0] for _ in range(2)]
-    assert [(each["id"], each["kind"]) for each in kinds] == [(3, "compiling"), (3, "run")]
+    assert [(kind["id"], kind["kind"]) for kind in kinds] == [(3, "compiling"), (3, "run")]

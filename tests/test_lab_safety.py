@@ -178,9 +178,9 @@ def test_a_pickle_is_never_opened(client: httpx.Client, tmp_path: Path, name: st
     array = np.array([Bomb(mark)], dtype=object)
     np.save(tmp_path / "a.npy", array, allow_pickle=True)
     contents = (tmp_path / "a.npy").read_bytes() if name == "a.npy" else pickle.dumps(Bomb(mark))
-    told = asked(client, send(client, name, contents))
-    assert told["state"] == "refused"
-    assert name in told["message"]
+    answer = asked(client, send(client, name, contents))
+    assert answer["state"] == "refused"
+    assert name in answer["message"]
     assert not mark.exists()
 
 
@@ -401,7 +401,7 @@ def test_a_sender_that_goes_in_the_middle_is_no_fault(
         with socket.create_connection(("127.0.0.1", impatient)) as door:
             door.sendall(WELCOME.format(port=impatient).encode())
     assert alive(impatient)
-    assert not [told for told in caplog.records if told.levelname == "ERROR"]
+    assert not [record for record in caplog.records if record.levelname == "ERROR"]
 
 
 def test_of_too_many_half_requests_most_are_closed_soon_and_others_served(
@@ -453,8 +453,8 @@ def test_twenty_at_once_are_all_answered(lab: Lab, client: httpx.Client) -> None
         sound = io.BytesIO()
         soundfile.write(sound, np.linspace(0, (number + 1) / 32, 300), 8000, format="WAV", subtype="DOUBLE")
         with httpx.Client(base_url=lab.base, headers=lab.headers, timeout=600) as mine:
-            told = asked(mine, send(mine, f"user{number}.wav", sound.getvalue()))
-        (record,) = told["answer"]["records"]
+            answer = asked(mine, send(mine, f"user{number}.wav", sound.getvalue()))
+        (record,) = answer["answer"]["records"]
         return record["rows"], record["channels"][0]["high"]
 
     with ThreadPoolExecutor(20) as users:

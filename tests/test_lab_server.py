@@ -207,7 +207,7 @@ def test_the_catalog_offers_every_law_drive_and_scenario(client: TestClient) -> 
     assert set(catalog["laws"]) == set(ss.scenarios.LAWS)
     assert set(catalog["drives"]) == set(ss.scenarios.DRIVES)
     presets = client.get("/scenarios", headers=BEARER).json()["presets"]
-    assert [name for each in presets for name in each["names"]] == list(ss.scenarios.names())
+    assert [name for preset in presets for name in preset["names"]] == list(ss.scenarios.names())
     told = [each["about"] for kind in ("laws", "drives") for each in catalog[kind].values()]
     assert not [words for words in told if "\\" in words or ":math:" in words or "`" in words]
 

@@ -84,7 +84,7 @@ def test_the_command_prints_an_address_that_answers_on_this_machine_alone(starte
 def test_a_port_that_is_taken_is_told(started: tuple[str, float]) -> None:
     port = started[0].partition("/?")[0].rpartition(":")[2]
     command = [sys.executable, "-m", "stickslip", "lab", "--port", port, "--no-browser"]
-    found = subprocess.run(command, capture_output=True, text=True)
-    assert found.returncode == 2
-    assert f"port {port} is taken" in found.stderr
-    assert "Traceback" not in found.stderr
+    run = subprocess.run(command, capture_output=True, text=True)
+    assert run.returncode == 2
+    assert f"port {port} is taken" in run.stderr
+    assert "Traceback" not in run.stderr

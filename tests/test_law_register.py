@@ -138,21 +138,21 @@ def test_it_is_swept_on_every_engine(engine: str) -> None:
 
 
 def test_it_is_fitted() -> None:
-    found = ss.fit_law(measured(), slider(AsymmetricCoulomb(1.0, back=1.0)))
-    own = {name: each for name, each in found.parameters.items() if name in ("forward", "back")}
+    fit = ss.fit_law(measured(), slider(AsymmetricCoulomb(1.0, back=1.0)))
+    own = {name: each for name, each in fit.parameters.items() if name in ("forward", "back")}
     assert {name: each.name for name, each in own.items()} == {
         "forward": "sliding friction forward", "back": "sliding friction back",
     }  # fmt: skip
     assert {each.unit for each in own.values()} == {"N"}
     # an offset of x is the same as a difference between the two, so that the records tell their mean
-    assert (found.law.forward + found.law.back) / 2 == pytest.approx(1.0, rel=5e-3)
+    assert (fit.law.forward + fit.law.back) / 2 == pytest.approx(1.0, rel=5e-3)
 
 
 def test_it_is_compared_by_its_name() -> None:
-    found = ss.compare_laws(measured(), slider(ss.laws.Coulomb(1.0)), laws=["Coulomb", "asymmetric"])
-    assert found.family == "rigid"
-    assert "asymmetric" in found.kept
-    assert "that of a rigid contact" in found.verdict
+    comparison = ss.compare_laws(measured(), slider(ss.laws.Coulomb(1.0)), laws=["Coulomb", "asymmetric"])
+    assert comparison.family == "rigid"
+    assert "asymmetric" in comparison.kept
+    assert "that of a rigid contact" in comparison.verdict
     with pytest.raises(ss.errors.ModelError, match=r"laws are .*asymmetric"):
         ss.compare_laws(measured(), slider(), laws=["nothing"])
 
@@ -171,10 +171,10 @@ def test_one_that_says_nothing_of_itself_is_found_by_its_units(law: Any, values:
     rig = ss.Rig.perfect("x", "z", "load").having("x", white=1e-6).having("load", white=2e-3)
     record = rig.measure(ss.simulate(slider(law), cycles=12), fs=1000, rng=1, start=0.7)
     asked = law if by is repr else by(law)
-    found = ss.compare_laws(record, slider(ss.laws.Coulomb(1.0)), laws=["Coulomb", asked])
-    assert found.kept == (type(law).__name__,)
+    comparison = ss.compare_laws(record, slider(ss.laws.Coulomb(1.0)), laws=["Coulomb", asked])
+    assert comparison.kept == (type(law).__name__,)
     for name, value in values.items():
-        estimate = found.fit.parameters[name]
+        estimate = comparison.fit.parameters[name]
         assert estimate.value == pytest.approx(value, rel=0.01), name
         assert estimate.interval[0] < value < estimate.interval[1], name
 
@@ -186,24 +186,24 @@ def test_a_law_of_other_laws_needs_its_values() -> None:
 
 @pytest.mark.parametrize("law", [Knee, "Knee", Knee(1.0, 1.0, knee=1e-2)], ids=["class", "name", "instance"])
 def test_a_law_that_guesses_nothing_is_fitted(law: Any) -> None:
-    found = ss.fit_law(measured(KNEE), slider(ss.laws.Coulomb(1.0)), law=law, intervals=False)
-    assert max(found.misfit.values()) < 1.1
+    fit = ss.fit_law(measured(KNEE), slider(ss.laws.Coulomb(1.0)), law=law, intervals=False)
+    assert max(fit.misfit.values()) < 1.1
     for name, true in vars(KNEE).items():
-        assert getattr(found.law, name) == pytest.approx(true, rel=1e-2)
+        assert getattr(fit.law, name) == pytest.approx(true, rel=1e-2)
 
 
 def test_a_law_that_guesses_nothing_is_compared_by_its_class() -> None:
-    found = ss.compare_laws(measured(KNEE), slider(ss.laws.Coulomb(1.0)), laws=["Coulomb", Knee])
-    assert (found.law, found.family) == ("Knee", "Knee")
-    assert found.fit.parameters["knee"].includes(KNEE.knee)
+    comparison = ss.compare_laws(measured(KNEE), slider(ss.laws.Coulomb(1.0)), laws=["Coulomb", Knee])
+    assert (comparison.law, comparison.family) == ("Knee", "Knee")
+    assert comparison.fit.parameters["knee"].includes(KNEE.knee)
 
 
 def test_a_law_that_explains_nothing_more_does_not_lead_alone() -> None:
     """Two levels where there is one, and a knee where there is none: the simpler law stays."""
-    told = measured(ss.laws.Coulomb(1.0))
+    record = measured(ss.laws.Coulomb(1.0))
     for law in (Knee, AsymmetricCoulomb):
-        found = ss.compare_laws(told, slider(ss.laws.Coulomb(1.0)), laws=["Coulomb", law])
-        assert "Coulomb" in found.kept
+        comparison = ss.compare_laws(record, slider(ss.laws.Coulomb(1.0)), laws=["Coulomb", law])
+        assert "Coulomb" in comparison.kept
 
 
 def test_it_is_fitted_and_tried_on_another_record_from_the_command_line(
@@ -213,13 +213,13 @@ def test_it_is_fitted_and_tried_on_another_record_from_the_command_line(
     for name in ("one", "other"):
         ss.write_record(measured(KNEE), f"{name}.csv")
     constants = [word for name, value in RIG.items() for word in (f"--{name}", str(value))]
-    said = CliRunner().invoke(
+    result = CliRunner().invoke(
         main, ["fit", "one.csv", *constants, "--laws", "Coulomb, knee", "--output", "fit", "--json"]
     )
-    assert said.exit_code == 0, said.output
-    assert json.loads(said.stdout)["law"] == "Knee"
-    said = CliRunner().invoke(main, ["predict", "fit", "other.csv", "--no-plain", "--json"])
-    assert said.exit_code == 0, said.output
+    assert result.exit_code == 0, result.output
+    assert json.loads(result.stdout)["law"] == "Knee"
+    result = CliRunner().invoke(main, ["predict", "fit", "other.csv", "--no-plain", "--json"])
+    assert result.exit_code == 0, result.output
     predicted = ss.answers.predict(ss.read_record("other.csv"), ss.answers.read_fitted(Path("fit")), plain=False)
     assert predicted.parts[0].follows["x"] > 99.5
 

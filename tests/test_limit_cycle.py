@@ -22,23 +22,23 @@ def sticking(speed: float, damping: float = 0.0) -> ss.Oscillator:
     [(0.5, 0.0, 6.7123889803846899), (0.1, 0.1, 12.635457258784897), (0.5, 0.1, 6.4941269476513108)],
 )
 def test_stick_slip_has_the_period_of_the_closed_form(speed: float, damping: float, period: float) -> None:
-    found = ss.squeak.limit_cycle(sticking(speed, damping), push=1.5)
-    assert found.status == "periodic"
-    assert 1 / found.frequency == pytest.approx(period, rel=1e-12)
-    assert abs(found.multipliers[0]) < 1e-6, "a stick ends in one state alone"
+    cycle = ss.squeak.limit_cycle(sticking(speed, damping), push=1.5)
+    assert cycle.status == "periodic"
+    assert 1 / cycle.frequency == pytest.approx(period, rel=1e-12)
+    assert abs(cycle.multipliers[0]) < 1e-6, "a stick ends in one state alone"
     if not damping:
-        assert found.amplitude == pytest.approx(math.hypot(0.5, speed), rel=1e-9)
-        assert found.stick_share[0] == pytest.approx(2 * 0.5 / speed / period, rel=1e-12)
+        assert cycle.amplitude == pytest.approx(math.hypot(0.5, speed), rel=1e-9)
+        assert cycle.stick_share[0] == pytest.approx(2 * 0.5 / speed / period, rel=1e-12)
 
 
 def test_beside_stable_sliding_stick_slip_lasts_up_to_a_known_speed() -> None:
     """BS-4: above 0.549 the mass does not stick again."""
     speeds = [0.2, 0.54, 0.558]
-    found = ss.squeak.limit_cycles(sticking(0.5, 0.1), "drive.speed", values=speeds)
-    assert [one.status for one in found.up] == ["steady sliding"] * 3
-    assert [one.status for one in found.down] == ["periodic", "periodic", "steady sliding"]
-    assert (found.both, found.threshold, found.kind) == ((0.2, 0.54), None, "cannot be told")
-    assert "stable at every value" in found.evidence
+    cycles = ss.squeak.limit_cycles(sticking(0.5, 0.1), "drive.speed", values=speeds)
+    assert [one.status for one in cycles.up] == ["steady sliding"] * 3
+    assert [one.status for one in cycles.down] == ["periodic", "periodic", "steady sliding"]
+    assert (cycles.both, cycles.threshold, cycles.kind) == ((0.2, 0.54), None, "cannot be told")
+    assert "stable at every value" in cycles.evidence
 
 
 @cache
@@ -67,13 +67,13 @@ def test_a_falling_law_with_a_stick_begins_subcritically() -> None:
     """ST-1: sliding becomes stable above 0.2303; the stick that bounds the motion does not know of it."""
     law = ss.laws.Stribeck(1.0, 1.5, speed=0.1, exponent=1.0, viscous=0.2)
     block = ss.Oscillator(1.0, 1.0, law, ss.drives.Belt(0.2), damping=0.3)
-    found = ss.squeak.limit_cycles(block, "drive.speed", values=[0.2, 0.22, 0.25])
-    assert found.kind == "subcritical"
-    assert found.both is not None
-    assert found.both[0] < 0.2304 < found.both[1] == 0.25
-    assert [one.vibrates for one in found.up] == [True, True, True]
-    assert [one.vibrates for one in found.down] == [True, True, False], "going down the sliding is stable at first"
-    assert "until a contact sticks" in found.evidence
+    cycles = ss.squeak.limit_cycles(block, "drive.speed", values=[0.2, 0.22, 0.25])
+    assert cycles.kind == "subcritical"
+    assert cycles.both is not None
+    assert cycles.both[0] < 0.2304 < cycles.both[1] == 0.25
+    assert [one.vibrates for one in cycles.up] == [True, True, True]
+    assert [one.vibrates for one in cycles.down] == [True, True, False], "going down the sliding is stable at first"
+    assert "until a contact sticks" in cycles.evidence
 
 
 @cache
@@ -85,13 +85,13 @@ def test_an_unstable_cycle_separates_the_vibration_from_stable_sliding() -> None
     """It begins at the threshold with the root of the distance; within it a vibration dies away, beyond it grows."""
     law = ss.laws.Stribeck(1.0, 1.5, speed=0.1, exponent=1.0, viscous=0.2)
     block = ss.Oscillator(1.0, 1.0, law, ss.drives.Belt(0.2), damping=0.3)
-    found = ss.squeak.limit_cycles(block, "drive.speed", values=[0.22, 0.2313, 0.2343])
-    assert found.between[0] is None, "sliding is unstable"
-    near, far = found.amplitudes("between")[1:]
-    assert found.threshold is not None
-    distance = found.values[1:] - found.threshold.value
+    cycles = ss.squeak.limit_cycles(block, "drive.speed", values=[0.22, 0.2313, 0.2343])
+    assert cycles.between[0] is None, "sliding is unstable"
+    near, far = cycles.amplitudes("between")[1:]
+    assert cycles.threshold is not None
+    distance = cycles.values[1:] - cycles.threshold.value
     assert far / near == pytest.approx(math.sqrt(distance[1] / distance[0]), rel=0.02)
-    cycle = found.between[2]
+    cycle = cycles.between[2]
     assert cycle is not None
     assert cycle.multipliers[0].real > 1
     place, (x, v) = cycle.sliding.place[0], cycle.motion.states[0, :2]
@@ -101,7 +101,7 @@ def test_an_unstable_cycle_separates_the_vibration_from_stable_sliding() -> None
     ]
     assert [end.status for end in ends] == ["steady sliding", "periodic"]
     assert "unstable, between" in [
-        str(line.get_label()) for line in ss.figures.plot_limit_cycles(found).axes[0].get_lines()
+        str(line.get_label()) for line in ss.figures.plot_limit_cycles(cycles).axes[0].get_lines()
     ]
 
 
@@ -117,10 +117,10 @@ def test_the_rig_squeaks_by_lifting_a_contact(load: float) -> None:
 
 
 def test_the_steady_state_on_a_belt_is_the_cycle() -> None:
-    found = ss.steady_state(ss.squeak.squeak_rig("wet", 3.0).having(drive=ss.drives.Belt(-0.1)))
-    assert found.status == "unique"
-    assert 1 / found.period == pytest.approx(rig(3.0).frequency, rel=1e-9)
-    assert np.allclose(np.abs(found.multipliers[:-1]), np.abs(rig(3.0).multipliers), rtol=1e-6)
+    steady = ss.steady_state(ss.squeak.squeak_rig("wet", 3.0).having(drive=ss.drives.Belt(-0.1)))
+    assert steady.status == "unique"
+    assert 1 / steady.period == pytest.approx(rig(3.0).frequency, rel=1e-9)
+    assert np.allclose(np.abs(steady.multipliers[:-1]), np.abs(rig(3.0).multipliers), rtol=1e-6)
 
 
 def test_the_cycle_is_what_a_long_simulation_ends_in() -> None:
@@ -156,24 +156,24 @@ def inclined(law: Any = None, *, speed: float = 1.0) -> ss.Structure:
 )
 def test_a_cycle_is_repeated_when_it_is_simulated_again(law: Any, speed: float) -> None:
     system = inclined(law, speed=speed)
-    found = ss.squeak.limit_cycle(system)
-    assert found.status == "periodic"
-    assert found.growth == pytest.approx(found.sliding.growth, rel=1e-8)
-    own = dict(zip(("x1", "x2", "v1", "v2"), map(float, found.motion.states[0]), strict=False))
-    mode, period = found.motion.table.modes[found.motion.modes[0]].name, found.motion.duration
+    cycle = ss.squeak.limit_cycle(system)
+    assert cycle.status == "periodic"
+    assert cycle.growth == pytest.approx(cycle.sliding.growth, rel=1e-8)
+    own = dict(zip(("x1", "x2", "v1", "v2"), map(float, cycle.motion.states[0]), strict=False))
+    mode, period = cycle.motion.table.modes[cycle.motion.modes[0]].name, cycle.motion.duration
     run = ss.simulate(system, duration=20 * period, start={**own, "mode": mode})
     late = run.sample(period * (10 + np.arange(320) / 32), ("x", "v"))[0].reshape(4, 10, 32)
-    known = found.motion.sample(period * np.arange(32) / 32, ("x", "v"))[0]
+    known = cycle.motion.sample(period * np.arange(32) / 32, ("x", "v"))[0]
     assert np.allclose(late, known[:, None], rtol=0, atol=1e-8 * np.ptp(known, axis=1).max())
 
 
 def test_hoffmanns_model_squeaks_on_below_its_critical_friction() -> None:
-    found = ss.squeak.limit_cycles(inclined(), "kinetic", values=[0.4, 0.46, 0.5, 0.6])
-    assert found.kind == "subcritical"
-    assert [one.vibrates for one in found.up] == [False, False, True, True]
-    assert [one.vibrates for one in found.down] == [False, True, True, True]
-    assert abs(found.down[1].multipliers[0]) < 1
-    assert found.down[1].sliding.stable
+    cycles = ss.squeak.limit_cycles(inclined(), "kinetic", values=[0.4, 0.46, 0.5, 0.6])
+    assert cycles.kind == "subcritical"
+    assert [one.vibrates for one in cycles.up] == [False, False, True, True]
+    assert [one.vibrates for one in cycles.down] == [False, True, True, True]
+    assert abs(cycles.down[1].multipliers[0]) < 1
+    assert cycles.down[1].sliding.stable
 
 
 def test_friction_feeds_torsion_and_the_contacts_carry_it_to_bending() -> None:
@@ -189,15 +189,15 @@ def test_friction_feeds_torsion_and_the_contacts_carry_it_to_bending() -> None:
 
 
 def test_the_rig_begins_and_ends_to_squeak_at_one_load() -> None:
-    found = ss.squeak.limit_cycles(
+    cycles = ss.squeak.limit_cycles(
         ss.squeak.squeak_rig(), lambda n: ss.squeak.squeak_rig("wet", n), values=[1.5, 1.9, 6.0], speed=-0.1
     )
-    assert found.threshold is not None
-    assert found.threshold.value == pytest.approx(1.79657, rel=1e-5)
-    assert found.kind == "supercritical"
-    assert found.exponent == pytest.approx(0, abs=0.1), "linear until a contact lifts off: the amplitude jumps"
-    assert [one.vibrates for one in found.up] == [one.vibrates for one in found.down] == [False, True, True]
-    assert "until a contact lifts off" in found.evidence
+    assert cycles.threshold is not None
+    assert cycles.threshold.value == pytest.approx(1.79657, rel=1e-5)
+    assert cycles.kind == "supercritical"
+    assert cycles.exponent == pytest.approx(0, abs=0.1), "linear until a contact lifts off: the amplitude jumps"
+    assert [one.vibrates for one in cycles.up] == [one.vibrates for one in cycles.down] == [False, True, True]
+    assert "until a contact lifts off" in cycles.evidence
 
 
 def test_energy_of_each_displacement_adds_up_to_that_of_all() -> None:
@@ -223,16 +223,16 @@ def test_the_figures_show_both_ways_and_the_threshold() -> None:
 
 def test_the_map_of_the_rig_over_load_and_slope() -> None:
     grid = {"slope": [-3.0, 0.0, 3.0], "load": [1.0, 4.0, 7.0]}
-    found = ss.squeak.stability_map(
+    chart = ss.squeak.stability_map(
         lambda load, slope: ss.squeak.squeak_rig("wet", load).having(slope=slope), grid=grid, speed=-0.1
     )
-    assert found.mechanism.sel(load=7.0, slope=0.0) == "mode coupling"
-    assert found.mechanism.sel(load=1.0, slope=3.0) == "stable"
-    figure = ss.figures.plot_stability(found, labels=("slope [s/m]", "load [N]"))
+    assert chart.mechanism.sel(load=7.0, slope=0.0) == "mode coupling"
+    assert chart.mechanism.sel(load=1.0, slope=3.0) == "stable"
+    figure = ss.figures.plot_stability(chart, labels=("slope [s/m]", "load [N]"))
     named = {text.get_text() for text in figure.axes[0].get_legend().get_texts()}
-    assert named == set(np.unique(found.mechanism.values))
+    assert named == set(np.unique(chart.mechanism.values))
     with pytest.raises(ss.errors.ModelError, match="two parameters"):
-        ss.figures.plot_stability(found.isel(load=0))
+        ss.figures.plot_stability(chart.isel(load=0))
 
 
 @pytest.mark.parametrize(

@@ -19,7 +19,7 @@ def test_a_line_is_found_and_foretells() -> None:
     assert line.coefficient.value == pytest.approx(0.5)
     assert line.adhesion.value == pytest.approx(0.3)
     assert line.friction("5 N").value == pytest.approx(2.8)
-    assert [each.value for each in line.coefficients] == pytest.approx([0.65, 0.575, 0.55])
+    assert [coefficient.value for coefficient in line.coefficients] == pytest.approx([0.65, 0.575, 0.55])
     # weighted least squares of three points: the variance in the middle is a third
     assert line.friction(4.0).sd == pytest.approx(0.01 / np.sqrt(3))
     assert "far from the loads" in line.friction(20.0).status

@@ -60,10 +60,10 @@ OFTEN = pytest.mark.parametrize(("trials", "least"), [(25, 0.82), pytest.param(1
 @OFTEN
 @pytest.mark.parametrize("rho", [0.0, 0.9])
 def test_interval_of_the_slope_holds_the_truth(rho, trials, least):
-    found = [friction_loops(sliding(slope=4.0, noise=0.1, rho=rho, seed=seed)).slope for seed in range(trials)]
-    assert np.mean([each.includes(4.0) for each in found]) >= least
-    spread = np.std([each.value for each in found])
-    assert np.median([each.interval[1] - each.value for each in found]) < 6 * spread
+    slopes = [friction_loops(sliding(slope=4.0, noise=0.1, rho=rho, seed=seed)).slope for seed in range(trials)]
+    assert np.mean([slope.includes(4.0) for slope in slopes]) >= least
+    spread = np.std([slope.value for slope in slopes])
+    assert np.median([slope.interval[1] - slope.value for slope in slopes]) < 6 * spread
 
 
 @pytest.mark.parametrize("phase", np.arange(8) * math.pi / 4)
@@ -106,14 +106,14 @@ def test_curve_lies_on_the_law():
 
 
 def test_frequency_is_found_and_may_be_given():
-    found = friction_loops(sliding(seconds=7.3))
-    assert found.frequency.value == pytest.approx(FREQUENCY, rel=1e-4)
+    loops = friction_loops(sliding(seconds=7.3))
+    assert loops.frequency.value == pytest.approx(FREQUENCY, rel=1e-4)
     assert friction_loops(sliding(), frequency=2.0).frequency.method == "given"
-    assert np.diff(found.cycles) == pytest.approx(1 / FREQUENCY, rel=1e-3)  # the first begins with the record
-    assert found.displacement.max() == pytest.approx(REACH, rel=1e-3)
-    assert found.velocity.max() == pytest.approx(PEAK, rel=1e-2)
+    assert np.diff(loops.cycles) == pytest.approx(1 / FREQUENCY, rel=1e-3)  # the first begins with the record
+    assert loops.displacement.max() == pytest.approx(REACH, rel=1e-3)
+    assert loops.velocity.max() == pytest.approx(PEAK, rel=1e-2)
     # the noise, less what interpolation between two samples averages away (0.67 to 1 of it)
-    assert 0.66 * 0.02 < np.median(found.scatter) < 1.1 * 0.02
+    assert 0.66 * 0.02 < np.median(loops.scatter) < 1.1 * 0.02
 
 
 @OFTEN
@@ -205,8 +205,8 @@ def test_a_contact_on_the_base_is_measured_against_it():
     assert work == pytest.approx(4 * 1.5 * REACH, rel=0.01)
     assert friction_loops(carried).energy_per_cycle.value > 1.5 * work  # the ground moves more than the base
     balanced = friction_force(carried, mass=1.0, stiffness=100.0, contact="base")
-    told = friction_loops(balanced)
-    assert np.array_equal(told.displacement, friction_loops(balanced, contact="base").displacement)
+    loops = friction_loops(balanced)
+    assert np.array_equal(loops.displacement, friction_loops(balanced, contact="base").displacement)
 
 
 @pytest.mark.parametrize("late", ["x", "friction"])
@@ -215,10 +215,10 @@ def test_a_stated_delay_is_taken_out(late):
     other = "x" if late == "friction" else "friction"
     shifted = Record.of({late: record[late][:-rows], other: record[other][rows:]}, fs=FS)
     assert abs(friction_loops(shifted).level.value - 1.5) > 0.05
-    told = friction_loops(shifted.with_details(late, delay=rows / FS))
+    loops = friction_loops(shifted.with_details(late, delay=rows / FS))
     direct = friction_loops(record.rows(rows))
-    assert told.level.value == pytest.approx(direct.level.value, rel=5e-3)
-    assert told.energy_per_cycle.value == pytest.approx(direct.energy_per_cycle.value, rel=5e-3)
+    assert loops.level.value == pytest.approx(direct.level.value, rel=5e-3)
+    assert loops.energy_per_cycle.value == pytest.approx(direct.energy_per_cycle.value, rel=5e-3)
 
 
 @pytest.mark.parametrize(("position", "unit"), [("x", "N m"), ("theta", "N")])

@@ -63,8 +63,8 @@ def test_one_row_a_record_copies_and_refusals_named() -> None:
         known = table["sliding friction [N]"].iloc[:5]
         assert known.to_numpy() == pytest.approx(1 + np.arange(5) / 10, rel=0.01)
         assert (table["sliding friction, low [N]"].iloc[:5] <= known).all()
-    told = json.loads(Path("out/results.json").read_text())
-    assert [each["same_as"] for each in told["records"]][-2] == "run_00.csv"
+    data = json.loads(Path("out/results.json").read_text())
+    assert [each["same_as"] for each in data["records"]][-2] == "run_00.csv"
     page = Path("out/report.html").read_text()
     assert page.count("<svg") >= 2
     assert not Path("out.rows").exists()

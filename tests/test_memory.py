@@ -53,23 +53,23 @@ def test_each_memory_is_told_from_the_others(kind: str, value: float, memory: st
 
 
 def test_a_curve_over_the_speed_has_no_memory() -> None:
-    found = friction_memory([loop("curve", hz, noise=0.02) for hz in (2.0, 8.0)])
-    assert (found.memory, found.rotation) == ("none", "none")
-    assert all(abs(phase.value) < 0.02 for phase in found.phases)
+    memory = friction_memory([loop("curve", hz, noise=0.02) for hz in (2.0, 8.0)])
+    assert (memory.memory, memory.rotation) == ("none", "none")
+    assert all(abs(phase.value) < 0.02 for phase in memory.phases)
 
 
 def test_one_frequency_tells_the_rotation_alone() -> None:
-    found = friction_memory(loop("state", 5.0, value=1e-2))
-    assert (found.memory, found.rotation) == ("undecided", "anticlockwise")
-    assert "second frequency" in found.reason
-    assert found.phases[0].value == pytest.approx(np.arctan(2 * np.pi * 5.0 * 1e-2), rel=0.02)
+    memory = friction_memory(loop("state", 5.0, value=1e-2))
+    assert (memory.memory, memory.rotation) == ("undecided", "anticlockwise")
+    assert "second frequency" in memory.reason
+    assert memory.phases[0].value == pytest.approx(np.arctan(2 * np.pi * 5.0 * 1e-2), rel=0.02)
 
 
 def test_friction_that_goes_ahead_is_gone_round_clockwise() -> None:
-    found = friction_memory([loop("late", hz, value=-3e-3) for hz in (2.0, 6.0)])
-    assert (found.memory, found.rotation) == ("undecided", "clockwise")
-    assert "clockwise" in found.reason
-    assert found.delay is None
+    memory = friction_memory([loop("late", hz, value=-3e-3) for hz in (2.0, 6.0)])
+    assert (memory.memory, memory.rotation) == ("undecided", "clockwise")
+    assert "clockwise" in memory.reason
+    assert memory.delay is None
 
 
 @pytest.mark.parametrize(
@@ -108,25 +108,25 @@ def shaken(law: object, hz: float, base: float, *, noise: float = 0.0) -> Record
 @pytest.mark.parametrize("noise", [0.0, 0.002])
 @pytest.mark.parametrize("law", [ss.laws.Coulomb(1.1), ss.laws.Coulomb(1.1, static=1.4)])
 def test_friction_that_sticks_has_no_memory(law: object, noise: float) -> None:
-    found = friction_memory([shaken(law, 2.5, 0.65e-3, noise=noise), shaken(law, 8.7, 1.1e-3, noise=noise)])
-    assert (found.memory, found.rotation) == ("none", "none"), found.reason
-    assert all(phase.includes(0.0) for phase in found.phases)
-    assert "at 2.5 Hz the contact rests 3" in found.status
-    assert "at 8.7 Hz the contact" not in found.status
+    memory = friction_memory([shaken(law, 2.5, 0.65e-3, noise=noise), shaken(law, 8.7, 1.1e-3, noise=noise)])
+    assert (memory.memory, memory.rotation) == ("none", "none"), memory.reason
+    assert all(phase.includes(0.0) for phase in memory.phases)
+    assert "at 2.5 Hz the contact rests 3" in memory.status
+    assert "at 8.7 Hz the contact" not in memory.status
 
 
 def test_a_state_is_told_though_the_contact_almost_sticks() -> None:
     law = ss.laws.StateVariable(1.1, rate=60.0)
-    found = friction_memory([shaken(law, 2.5, 0.65e-3), shaken(law, 8.7, 1.1e-3)])
-    assert found.memory == "state variable", found.reason
-    assert found.time.includes(1 / (1.1 * 60.0))
-    assert found.time.value == pytest.approx(1 / (1.1 * 60.0), rel=0.03)
+    memory = friction_memory([shaken(law, 2.5, 0.65e-3), shaken(law, 8.7, 1.1e-3)])
+    assert memory.memory == "state variable", memory.reason
+    assert memory.time.includes(1 / (1.1 * 60.0))
+    assert memory.time.value == pytest.approx(1 / (1.1 * 60.0), rel=0.03)
 
 
 def test_noise_speaks_against_no_memory() -> None:
-    found = friction_memory([loop("curve", hz, noise=30.0) for hz in (2.0, 8.0)])
-    assert found.memory == "undecided"
-    assert "less noise" in found.reason
+    memory = friction_memory([loop("curve", hz, noise=30.0) for hz in (2.0, 8.0)])
+    assert memory.memory == "undecided"
+    assert "less noise" in memory.reason
 
 
 def test_what_can_not_be_told_is_refused() -> None:

@@ -167,8 +167,8 @@ def test_columns_go_beside_what_a_file_states_of_the_rig(config: str) -> None:
     init = CliRunner().invoke(main, command[1:], input=5 * "\n")
     assert init.exit_code == 0, init.output
     assert "Mass that moves" not in init.output, "it is stated"
-    told = next(line for line in init.stdout.splitlines() if line.startswith("Next: "))
-    assert right(ask(*shlex.split(told.removeprefix("Next: stickslip "))).stdout)
+    first = next(line for line in init.stdout.splitlines() if line.startswith("Next: "))
+    assert right(ask(*shlex.split(first.removeprefix("Next: stickslip "))).stdout)
     assert ss.rig.read_rig(command[-1]).mass.sd == pytest.approx(0.01)
     assert "To mend it:" not in CliRunner().invoke(main, asked).stderr, "that file is there now"
 
@@ -327,10 +327,10 @@ def test_a_spring_in_newtons_a_millimetre_is_named_of_a_rig_that_sticks_below_it
 
 def test_no_force_stands_in_the_table_where_what_it_rests_on_was_stated_wrongly() -> None:
     path = written("t [s],x [m],z [m],a [m/s^2]", a=1 / 9.80665)
-    told = ask("analyze", path, *RIG)
-    assert "until that is mended no force is given" in " ".join(told.stdout.split())
-    assert "sliding friction" not in told.stdout
-    assert "sliding friction" in mended(told)
+    answer = ask("analyze", path, *RIG)
+    assert "until that is mended no force is given" in " ".join(answer.stdout.split())
+    assert "sliding friction" not in answer.stdout
+    assert "sliding friction" in mended(answer)
 
 
 def test_a_unit_that_ends_a_columns_name_is_read() -> None:
@@ -338,9 +338,9 @@ def test_a_unit_that_ends_a_columns_name_is_read() -> None:
     seen = motion()
     table = np.column_stack([1e3 * np.arange(len(seen)) / 1000, 1e6 * seen["x"], 1e6 * seen["z"]])
     np.savetxt(path, table, delimiter=";", header="Zeit_ms;Weg_um;Tisch_um", comments="", fmt="%.9g")
-    told = ask("analyze", path, "--channels", "x=Weg_um", "--channels", "z=Tisch_um", *RIG)
-    assert "no unit" not in told.stdout
-    assert right(" ".join(told.stdout.split()))
+    answer = ask("analyze", path, "--channels", "x=Weg_um", "--channels", "z=Tisch_um", *RIG)
+    assert "no unit" not in answer.stdout
+    assert right(" ".join(answer.stdout.split()))
 
 
 def test_a_mass_that_friction_carries_on_a_shaken_table_is_stated_rightly() -> None:

@@ -108,13 +108,13 @@ def test_all_problems_are_there() -> None:
 @pytest.mark.parametrize("name", MODELS)
 def test_certified_digits(name: str, start: int) -> None:
     given = problem(name)
-    found = minimise(lambda b: MODELS[name](b, given.x), given.data, given.starts[start])
+    minimum = minimise(lambda b: MODELS[name](b, given.x), given.data, given.starts[start])
     least = DIGITS[given.level]
-    assert found.settled
-    assert digits(found.parameters, given.certified) >= least
-    assert digits(found.sd, given.sd) >= 4 if name != "Lanczos1" else found.sd.max() < 1e-9
+    assert minimum.settled
+    assert digits(minimum.parameters, given.certified) >= least
+    assert digits(minimum.sd, given.sd) >= 4 if name != "Lanczos1" else minimum.sd.max() < 1e-9
     if name != "Lanczos1":  # its squares, 1e-25, are of rounding alone
-        assert found.squares == pytest.approx(given.squares, rel=1e-6)
+        assert minimum.squares == pytest.approx(given.squares, rel=1e-6)
 
 
 def test_what_can_not_be_fitted_is_refused() -> None:

@@ -16,9 +16,9 @@ FS = 1000.0
 
 @pytest.mark.parametrize("sd", [1e-6, 1e-3, 1.0])
 def test_white_noise_is_rated_without_bias(sd):
-    found = [noise_level(sd * np.random.default_rng(seed).standard_normal(2000), FS) for seed in range(60)]
-    assert np.mean(found) == pytest.approx(sd, rel=0.02)
-    assert np.std(found) < 0.06 * sd
+    levels = [noise_level(sd * np.random.default_rng(seed).standard_normal(2000), FS) for seed in range(60)]
+    assert np.mean(levels) == pytest.approx(sd, rel=0.02)
+    assert np.std(levels) < 0.06 * sd
 
 
 @pytest.mark.parametrize("cycle", [30, 100, 1000])

@@ -21,7 +21,7 @@ DECAY = {"x": np.exp(-0.8 * np.arange(800) / 200) * np.cos(10 * np.arange(800) /
 def things() -> dict[str, Any]:
     """One of each kind that a person draws."""
     record = ss.datasets.demo().rows(0, 4000)
-    found = ss.analyze(record, **RIG)
+    findings = ss.analyze(record, **RIG)
     slider = ss.Oscillator(
         mass=1, stiffness=100, law=ss.laws.Coulomb(0.5), drive=ss.drives.HarmonicBase(0.02, frequency=1.0)
     )
@@ -31,9 +31,10 @@ def things() -> dict[str, Any]:
     )
     tone = np.sin(np.arange(8000.0)) * (np.abs(np.arange(8000) - 4000) < 2000)
     return {
-        "record": record, "findings": found, "loops": found.loops, "sticks": found.sticks, "estimate": found.level,
-        "several": found.estimates[:4], "run": run, "comparison": ss.compare([found, found]),
-        "curve": ss.fit_curve(found.record, curve="coulomb"), "decay": ss.analyze_decay(decay).decay,
+        "record": record, "findings": findings, "loops": findings.loops, "sticks": findings.sticks,
+        "estimate": findings.level, "several": findings.estimates[:4], "run": run,
+        "comparison": ss.compare([findings, findings]),
+        "curve": ss.fit_curve(findings.record, curve="coulomb"), "decay": ss.analyze_decay(decay).decay,
         "wavelets": ss.wavelet_map(record, "a"), "squeaks": ss.find_squeaks(ss.Record.of({"sound": tone}, fs=8000)),
         "map": ss.sweep(slider, {"frequency": [0.5, 1.0], "kinetic": [0.2, 0.5]}, measures=["stops"], settle=4),
     }  # fmt: skip
@@ -89,13 +90,15 @@ def test_a_notebook_shows_a_table(things: dict[str, Any]) -> None:
     assert "<script" not in ss.Record.of({"x": [1.0, 2.0]}, fs=1.0)._repr_html_()
     hostile = ss.Estimate.normal("<script>", 1.0, sd=0.1, unit="N", method="&")
     assert "&lt;script&gt;" in hostile._repr_html_()
-    told = ss.summary(things["findings"])
-    assert told.answer.split(";")[0] in told._repr_html_()
+    story = ss.summary(things["findings"])
+    assert story.answer.split(";")[0] in story._repr_html_()
 
 
 def test_a_caution_that_several_rows_share_stands_once(things: dict[str, Any]) -> None:
     shown = things["findings"]._repr_html_()
-    shared = max((str(each.status) for each in things["findings"].estimates if each.status != "ok"), key=len)
+    shared = max(
+        (str(estimate.status) for estimate in things["findings"].estimates if estimate.status != "ok"), key=len
+    )
     assert shown.count(shared.split("; ")[0]) == 1
 
 
@@ -104,7 +107,7 @@ def test_answers_and_motions_become_tables_of_pandas_and_xarray(things: dict[str
     level = things["loops"].level
     row = frame.loc["sliding friction"]
     assert (row.value, row.low, row.high, row.unit) == (level.value, *level.interval, "N")
-    assert list(frame.index) == [each.name for each in things["loops"].estimates]
+    assert list(frame.index) == [estimate.name for estimate in things["loops"].estimates]
     assert float(things["loops"].to_xarray()["value"].sel(quantity="sliding friction")) == level.value
     assert len(things["findings"].to_pandas()) == len(things["findings"].estimates)
     run = things["run"]

@@ -21,19 +21,19 @@ def analyzed(seed: int, noise: str, dry: float = 0.0) -> ss.answers.Findings:
 
 
 def test_an_interval_that_misses_zero_by_chance_is_no_dry_friction() -> None:
-    found = analyzed(105, "12 bit")
-    assert found.decay.best.dry_displacement.interval[0] > 0  # as of one null record in forty
-    assert not found.decay.rubs
-    told = " ".join(ss.summary(found).headline)
+    findings = analyzed(105, "12 bit")
+    assert findings.decay.best.dry_displacement.interval[0] > 0  # as of one null record in forty
+    assert not findings.decay.rubs
+    told = " ".join(ss.summary(findings).headline)
     assert "dies away by viscous friction" in told
     assert "That there is dry friction too can not be told" in told
     assert "dry friction force of" not in told
 
 
 def test_dry_friction_that_is_there_is_told() -> None:
-    found = analyzed(101, "white", 0.02)
-    assert found.decay.rubs
-    told = " ".join(ss.summary(found).headline)
+    findings = analyzed(101, "white", 0.02)
+    assert findings.decay.rubs
+    told = " ".join(ss.summary(findings).headline)
     assert "dies away by viscous and dry friction" in told
     assert "if the dry friction stays the same. If it rises by 1 % over the decay, the damping ratio is read" in told
     assert "dry friction force of" in told
@@ -54,22 +54,22 @@ def test_what_a_changing_friction_is_misread_by_is_said_beforehand(ratio: float,
 
 
 def test_one_damping_ratio_is_quoted_and_the_others_are_folded() -> None:
-    found = analyzed(101, "white", 0.02)
-    story = ss.summary(found)
+    findings = analyzed(101, "white", 0.02)
+    story = ss.summary(findings)
     assert [line.name for line in story.lines if "damping ratio" in line.name] == ["damping ratio"]
     folded, tried = story.tables
     assert (folded.folded, tried.folded) == (True, False)
     assert folded.rows[0][0] == "damping ratio, whichever motion"
-    assert {each.name for each in found.estimates} >= {"damping ratio", "damping ratio, by decrements"}
+    assert {estimate.name for estimate in findings.estimates} >= {"damping ratio", "damping ratio, by decrements"}
 
 
 def test_a_terminal_says_how_many_are_folded(tmp_path: Path) -> None:
     values, fs, _ = null_decay(101, "white", dry=0.02)
     file = ss.write_record(ss.Record.of({"x": values}, fs=fs), tmp_path / "release.csv")
     asked = ["decay", str(file), "--output", str(tmp_path / "out")]
-    told = CliRunner().invoke(main, asked).output
-    assert "More with --all" in told
-    assert "by decrements" not in told
+    output = CliRunner().invoke(main, asked).output
+    assert "More with --all" in output
+    assert "by decrements" not in output
     assert "by decrements" in CliRunner().invoke(main, [*asked, "--all"]).output
     assert "by decrements" in (tmp_path / "out" / "report.html").read_text("utf-8")
 

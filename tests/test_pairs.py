@@ -47,9 +47,9 @@ def test_a_loss_factor_is_twice_the_damping_ratio_of_what_rings() -> None:
 
 def test_every_pair_says_where_its_numbers_are_from() -> None:
     for name in ("steel on steel", "aluminium on steel", "Teflon on steel", "rubber on steel", "wet rubber on steel"):
-        found = ss.laws.pair(name)
-        assert found.static >= found.kinetic > 0
-        assert all(len(source) > 10 for source in found.sources)
+        pair = ss.laws.pair(name)
+        assert pair.static >= pair.kinetic > 0
+        assert all(len(source) > 10 for source in pair.sources)
 
 
 def test_an_unknown_pair_is_refused() -> None:

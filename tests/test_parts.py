@@ -23,14 +23,14 @@ def pieces(record: ss.Record, *rows: int) -> list[ss.Record]:
 def test_every_row_belongs_to_one_stretch() -> None:
     record = ss.Record.of({"x": np.arange(10007.0)}, fs=100, start=3.0)
     for parts in (record, pieces(record, 1, 5, 4000, 4001, 9990)):
-        found = list(overlapping(parts, seconds=7.0, overlap=1.5))
+        items = list(overlapping(parts, seconds=7.0, overlap=1.5))
         own = [
-            each.record["x"][(each.record.time >= each.first - 1e-9) & (each.record.time < each.last - 1e-9)]
-            for each in found
+            item.record["x"][(item.record.time >= item.first - 1e-9) & (item.record.time < item.last - 1e-9)]
+            for item in items
         ]
         assert np.array_equal(np.concatenate(own), record["x"])
-        assert all(a.last == b.first for a, b in itertools.pairwise(found))
-        assert all(each.record.start <= max(3.0, each.first - 1.49) for each in found)
+        assert all(a.last == b.first for a, b in itertools.pairwise(items))
+        assert all(item.record.start <= max(3.0, item.first - 1.49) for item in items)
 
 
 def test_sticks_of_stretches_are_those_of_the_whole() -> None:
@@ -38,19 +38,19 @@ def test_sticks_of_stretches_are_those_of_the_whole() -> None:
     whole = ss.find_sticks(ss.friction_force(record, method="fusion", **RIG))
     parts = pieces(record, 3000, 11111)
     stretches = overlapping(parts, seconds=2.0, overlap=0.5)
-    found = join_sticks(
-        (each, ss.find_sticks(ss.friction_force(each.record, method="fusion", **RIG))) for each in stretches
+    sticks = join_sticks(
+        (stretch, ss.find_sticks(ss.friction_force(stretch.record, method="fusion", **RIG))) for stretch in stretches
     )
-    assert [event.kind for event in found.events] == [event.kind for event in whole.events]
-    apart = np.array([a.time - b.time for a, b in zip(found.events, whole.events, strict=True)])
+    assert [event.kind for event in sticks.events] == [event.kind for event in whole.events]
+    apart = np.array([a.time - b.time for a, b in zip(sticks.events, whole.events, strict=True)])
     assert np.sqrt(np.mean(apart**2)) < 0.02e-3
-    assert sum(event.duration for event in found.events if event.kind in ("stick", "slip")) == pytest.approx(
+    assert sum(event.duration for event in sticks.events if event.kind in ("stick", "slip")) == pytest.approx(
         sum(event.duration for event in whole.events if event.kind in ("stick", "slip")), abs=1e-4
     )
-    assert found.share.value == pytest.approx(whole.share.value, abs=0.002)
-    assert found.microslips is not None
-    assert found.microslips.value == 2.0
-    assert (found.kind, found.method) == (whole.kind, whole.method)
+    assert sticks.share.value == pytest.approx(whole.share.value, abs=0.002)
+    assert sticks.microslips is not None
+    assert sticks.microslips.value == 2.0
+    assert (sticks.kind, sticks.method) == (whole.kind, whole.method)
 
 
 def test_an_event_longer_than_the_overlap_is_one() -> None:
@@ -59,9 +59,9 @@ def test_an_event_longer_than_the_overlap_is_one() -> None:
     x = np.cumsum(np.maximum(np.abs(drive) - 0.5, 0) * np.sign(drive)) / 1000
     record = ss.Record.of({"x": x + 1e-6 * np.random.default_rng(0).standard_normal(t.size)}, fs=1000)
     whole = ss.find_sticks(record)
-    found = join_sticks((each, ss.find_sticks(each.record)) for each in overlapping(record, seconds=20, overlap=0.2))
-    assert [event.kind for event in found.events] == [event.kind for event in whole.events]
-    assert sum(event.duration for event in found.events) == pytest.approx(60.0, abs=0.05)
+    sticks = join_sticks((each, ss.find_sticks(each.record)) for each in overlapping(record, seconds=20, overlap=0.2))
+    assert [event.kind for event in sticks.events] == [event.kind for event in whole.events]
+    assert sum(event.duration for event in sticks.events) == pytest.approx(60.0, abs=0.05)
 
 
 def test_what_a_threshold_leaves_open_stays_open_in_the_mean() -> None:
@@ -71,10 +71,10 @@ def test_what_a_threshold_leaves_open_stays_open_in_the_mean() -> None:
     record = ss.Record.of({"x": x + 1e-6 * np.random.default_rng(0).standard_normal(t.size)}, fs=1000)
     whole = ss.find_sticks(record, threshold=0.03)
     stretches = overlapping(record, seconds=10)
-    found = join_sticks((each, ss.find_sticks(each.record, threshold=0.03)) for each in stretches)
-    assert found.method == "speed"
-    assert found.share.includes(1 / 3)
-    assert found.share.interval == pytest.approx(whole.share.interval, abs=0.01)
+    sticks = join_sticks((stretch, ss.find_sticks(stretch.record, threshold=0.03)) for stretch in stretches)
+    assert sticks.method == "speed"
+    assert sticks.share.includes(1 / 3)
+    assert sticks.share.interval == pytest.approx(whole.share.interval, abs=0.01)
 
 
 def test_what_keeps_a_stretch_from_being_sure_is_said_of_the_whole() -> None:

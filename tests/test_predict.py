@@ -86,10 +86,10 @@ def test_sensors_are_read_as_they_are_stated() -> None:
 
 def test_a_fit_is_tried_on_another_record_as_it_was_written(tmp_path: Path) -> None:
     record = measured(STICKING)
-    found = ss.fit_law(record, STICKING.having(kinetic=1.0), free=["kinetic"], nuisance=["damping"], intervals=False)
-    folder = ss.publish(found, folder=tmp_path / "slow-fit", record=record)
+    fit = ss.fit_law(record, STICKING.having(kinetic=1.0), free=["kinetic"], nuisance=["damping"], intervals=False)
+    folder = ss.publish(fit, folder=tmp_path / "slow-fit", record=record)
     read = ss.answers.read_fitted(folder)
-    assert (read.law, read.damping) == (found.law, found.oscillator.damping)
+    assert (read.law, read.damping) == (fit.law, fit.oscillator.damping)
     write("fast.csv", measured(STICKING.having(frequency=4.0), seed=2))
     result = predict("slow-fit", "fast.csv")
     assert result.exit_code == 0, result.output
@@ -98,8 +98,8 @@ def test_a_fit_is_tried_on_another_record_as_it_was_written(tmp_path: Path) -> N
     assert max(map(len, result.stdout.splitlines())) <= 80
     page = Path("fast-predicted/report.html").read_text("utf-8")
     assert "as it was given" in page
-    told = json.loads(Path("fast-predicted/results.json").read_text("utf-8"))
-    assert told["records"][0]["channels"]["x"]["follows"] == pytest.approx(told["follows"]["x"])
+    data = json.loads(Path("fast-predicted/results.json").read_text("utf-8"))
+    assert data["records"][0]["channels"]["x"]["follows"] == pytest.approx(data["follows"]["x"])
 
 
 def test_columns_of_the_fit_are_those_of_the_next_record() -> None:
@@ -109,8 +109,8 @@ def test_columns_of_the_fit_are_those_of_the_next_record() -> None:
         text = Path(name).read_text("utf-8")
         Path(name).write_text(text.replace("x [mm],z [mm]", "Weg [mm],Tisch [mm]"), "utf-8")
     record = ss.read_record("slow.csv", channels=columns)
-    found = ss.fit_law(record, STICKING.having(kinetic=1.0), free=["kinetic"], nuisance=["damping"], intervals=False)
-    ss.publish(found, folder="slow-fit", record=record)
+    fit = ss.fit_law(record, STICKING.having(kinetic=1.0), free=["kinetic"], nuisance=["damping"], intervals=False)
+    ss.publish(fit, folder="slow-fit", record=record)
     result = predict("slow-fit", "fast.csv", "--no-plain")
     assert result.exit_code == 0, result.output
     assert "columns by slow-fit/law/rig.toml" in result.stderr
@@ -132,8 +132,8 @@ def test_the_rate_of_the_fitted_file_is_not_that_of_the_next() -> None:
             name, 1e3 * np.column_stack([part["x"], part["z"]]), delimiter=",", header="x [mm],z [mm]", comments=""
         )
     record = ss.read_record("slow.csv", channels={"x": "x [mm]", "z": "z [mm]"}, fs=1000)
-    found = ss.fit_law(record, STICKING.having(kinetic=1.0), free=["kinetic"], nuisance=["damping"], intervals=False)
-    ss.publish(found, folder="slow-fit", record=record)
+    fit = ss.fit_law(record, STICKING.having(kinetic=1.0), free=["kinetic"], nuisance=["damping"], intervals=False)
+    ss.publish(fit, folder="slow-fit", record=record)
     refused = predict("slow-fit", "fast.csv", "--no-plain")
     assert refused.exit_code == 1
     assert "neither time nor sampling rate" in refused.stderr
@@ -164,10 +164,10 @@ def test_several_records_are_rows_and_what_can_not_be_asked_is_left_out() -> Non
     result = predict("law.toml", "a.csv", "b.csv", "still.csv", "--no-plain", "--json")
     assert result.exit_code == 0, result.output
     assert "left out: still.csv" in result.stderr
-    told = json.loads(result.stdout)
-    assert [each["name"] for each in told["records"]] == ["a.csv", "b.csv"]
-    a, b = (each["channels"]["x"]["follows"] for each in told["records"])
-    assert told["follows"]["x"] == b < a
+    data = json.loads(result.stdout)
+    assert [each["name"] for each in data["records"]] == ["a.csv", "b.csv"]
+    a, b = (each["channels"]["x"]["follows"] for each in data["records"])
+    assert data["follows"]["x"] == b < a
     assert not Path("comparison-predicted").exists()
 
 

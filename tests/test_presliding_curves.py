@@ -35,19 +35,23 @@ def iwan(x, stiffness: float = 1e5, width: float = 3e-5, elements: int = 8):
 
 
 def test_a_jenkins_element_comes_back() -> None:
-    found = fit_curve(moved(jenkins), curve="jenkins")
-    assert found.parameters["kinetic"].value == pytest.approx(1.1, rel=2e-3)
-    assert found.parameters["stiffness"].value == pytest.approx(1e5, rel=2e-3)
-    assert found.parameters["offset"].value == pytest.approx(0.02, abs=1e-3)
-    assert found.law == ElastoSlip([found.parameters["stiffness"].value], [found.parameters["kinetic"].value])
-    assert found.status == "ok"
+    fit = fit_curve(moved(jenkins), curve="jenkins")
+    assert fit.parameters["kinetic"].value == pytest.approx(1.1, rel=2e-3)
+    assert fit.parameters["stiffness"].value == pytest.approx(1e5, rel=2e-3)
+    assert fit.parameters["offset"].value == pytest.approx(0.02, abs=1e-3)
+    assert fit.law == ElastoSlip([fit.parameters["stiffness"].value], [fit.parameters["kinetic"].value])
+    assert fit.status == "ok"
 
 
 def test_intervals_hold_the_truth() -> None:
     held = 0
     for seed in range(30):
-        found = fit_curve(moved(jenkins, seed=seed, noise=0.05), curve="jenkins").parameters
-        held += found["kinetic"].includes(1.1) + found["stiffness"].includes(1e5) + found["offset"].includes(0.02)
+        parameters = fit_curve(moved(jenkins, seed=seed, noise=0.05), curve="jenkins").parameters
+        held += (
+            parameters["kinetic"].includes(1.1)
+            + parameters["stiffness"].includes(1e5)
+            + parameters["offset"].includes(0.02)
+        )
     assert held >= 0.88 * 90
 
 
@@ -55,16 +59,16 @@ def test_a_displacement_that_trembles_makes_nothing_softer() -> None:
     """Noise of 2 % of the give would let the element slip and hold at each reversal: 2 % of its stiffness."""
     clean = moved(jenkins, cycles=20)
     x = clean["x"] + np.random.default_rng(1).normal(0, 2e-7, len(clean))
-    found = fit_curve(Record.of({"x": x, "friction": clean["friction"]}, fs=FS), curve="jenkins").parameters
-    assert found["stiffness"].value == pytest.approx(1e5, rel=3e-3)
-    assert found["stiffness"].includes(1e5)
+    parameters = fit_curve(Record.of({"x": x, "friction": clean["friction"]}, fs=FS), curve="jenkins").parameters
+    assert parameters["stiffness"].value == pytest.approx(1e5, rel=3e-3)
+    assert parameters["stiffness"].includes(1e5)
 
 
 def test_iwans_classes_come_back() -> None:
-    found = fit_curve(moved(iwan), curve="iwan", elements=8)
+    fit = fit_curve(moved(iwan), curve="iwan", elements=8)
     for name, value in (("stiffness", 1e5), ("width", 3e-5), ("kinetic", 1.5)):
-        assert found.parameters[name].value == pytest.approx(value, rel=3e-3)
-    assert len(found.law.forces) == 8
+        assert fit.parameters[name].value == pytest.approx(value, rel=3e-3)
+    assert len(fit.law.forces) == 8
 
 
 def test_dahls_law_as_another_solver_has_it() -> None:
@@ -78,25 +82,25 @@ def test_dahls_law_as_another_solver_has_it() -> None:
 
     solved = solve_ivp(rate, (0, t[-1]), [0.0], t_eval=t, rtol=1e-8, atol=1e-9, max_step=2e-3).y[0]
     record = Record.of({"x": STROKE * np.sin(2 * np.pi * t), "friction": solved}, fs=1000)
-    found = fit_curve(record, curve="dahl")
+    fit = fit_curve(record, curve="dahl")
     for name, value in (("kinetic", level), ("stiffness", stiffness), ("exponent", power)):
-        assert found.parameters[name].value == pytest.approx(value, rel=2e-3)
-    assert found.law == Dahl(**{name: found.parameters[name].value for name in ("kinetic", "stiffness", "exponent")})
+        assert fit.parameters[name].value == pytest.approx(value, rel=2e-3)
+    assert fit.law == Dahl(**{name: fit.parameters[name].value for name in ("kinetic", "stiffness", "exponent")})
 
 
 def test_maxwell_elements_follow_a_smooth_loop() -> None:
     record = moved(lambda x: iwan(x, elements=50))
-    found = fit_curve(record, curve="maxwell", elements=16)
-    assert found.unexplained < 0.02
-    assert found.parameters["stiffness"].value == pytest.approx(1e5, rel=0.15)
-    assert found.parameters["kinetic"].value == pytest.approx(1.5, rel=0.02)
-    assert all(force > 0 for force in found.law.forces)
+    fit = fit_curve(record, curve="maxwell", elements=16)
+    assert fit.unexplained < 0.02
+    assert fit.parameters["stiffness"].value == pytest.approx(1e5, rel=0.15)
+    assert fit.parameters["kinetic"].value == pytest.approx(1.5, rel=0.02)
+    assert all(force > 0 for force in fit.law.forces)
 
 
 def test_loops_are_fitted_by_their_mean_cycle() -> None:
-    found = fit_curve(friction_loops(moved(jenkins)), curve="jenkins").parameters
-    assert found["kinetic"].value == pytest.approx(1.1, rel=0.01)
-    assert found["stiffness"].value == pytest.approx(1e5, rel=0.02)
+    parameters = fit_curve(friction_loops(moved(jenkins)), curve="jenkins").parameters
+    assert parameters["kinetic"].value == pytest.approx(1.1, rel=0.01)
+    assert parameters["stiffness"].value == pytest.approx(1e5, rel=0.02)
 
 
 def test_what_strokes_and_samples_can_not_tell_is_flagged() -> None:

@@ -57,11 +57,11 @@ def reference(system: ss.Oscillator, speed: float, end: float) -> dict[str, floa
     now, y = 0.0, np.array([0.0, q, 0.0])
     while True:
         small = [1e-13, 1e-11, 1e-12]
-        found = solve_ivp(rates, (0, end - now), y, "Radau", rtol=1e-11, atol=small, events=stops, args=(now,))
-        now, y = now + found.t[-1], found.y[:, -1].copy()
+        solution = solve_ivp(rates, (0, end - now), y, "Radau", rtol=1e-11, atol=small, events=stops, args=(now,))
+        now, y = now + solution.t[-1], solution.y[:, -1].copy()
         s, _, grip = slip(y[1], y[2])
-        if found.status != 1:
-            assert found.status == 0, found.message
+        if solution.status != 1:
+            assert solution.status == 0, solution.message
             age = law.distance / law.reference * math.exp(y[2])
             return {"x": y[0], "v": face + s, "age": age, "friction": law.direct * law.normal * y[1]}
         held, most = push(now, y[0], face) / (law.direct * law.normal), math.log(least / law.reference) + grip

@@ -88,24 +88,24 @@ def run(line: str) -> None:
         return
     result = CliRunner().invoke(main, command[1:])
     assert result.exit_code == 0, result.output
-    told = result.stdout
-    print(told, end="")
+    stdout = result.stdout
+    print(stdout, end="")
     if command[1] == "check":
-        assert "samples" in told
-        assert "nothing wrong was found" in told
+        assert "samples" in stdout
+        assert "nothing wrong was found" in stdout
     elif command[1:] == ["simulate", "--list"]:
-        assert "FD-4" in told
+        assert "FD-4" in stdout
     elif command[1] == "simulate":
-        assert Path(told.split()[-1]).with_name("results.json").is_file(), "the page's folder is there"
+        assert Path(stdout.split()[-1]).with_name("results.json").is_file(), "the page's folder is there"
     elif command[1] in ("decay", "squeak"):
-        assert {"decay": "damping ratio", "squeak": "It squeaks"}[command[1]] in told
-        assert Path(told.split()[-1]).stat().st_size > 10_000, "the report that it names is there"
+        assert {"decay": "damping ratio", "squeak": "It squeaks"}[command[1]] in stdout
+        assert Path(stdout.split()[-1]).stat().st_size > 10_000, "the report that it names is there"
     elif command[1] == "rig":
-        assert ("Root-mean-square errors" if "--plan" in command else "what is true") in told
-        assert Path(told.split()[-1]).with_name("results.json").is_file(), "the page's folder is there"
+        assert ("Root-mean-square errors" if "--plan" in command else "what is true") in stdout
+        assert Path(stdout.split()[-1]).with_name("results.json").is_file(), "the page's folder is there"
     elif command[1] == "wavelet":
-        assert "jumps or kinks" in told
+        assert "jumps or kinks" in stdout
     else:
         assert command[1] == "analyze", f"a command whose answer no test looks at: {line}"
-        assert "sliding friction" in told
-        assert Path(told.split()[-1]).stat().st_size > 10_000, "the report that it names is there"
+        assert "sliding friction" in stdout
+        assert Path(stdout.split()[-1]).stat().st_size > 10_000, "the report that it names is there"

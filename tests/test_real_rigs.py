@@ -50,12 +50,12 @@ def test_the_frame_sticks_and_slips_in_each_cycle(dataset: Sets, weight: str, fr
 def test_the_frame_moves_against_its_load_so_compliance_is_not_told(dataset: Sets, weight: str, least: float) -> None:
     """While it sticks it creeps some micrometres the wrong way, and more under more load: no contact does so."""
     findings = frame(dataset, weight)
-    found = findings.presliding
-    assert found is not None
-    assert found.verdict == "can not be told"
-    assert "against its load" in found.evidence
-    assert not found.compliance_forward.known
-    assert found.compliance_forward.status.startswith(found.evidence)
+    presliding = findings.presliding
+    assert presliding is not None
+    assert presliding.verdict == "can not be told"
+    assert "against its load" in presliding.evidence
+    assert not presliding.compliance_forward.known
+    assert presliding.compliance_forward.status.startswith(presliding.evidence)
     strokes = find_strokes(findings.record, contact=None, question="the creep")
     lines = filter(None, (_branch(stroke, LOW, HIGH) for stroke in strokes.to(1)))
     assert -np.mean([compliance for _, compliance in lines]) > least
@@ -63,35 +63,35 @@ def test_the_frame_moves_against_its_load_so_compliance_is_not_told(dataset: Set
 
 @pytest.mark.parametrize("name", SOUND)
 def test_the_band_brake_gives_way_with_play_before_it_slips(dataset: Sets, name: str) -> None:
-    found = ss.analyze(brake(dataset, name))
-    assert found.presliding is not None
-    assert found.presliding.verdict == "gives way"
-    assert found.presliding.stiffness is not None
-    assert 2e6 < found.presliding.stiffness.value < 5e6  # read off the loops: 1 to 4 kip over 0.1 to 0.15 inch
-    assert found.presliding.backlash is not None
-    assert found.presliding.backlash.value == pytest.approx(0.0032, abs=0.0009)  # one device, whatever its tension
-    assert found.loops is not None
-    for level in (found.loops.forward, found.loops.back):
+    findings = ss.analyze(brake(dataset, name))
+    assert findings.presliding is not None
+    assert findings.presliding.verdict == "gives way"
+    assert findings.presliding.stiffness is not None
+    assert 2e6 < findings.presliding.stiffness.value < 5e6  # read off the loops: 1 to 4 kip over 0.1 to 0.15 inch
+    assert findings.presliding.backlash is not None
+    assert findings.presliding.backlash.value == pytest.approx(0.0032, abs=0.0009)  # one device, whatever its tension
+    assert findings.loops is not None
+    for level in (findings.loops.forward, findings.loops.back):
         assert 0.8 < level.value / 4448.2216 < 4.4  # kip
 
 
 def test_the_band_brake_rings_after_slip_begins(dataset: Sets) -> None:
-    found = ss.cycle.breakaway(brake(dataset, "0.5Hz35lbtension"))
-    assert found.ringing_forward is not None
-    assert 41 < found.ringing_forward.value < 56
-    assert found.ringing_back is not None
-    assert 41 < found.ringing_back.value < 58
-    assert found.ringing_difference is not None
-    low, high = found.ringing_difference.interval
+    breakaway = ss.cycle.breakaway(brake(dataset, "0.5Hz35lbtension"))
+    assert breakaway.ringing_forward is not None
+    assert 41 < breakaway.ringing_forward.value < 56
+    assert breakaway.ringing_back is not None
+    assert 41 < breakaway.ringing_back.value < 58
+    assert breakaway.ringing_difference is not None
+    low, high = breakaway.ringing_difference.interval
     assert low < 44 - 54.6 < high  # by parabolas alone; what else may be taken for the ring widens it beyond telling
-    assert found.ratio.value > 1.2  # the first peak, ring included
-    assert "moves before" in found.status
+    assert breakaway.ratio.value > 1.2  # the first peak, ring included
+    assert "moves before" in breakaway.status
 
 
 def test_the_faulty_file_is_flagged_and_the_others_are_not(dataset: Sets) -> None:
     for name in (*SOUND, "0.5Hz20lbtension", "1Hz20lbtension", FAULTY):
-        found = ss.cycle.breakaway(brake(dataset, name))
-        flagged = [each for each in found.estimates if "no steady friction" in each.status]
+        breakaway = ss.cycle.breakaway(brake(dataset, name))
+        flagged = [estimate for estimate in breakaway.estimates if "no steady friction" in estimate.status]
         assert bool(flagged) == (name == FAULTY), name
 
 
@@ -101,14 +101,14 @@ def test_paper_on_paper_is_loaded_at_the_rate_of_the_spring(
 ) -> None:
     """k V / (m g), published; two of three records stick, as the paper says (Colas et al. 2019)."""
     path = dataset("paper_stick_slip") / f"k168Nm_{name}.mat"
-    found = ss.analyze(ss.read_record(path, channels={"load": f"Fnorm * {WEIGHT} [N]"})).pull
-    assert found is not None
-    assert found.loading_rate.value / WEIGHT == pytest.approx(slope, rel=tolerance)
-    assert found.regime == "stick-slip"
-    assert found.status == "ok"
+    pull = ss.analyze(ss.read_record(path, channels={"load": f"Fnorm * {WEIGHT} [N]"})).pull
+    assert pull is not None
+    assert pull.loading_rate.value / WEIGHT == pytest.approx(slope, rel=tolerance)
+    assert pull.regime == "stick-slip"
+    assert pull.status == "ok"
 
 
 def test_paper_on_paper_swings_when_it_is_pulled_fast(dataset: Sets) -> None:
     path = dataset("paper_stick_slip") / "k168Nm_v4300.mat"
-    found = ss.balance.pulled_slider(ss.read_record(path, channels={"load": f"Fnorm * {WEIGHT} [N]"}))
-    assert found.regime == "inertial"
+    slider = ss.balance.pulled_slider(ss.read_record(path, channels={"load": f"Fnorm * {WEIGHT} [N]"}))
+    assert slider.regime == "inertial"

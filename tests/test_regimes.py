@@ -20,36 +20,36 @@ SHAW = 0.72697564257968176  # r at which sliding with static = 1.5 kinetic frict
 
 def test_hysteresis_is_followed_up_and_down() -> None:
     """Held until the force exceeds the static friction; on the way down sliding lasts to Shaw's boundary."""
-    found = ss.bifurcation(BISTABLE, "amplitude", values=np.linspace(1.2, 1.6, 9))
-    up, down = found.changes
+    diagram = ss.bifurcation(BISTABLE, "amplitude", values=np.linspace(1.2, 1.6, 9))
+    up, down = diagram.changes
     assert (up.direction, up.before, up.after) == ("up", "held", "no stops")
     assert up.value == pytest.approx(1.5, abs=up.error)
     assert (down.direction, down.before, down.after) == ("down", "no stops", "2 + 0 stops")
     assert down.value == pytest.approx(1 / SHAW, abs=1.01 * down.error)
     assert up.error < 1e-6
-    assert found.coexisting == pytest.approx(np.linspace(1.2, 1.5, 7))
-    assert [each.regime for each in found.at(0)] == ["held", "2 + 0 stops"]
+    assert diagram.coexisting == pytest.approx(np.linspace(1.2, 1.5, 7))
+    assert [each.regime for each in diagram.at(0)] == ["held", "2 + 0 stops"]
 
 
 def test_the_number_of_stops_is_the_one_known() -> None:
     """A row of the table of stops over friction (Hong and Liu 2000), b = 0.1."""
     known = ss.scenarios.grid("HL-1")
     row = known["ratios"].index(0.1)
-    found = ss.bifurcation(forced(0.1, 0.5), "kinetic", values=known["loads"], precision=1e-3)
-    stops = [each.orbit.stops for each in found.up]
+    diagram = ss.bifurcation(forced(0.1, 0.5), "kinetic", values=known["loads"], precision=1e-3)
+    stops = [each.orbit.stops for each in diagram.up]
     assert stops == list(zip(known["normal"][row], known["abnormal"][row], strict=True))
 
 
 def test_starts_find_what_following_does_not() -> None:
     """From below only rest is met before the static friction; another start slides there."""
-    found = ss.bifurcation(BISTABLE, "amplitude", values=[1.2, 1.3], starts=[{}, {"x": 3.0}])
-    assert [each.regime for each in found.up + found.down] == ["held"] * 4
-    assert [[each.regime for each in others] for others in found.beside] == [["2 + 0 stops"]] * 2
+    diagram = ss.bifurcation(BISTABLE, "amplitude", values=[1.2, 1.3], starts=[{}, {"x": 3.0}])
+    assert [each.regime for each in diagram.up + diagram.down] == ["held"] * 4
+    assert [[other.regime for other in others] for others in diagram.beside] == [["2 + 0 stops"]] * 2
 
 
 def test_the_diagram_is_labelled() -> None:
-    found = ss.bifurcation(BISTABLE, "amplitude", values=[1.3, 1.4, 1.6], precision=1e-2)
-    data = found.data
+    diagram = ss.bifurcation(BISTABLE, "amplitude", values=[1.3, 1.4, 1.6], precision=1e-2)
+    data = diagram.data
     assert data["regime"].sel(direction="down", amplitude=1.3) == "2 + 0 stops"
     sliding = data.sel(direction="up", amplitude=1.6)
     orbit = ss.steady_state(BISTABLE.having(amplitude=1.6), start={"x": 3.0})
@@ -61,45 +61,45 @@ def test_the_diagram_is_labelled() -> None:
 
 def test_chaos_is_points_that_do_not_repeat() -> None:
     case = ss.scenarios.get("FM-1")
-    found = ss.bifurcation(case.system, "drive.amplitude", values=[1.88, 1.9], transient=100)
-    wild = found.up[-1]
+    diagram = ss.bifurcation(case.system, "drive.amplitude", values=[1.88, 1.9], transient=100)
+    wild = diagram.up[-1]
     assert wild.regime == "chaotic"
     assert len(np.unique(wild.points[:, 0].round(9))) > 200
-    assert found.data["points"].sizes["point"] == len(wild.points)
+    assert diagram.data["points"].sizes["point"] == len(wild.points)
 
 
 def test_branches_hold_the_unstable_orbits_between() -> None:
     """Stick-slip ends at a fold, below which the mass is held; the branch turns back there and is unstable."""
-    found = ss.bifurcation(BISTABLE, "amplitude", values=[1.1, 1.4, 1.6], branches=True)
-    assert [change.after for change in found.changes] == ["no stops", "2 + 0 stops", "held"]
-    [branch] = found.branches
+    diagram = ss.bifurcation(BISTABLE, "amplitude", values=[1.1, 1.4, 1.6], branches=True)
+    assert [change.after for change in diagram.changes] == ["no stops", "2 + 0 stops", "held"]
+    [branch] = diagram.branches
     [fold] = branch.folds
-    assert branch.values[fold] == pytest.approx(found.changes[-1].value, abs=1e-5)
+    assert branch.values[fold] == pytest.approx(diagram.changes[-1].value, abs=1e-5)
     assert {orbit.status for orbit in branch.orbits[fold + 1 :]} == {"unstable"}
 
 
 def test_basins_are_those_of_the_exact_runs() -> None:
     """Where Shaw's sliding and rest stand beside each other, each start leads where a long run ends."""
     system = BISTABLE.having(amplitude=1.25)
-    found = ss.basins(system, grid={"x": np.linspace(-2, 2, 9), "v": np.linspace(-2, 2, 9)})
-    assert [each.regime for each in found.attractors] == ["2 + 0 stops", "held"]
-    for i, x in enumerate(found.axes[0]):
-        for j, v in enumerate(found.axes[1]):
+    basins = ss.basins(system, grid={"x": np.linspace(-2, 2, 9), "v": np.linspace(-2, 2, 9)})
+    assert [attractor.regime for attractor in basins.attractors] == ["2 + 0 stops", "held"]
+    for i, x in enumerate(basins.axes[0]):
+        for j, v in enumerate(basins.axes[1]):
             run = ss.simulate(system, cycles=300, start={"x": x, "v": v})
             moves = any(event.time > 280 / system.drive.frequency for event in run.events)
-            assert found.attractors[found.which[i, j]].regime == ("2 + 0 stops" if moves else "held")
-    assert sum(share.value for share in found.shares) == pytest.approx(1.0)
-    assert all(share.includes(share.value) for share in found.shares)
-    assert found.data.sel(x=-2.0, v=2.0) == 0
+            assert basins.attractors[basins.which[i, j]].regime == ("2 + 0 stops" if moves else "held")
+    assert sum(share.value for share in basins.shares) == pytest.approx(1.0)
+    assert all(share.includes(share.value) for share in basins.shares)
+    assert basins.data.sel(x=-2.0, v=2.0) == 0
 
 
 def test_a_grid_of_rest_is_known_in_closed_form() -> None:
     """Held starts, without velocity, stay held where P + k |x| does not exceed the static friction."""
     system = forced(0.8, 0.7, static_ratio=2.0)  # P = 1, static friction 1.4
     x = np.linspace(-0.6, 0.6, 13)
-    found = ss.basins(system, grid={"x": x, "v": [-3.0, 0.0]})
-    held = [each.regime for each in found.attractors].index("held")
-    stay = found.which[:, 1] == held
+    basins = ss.basins(system, grid={"x": x, "v": [-3.0, 0.0]})
+    held = [attractor.regime for attractor in basins.attractors].index("held")
+    stay = basins.which[:, 1] == held
     assert np.all(stay[np.abs(x) <= 0.4 - 1e-9])
 
 
@@ -113,15 +113,15 @@ def test_a_start_that_can_not_be_followed_costs_no_map(monkeypatch: pytest.Monke
         return lap(system, table, state, mode, laps)  # type: ignore[arg-type]
 
     monkeypatch.setattr(module, "lap", failing)
-    found = ss.basins(ss.scenarios.get("FM-1").system, grid={"x": [-1.0, 0.5], "v": [0.5, 1.0]}, transient=20)
-    assert [sentence.partition(":")[0] for sentence in found.lost] == ["x = -1, v = 1"]
-    assert found.which.tolist() == [[0, -1], [0, 0]]
-    assert "could not be followed" in repr(found)
-    followed = found.which.size - len(found.lost)
-    for number, share in enumerate(found.shares):
-        count = np.count_nonzero(found.which == number)
+    basins = ss.basins(ss.scenarios.get("FM-1").system, grid={"x": [-1.0, 0.5], "v": [0.5, 1.0]}, transient=20)
+    assert [sentence.partition(":")[0] for sentence in basins.lost] == ["x = -1, v = 1"]
+    assert basins.which.tolist() == [[0, -1], [0, 0]]
+    assert "could not be followed" in repr(basins)
+    followed = basins.which.size - len(basins.lost)
+    for number, share in enumerate(basins.shares):
+        count = np.count_nonzero(basins.which == number)
         assert share.value == pytest.approx(count / followed)  # what failed is no start that leads elsewhere
-        assert share.interval[1] >= (count + len(found.lost)) / found.which.size
+        assert share.interval[1] >= (count + len(basins.lost)) / basins.which.size
         assert not stands(share.status)
 
 
@@ -148,24 +148,24 @@ def test_the_boundary_is_den_hartogs(row: tuple[float, float, float]) -> None:
     if (ratio, damping) == (0.5, 0.0):
         pytest.skip("at half the natural frequency the sliding motion is not unique")
     system = forced(ratio, 0.5, damping_ratio=damping)
-    found = ss.maps.boundary(system, "kinetic", between=(0.9 * load, min(1.1 * load, 0.99)))
-    assert found.value == pytest.approx(load, rel=1e-8)
-    assert found.kinds == (("no stops", "stops"),)
-    assert np.all(found.multipliers < 1)
+    border = ss.maps.boundary(system, "kinetic", between=(0.9 * load, min(1.1 * load, 0.99)))
+    assert border.value == pytest.approx(load, rel=1e-8)
+    assert border.kinds == (("no stops", "stops"),)
+    assert np.all(border.multipliers < 1)
 
 
 def test_the_boundary_with_static_friction_is_shaws() -> None:
-    found = ss.maps.boundary(BISTABLE, "amplitude", between=(1.2, 1.6), start={"x": 3.0})
-    assert found.value == pytest.approx(1 / SHAW, rel=1e-8)
-    assert found.kinds == (("stops", "no stops"),)
+    border = ss.maps.boundary(BISTABLE, "amplitude", between=(1.2, 1.6), start={"x": 3.0})
+    assert border.value == pytest.approx(1 / SHAW, rel=1e-8)
+    assert border.kinds == (("stops", "no stops"),)
 
 
 def test_a_boundary_is_followed_along_a_parameter() -> None:
     chosen = {b: r for b, z, r in ss.scenarios.grid("DH-2")["boundary"] if not z and b in (0.4, 0.8, 1.4)}
     places = np.array(sorted(chosen)) / TURN
-    found = ss.maps.boundary(forced(0.8, 0.5), "kinetic", between=(0.05, 0.99), along={"frequency": places})
-    assert found.values == pytest.approx([chosen[b] for b in sorted(chosen)], rel=1e-8)
-    assert found.data["kinetic"].dims == ("frequency",)
+    border = ss.maps.boundary(forced(0.8, 0.5), "kinetic", between=(0.05, 0.99), along={"frequency": places})
+    assert border.values == pytest.approx([chosen[b] for b in sorted(chosen)], rel=1e-8)
+    assert border.data["kinetic"].dims == ("frequency",)
 
 
 def test_other_questions_have_boundaries_too() -> None:
@@ -234,8 +234,8 @@ def test_the_figures_show_what_was_found() -> None:
     diagram = ss.bifurcation(BISTABLE, "amplitude", values=[1.3, 1.6], starts=[{}, {"x": 3.0}], precision=1e-2)
     places = {"frequency": np.array([0.6, 0.8, 1.1]) / TURN}
     curve = ss.maps.boundary(forced(0.8, 0.5), "kinetic", between=(0.05, 0.99), along=places, precision=1e-6)
-    found = ss.basins(BISTABLE.having(amplitude=1.25), grid={"x": np.linspace(-2, 2, 5), "v": np.linspace(-2, 2, 5)})
-    for result, words in ((diagram, "held"), (curve, "Den Hartog"), (found, "2 + 0 stops")):
+    basins = ss.basins(BISTABLE.having(amplitude=1.25), grid={"x": np.linspace(-2, 2, 5), "v": np.linspace(-2, 2, 5)})
+    for result, words in ((diagram, "held"), (curve, "Den Hartog"), (basins, "2 + 0 stops")):
         [plate] = ss.summary(result).plates
         assert words in plate.svg()
     line = next(line for line in ss.figures.plot_boundary(curve).get_lines() if "Hartog" in str(line.get_label()))

@@ -33,13 +33,13 @@ def record_of(*, fs=FS, noise=0.3, rho=0.9, seed=0, forward=(5.0, 2.0), back=(5.
 
 
 def test_truth_without_noise():
-    found = regress_friction(record_of(noise=0.0, sensor=0.0))
+    regression = regress_friction(record_of(noise=0.0, sensor=0.0))
     for name, value in TRUTH.items():
-        assert getattr(found, name).value == pytest.approx(value, rel=2e-3), name
-    assert found.residual < 0.01
-    assert found.status == "ok"
-    assert found.explained == pytest.approx(found.measured, abs=0.2)
-    assert [found.inertia.unit, found.viscous.unit, found.coulomb.unit, found.offset.unit] == [
+        assert getattr(regression, name).value == pytest.approx(value, rel=2e-3), name
+    assert regression.residual < 0.01
+    assert regression.status == "ok"
+    assert regression.explained == pytest.approx(regression.measured, abs=0.2)
+    assert [regression.inertia.unit, regression.viscous.unit, regression.coulomb.unit, regression.offset.unit] == [
         "kg", "N s/m", "N", "N",
     ]  # fmt: skip
 
@@ -49,8 +49,8 @@ def test_truth_without_noise():
 def test_intervals_hold_the_truth(rho, trials, least):
     held = []
     for seed in range(trials):
-        found = regress_friction(record_of(rho=rho, seed=seed))
-        held.append([getattr(found, name).includes(value) for name, value in TRUTH.items()])
+        regression = regress_friction(record_of(rho=rho, seed=seed))
+        held.append([getattr(regression, name).includes(value) for name, value in TRUTH.items()])
     assert np.all(np.mean(held, axis=0) >= least)  # 3 binomial standard deviations below 0.95
 
 
@@ -58,9 +58,9 @@ def test_a_stated_delay_is_taken_out():
     record, rows = record_of(noise=0.0), 25
     late = Record.of({"x": record["x"][rows:], "force": record["force"][:-rows]}, fs=FS)
     assert abs(regress_friction(late).inertia.value - 3) > 0.3
-    told = regress_friction(late.with_details("force", delay=rows / FS))
+    regression = regress_friction(late.with_details("force", delay=rows / FS))
     for name, value in TRUTH.items():
-        assert getattr(told, name).value == pytest.approx(value, rel=0.01), name
+        assert getattr(regression, name).value == pytest.approx(value, rel=0.01), name
 
 
 @pytest.mark.parametrize(("position", "unit"), [("x", "N m"), ("theta", "N")])
@@ -72,24 +72,24 @@ def test_units_that_do_not_belong_together_are_refused(position, unit):
 
 def test_directions_may_differ():
     record = record_of(forward=(4.0, 1.5), back=(6.0, 2.5), noise=0.05)
-    found = regress_friction(record, symmetric=False)
+    regression = regress_friction(record, symmetric=False)
     # the constant force is shared: forward Coulomb friction gains it, backward loses it
-    assert found.viscous_forward.value == pytest.approx(4.0, abs=0.2)
-    assert found.viscous_back.value == pytest.approx(6.0, abs=0.2)
-    assert found.coulomb_forward.value == pytest.approx(1.5 - 0.4, abs=0.05)
-    assert found.coulomb_back.value == pytest.approx(2.5 + 0.4, abs=0.05)
-    assert found.coulomb.value == pytest.approx(2.0, abs=0.05)
-    assert found.offset is None
-    assert found.residual < regress_friction(record).residual
+    assert regression.viscous_forward.value == pytest.approx(4.0, abs=0.2)
+    assert regression.viscous_back.value == pytest.approx(6.0, abs=0.2)
+    assert regression.coulomb_forward.value == pytest.approx(1.5 - 0.4, abs=0.05)
+    assert regression.coulomb_back.value == pytest.approx(2.5 + 0.4, abs=0.05)
+    assert regression.coulomb.value == pytest.approx(2.0, abs=0.05)
+    assert regression.offset is None
+    assert regression.residual < regress_friction(record).residual
 
 
 def test_stiffness_is_a_term_if_asked_for():
     record = record_of(more=40.0, noise=0.05)
-    found = regress_friction(record, stiffness=True)
-    assert found.stiffness.value == pytest.approx(40.0, rel=0.02)
-    assert found.stiffness.unit == "N/m"
-    assert found.inertia.value == pytest.approx(3.0, rel=0.01)
-    assert regress_friction(record).residual > 2 * found.residual
+    regression = regress_friction(record, stiffness=True)
+    assert regression.stiffness.value == pytest.approx(40.0, rel=0.02)
+    assert regression.stiffness.unit == "N/m"
+    assert regression.inertia.value == pytest.approx(3.0, rel=0.01)
+    assert regress_friction(record).residual > 2 * regression.residual
 
 
 def test_sign_scale_and_sampling():
@@ -114,9 +114,9 @@ def test_measured_velocity_and_acceleration_are_used():
     force = record_of(noise=0.05)["force"]
     accelerometer = a + 0.05 * rng.standard_normal(a.size)
     coarse = np.round(x / 2e-3) * 2e-3  # a displacement far too coarse to be differentiated twice
-    found = regress_friction(Record.of({"x": coarse, "v": v, "a": accelerometer, "force": force}, fs=FS))
+    regression = regress_friction(Record.of({"x": coarse, "v": v, "a": accelerometer, "force": force}, fs=FS))
     for name, value in TRUTH.items():
-        assert getattr(found, name).value == pytest.approx(value, rel=0.02), name
+        assert getattr(regression, name).value == pytest.approx(value, rel=0.02), name
     alone = regress_friction(Record.of({"v": v, "force": force}, fs=FS))
     assert alone.inertia.value == pytest.approx(3.0, rel=0.01)
 
@@ -124,16 +124,16 @@ def test_measured_velocity_and_acceleration_are_used():
 def test_an_angle_gives_a_moment_of_inertia():
     record = record_of(noise=0.05)
     turning = Record.of({"theta": record["x"], "force": record["force"]}, fs=FS, units={"force": "N m"})
-    found = regress_friction(turning)
-    assert found.inertia.unit == "kg m^2"
-    assert found.inertia.value == pytest.approx(3.0, rel=0.01)
+    regression = regress_friction(turning)
+    assert regression.inertia.unit == "kg m^2"
+    assert regression.inertia.value == pytest.approx(3.0, rel=0.01)
 
 
 def test_noise_in_the_acceleration_is_said():
-    found = regress_friction(record_of(noise=0.05, sensor=3e-4), bandwidth=25.0)
-    assert "noise in the acceleration lowers the inertia" in found.status
-    assert found.inertia.value < 2.8
-    assert found.inertia.status == found.status
+    regression = regress_friction(record_of(noise=0.05, sensor=3e-4), bandwidth=25.0)
+    assert "noise in the acceleration lowers the inertia" in regression.status
+    assert regression.inertia.value < 2.8
+    assert regression.inertia.status == regression.status
 
 
 def test_choice_of_the_signal():
@@ -178,23 +178,23 @@ def emps(dataset):
 
 
 def test_emps_symmetric(dataset):
-    found = regress_friction(emps(dataset))
-    assert found.inertia.value == pytest.approx(95.1089, rel=0.01)
-    assert found.viscous.value == pytest.approx(203.5034, rel=0.01)
-    assert found.coulomb.value == pytest.approx(20.3935, rel=0.01)
-    assert found.offset.value == pytest.approx(-3.1648, rel=0.02)
-    assert found.residual <= 0.042
+    regression = regress_friction(emps(dataset))
+    assert regression.inertia.value == pytest.approx(95.1089, rel=0.01)
+    assert regression.viscous.value == pytest.approx(203.5034, rel=0.01)
+    assert regression.coulomb.value == pytest.approx(20.3935, rel=0.01)
+    assert regression.offset.value == pytest.approx(-3.1648, rel=0.02)
+    assert regression.residual <= 0.042
     for name, value in (("inertia", 95.1089), ("viscous", 203.5034), ("coulomb", 20.3935), ("offset", -3.1648)):
-        assert getattr(found, name).includes(value)
+        assert getattr(regression, name).includes(value)
 
 
 def test_emps_asymmetric(dataset):
-    found = regress_friction(emps(dataset), symmetric=False)
-    assert found.viscous_forward.value == pytest.approx(166.706, rel=0.02)
-    assert found.viscous_back.value == pytest.approx(240.424, rel=0.02)
-    assert found.coulomb_forward.value == pytest.approx(20.144, rel=0.02)
-    assert found.coulomb_back.value == pytest.approx(20.628, rel=0.02)
-    assert found.residual <= 0.0320  # published: 0.0311
+    regression = regress_friction(emps(dataset), symmetric=False)
+    assert regression.viscous_forward.value == pytest.approx(166.706, rel=0.02)
+    assert regression.viscous_back.value == pytest.approx(240.424, rel=0.02)
+    assert regression.coulomb_forward.value == pytest.approx(20.144, rel=0.02)
+    assert regression.coulomb_back.value == pytest.approx(20.628, rel=0.02)
+    assert regression.residual <= 0.0320  # published: 0.0311
 
 
 def test_rack_of_two_instruments(dataset):
@@ -206,7 +206,7 @@ def test_rack_of_two_instruments(dataset):
     )
     speed = read_record(folder / "24072020-sym_br_r0_mr.csv", channels={"v": "`Servo motor speed` * -20/60/1000 [m/s]"})
     together = synchronise(force, speed, on=("x", "v"))
-    found = regress_friction(together)
-    assert found.inertia.value == pytest.approx(61.4, rel=0.02)
-    assert found.inertia.includes(61.4)
-    assert "independent samples" in found.status  # three strokes of the rack in two seconds
+    regression = regress_friction(together)
+    assert regression.inertia.value == pytest.approx(61.4, rel=0.02)
+    assert regression.inertia.includes(61.4)
+    assert "independent samples" in regression.status  # three strokes of the rack in two seconds

@@ -203,9 +203,9 @@ def test_a_motion_that_is_caught_and_held_ends_there(moment):
     again, _, _ = free_decay(amplitude=caught[-1])
     noise = 1e-3 * np.random.default_rng(1).standard_normal(len(caught) + 300 + len(again))
     record = of(np.concatenate([caught, hold, again]) + noise, fs)
-    found = find_releases(record)
-    assert found.ring_downs[-1].stopped
-    assert not any(each.stopped for each in found.ring_downs[:-1])
+    releases = find_releases(record)
+    assert releases.ring_downs[-1].stopped
+    assert not any(ring_down.stopped for ring_down in releases.ring_downs[:-1])
     decay = ss.fit_decay(record)
     assert decay.damping_ratio.value == pytest.approx(0.0316, abs=max(1e-3, 4 * decay.damping_ratio.sd))
     assert decay.dry_displacement.value == pytest.approx(0.02, abs=1e-3)
@@ -230,12 +230,12 @@ def test_a_release_s_window_begins_with_its_hold_and_not_with_the_hand_s_pull():
     pull = values[-1] + (values[0] - values[-1]) * ramp**2 * (3 - 2 * ramp)
     whole = np.concatenate([values, pull, values, pull, values])
     record = of(whole + 1e-3 * rng.standard_normal(len(whole)), fs)
-    found = find_releases(record).ring_downs
-    assert len(found) == 3
-    for each in found:
-        assert each.held
-        assert np.abs(each.samples[each.hold] - values[0]).max() < 6e-3
-        assert each.hold.stop > 100
+    ring_downs = find_releases(record).ring_downs
+    assert len(ring_downs) == 3
+    for ring_down in ring_downs:
+        assert ring_down.held
+        assert np.abs(ring_down.samples[ring_down.hold] - values[0]).max() < 6e-3
+        assert ring_down.hold.stop > 100
     fit = ss.fit_decay(record)
     assert fit.status == "ok"
     alone = ss.fit_decay(of(values + 1e-3 * rng.standard_normal(len(values)), fs))

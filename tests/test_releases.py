@@ -55,18 +55,18 @@ def test_size_does_not_matter() -> None:
 
 def test_sliding_without_a_stop_tells_nothing() -> None:
     time = np.arange(4000) / FS
-    found = Rests.of(TOP * np.sin(100 * time), LEVEL * np.sign(np.sin(100 * time)), fs=FS, frequency=100.0, unsure=0.0)
-    assert found.fall is None
-    assert found.probabilities(0.01, 0.03) == pytest.approx(dict.fromkeys(("Coulomb", "static", "Stribeck"), 1 / 3))
+    record = Rests.of(TOP * np.sin(100 * time), LEVEL * np.sign(np.sin(100 * time)), fs=FS, frequency=100.0, unsure=0.0)
+    assert record.fall is None
+    assert record.probabilities(0.01, 0.03) == pytest.approx(dict.fromkeys(("Coulomb", "static", "Stribeck"), 1 / 3))
 
 
 def test_a_reversal_between_two_samples_ends_a_stroke() -> None:
     """A stroke went on through it, and the friction of the next one was taken for that of slow sliding: -2 levels."""
     time = np.arange(600) / 300
     speed = TOP * np.sin(2 * np.pi * 5 * time + 0.3)
-    found = Rests.of(speed, LEVEL * np.sign(speed), fs=300, frequency=10 * np.pi, unsure=0.0)
-    assert not len(found.rises)
-    assert found.probabilities(0.01, 0.03) == pytest.approx(dict.fromkeys(("Coulomb", "static", "Stribeck"), 1 / 3))
+    record = Rests.of(speed, LEVEL * np.sign(speed), fs=300, frequency=10 * np.pi, unsure=0.0)
+    assert not len(record.rises)
+    assert record.probabilities(0.01, 0.03) == pytest.approx(dict.fromkeys(("Coulomb", "static", "Stribeck"), 1 / 3))
 
 
 def test_a_curve_that_falls_within_the_corner_is_not_told_from_static_friction() -> None:

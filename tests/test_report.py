@@ -92,7 +92,7 @@ def test_the_page_asks_nothing_of_a_network(page: str) -> None:
     parsed = Page(page)
     assert parsed.open == []
     loading = {("img", "src"), ("script", "src"), ("link", "href"), ("iframe", "src"), ("object", "data")}
-    assert not [each for each in parsed.attributes if each[:2] in loading]
+    assert not [attribute for attribute in parsed.attributes if attribute[:2] in loading]
     links = [str(value) for _, name, value in parsed.attributes if name.endswith("href")]
     assert not [link for link in links if not link.startswith("#")]
     assert not re.search(r"@import|url\((?!#)", page)
@@ -152,9 +152,9 @@ def test_faults_and_doubts_are_told(tmp_path: Path) -> None:
     wave[100:103] = np.nan
     faults = tuple(ss.Record.of({"x": wave}, fs=500.0).check())
     doubtful = replace(findings, faults=faults)
-    told = summary(doubtful)
-    assert told.faults == [str(fault) for fault in faults]
-    assert any("1 fault" in caution for caution in told.cautions)
+    story = summary(doubtful)
+    assert story.faults == [str(fault) for fault in faults]
+    assert any("1 fault" in caution for caution in story.cautions)
     text = Page(report(doubtful, tmp_path / "r.html").read_text(encoding="utf-8")).text
     assert str(faults[0]) in text
 
@@ -223,11 +223,11 @@ def test_directions_that_differ_are_told_of_a_regression_too() -> None:
 
 def test_a_folder_holds_all_and_only_what_it_lists(demo: Findings, tmp_path: Path) -> None:
     place = publish(demo, folder=tmp_path / "deep" / "results")
-    told = json.loads((place / "results.json").read_text(encoding="utf-8"))
+    data = json.loads((place / "results.json").read_text(encoding="utf-8"))
     files = {path.relative_to(place).as_posix() for path in place.rglob("*") if path.is_file()}
-    assert files == set(told["files"])
+    assert files == set(data["files"])
     assert {"report.html", "figures/friction-velocity.svg", "figures/friction-velocity.png"} <= files
-    assert told["truth"]["sliding friction"] == 1.1
+    assert data["truth"]["sliding friction"] == 1.1
     assert everything(tmp_path / "deep") == {"results", *(f"results/{name}" for name in everything(place))}
 
 

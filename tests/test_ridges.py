@@ -60,14 +60,14 @@ def test_peaks_have_the_prominence_that_their_saddle_leaves() -> None:
         return height * np.exp(-(((t - at) / 0.15) ** 2)) * np.sin(2 * np.pi * frequency * t)
 
     signal = burst(1, 40, 1.0) + burst(3, 40, 0.5) + burst(5, 90, 0.25)
-    found = ss.signals.local_maxima(ss.wavelet_map(of(signal), "a", frequencies=(10, 240), normalisation="amplitude"))
-    assert [(round(peak.time, 1), round(peak.frequency, -1)) for peak in found] == [
+    maxima = ss.signals.local_maxima(ss.wavelet_map(of(signal), "a", frequencies=(10, 240), normalisation="amplitude"))
+    assert [(round(peak.time, 1), round(peak.frequency, -1)) for peak in maxima] == [
         (1.0, 40.0),
         (3.0, 40.0),
         (5.0, 90.0),
     ]
-    assert found[0].prominence > found[1].prominence > found[2].prominence > 20
-    assert found[0].modulus / found[1].modulus == pytest.approx(2, rel=0.01)
+    assert maxima[0].prominence > maxima[1].prominence > maxima[2].prominence > 20
+    assert maxima[0].modulus / maxima[1].modulus == pytest.approx(2, rel=0.01)
     low = ss.signals.local_maxima(ss.wavelet_map(of(signal), "a", frequencies=(10, 240)), prominence=200)
     assert low == ()
     with pytest.raises(RecordError, match="more than 0 dB"):
@@ -88,11 +88,11 @@ def test_spikes_are_found_to_the_sample(shape: str) -> None:
             signal[row:] += sign
         else:
             signal[row:] += 0.2 * sign * (np.arange(count - row))
-    found = ss.signals.find_spikes(of(signal + RNG.normal(0, 3e-3, count)), "a", frequencies=(100, 250), threshold=15)
-    rows = np.array([spike.time for spike in found]) * FS
+    spikes = ss.signals.find_spikes(of(signal + RNG.normal(0, 3e-3, count)), "a", frequencies=(100, 250), threshold=15)
+    rows = np.array([spike.time for spike in spikes]) * FS
     assert len(rows) == len(at)
     assert np.abs(rows - at).max() <= 1.0001
-    assert [spike.group for spike in found] == [0, 0, 1, 1, 1, 2]
+    assert [spike.group for spike in spikes] == [0, 0, 1, 1, 1, 2]
 
 
 def test_noise_and_tones_have_no_spikes() -> None:

@@ -81,10 +81,10 @@ def test_the_tolerance_holds_for_the_end() -> None:
 
 
 def test_what_a_run_took() -> None:
-    told = solve.statistics(ss.simulate(FORCED, cycles=10))
-    assert told.events >= 10
-    assert told.pieces > told.events
-    assert 0 < told.slowest_exit <= 1
+    statistics = solve.statistics(ss.simulate(FORCED, cycles=10))
+    assert statistics.events >= 10
+    assert statistics.pieces > statistics.events
+    assert 0 < statistics.slowest_exit <= 1
     curved = solve.statistics(ss.simulate(CURVED, cycles=10))
     assert curved.steps > curved.events
     assert math.isnan(curved.slowest_exit)

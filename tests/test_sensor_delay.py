@@ -78,18 +78,18 @@ def test_the_misfit_is_expanded_as_its_residuals_change() -> None:
 @pytest.mark.parametrize("whole", [1, -7])
 def test_no_lag_between_samples_is_favoured(part: float, whole: int) -> None:
     delay = (whole + part) / FS
-    found = [ss.balance.sensor_delay(ring_down(delay, seed)).delay for seed in range(5)]
-    errors = np.array([estimate.value + delay for estimate in found])
+    delays = [ss.balance.sensor_delay(ring_down(delay, seed)).delay for seed in range(5)]
+    errors = np.array([estimate.value + delay for estimate in delays])
     assert abs(errors.mean()) < 3.5 * bound() / math.sqrt(len(errors))
-    assert found[0].sd < 1.1 * bound()
+    assert delays[0].sd < 1.1 * bound()
 
 
 def test_it_reaches_its_bound_and_the_interval_holds() -> None:
-    found = [ss.balance.sensor_delay(ring_down(1.2585e-3, seed)).delay for seed in range(100, 125)]
-    errors = np.array([estimate.value + 1.2585e-3 for estimate in found])
+    delays = [ss.balance.sensor_delay(ring_down(1.2585e-3, seed)).delay for seed in range(100, 125)]
+    errors = np.array([estimate.value + 1.2585e-3 for estimate in delays])
     assert np.sqrt(np.mean(errors**2)) < 1.1 * bound() * (1 + 2 / math.sqrt(2 * len(errors)))
-    assert np.mean([estimate.sd for estimate in found]) < 1.1 * bound()
-    assert np.mean([estimate.includes(-1.2585e-3) for estimate in found]) > 0.8  # of 25; 95 % less three deviations
+    assert np.mean([estimate.sd for estimate in delays]) < 1.1 * bound()
+    assert np.mean([estimate.includes(-1.2585e-3) for estimate in delays]) > 0.8  # of 25; 95 % less three deviations
 
 
 @pytest.mark.parametrize("channels", [("x", "z"), ("x", "v"), ("v", "a")])
@@ -126,8 +126,8 @@ def test_the_least_residual_is_drawn_half_way_between_samples() -> None:
 def test_the_least_residual_at_a_few_samples_a_second() -> None:
     t, rng = np.arange(400) / 8, np.random.default_rng(0)
     x, a = (sign * np.sin(t) + 1e-6 * rng.standard_normal(t.size) for sign in (1, -1))
-    found = ss.balance.sensor_delay(ss.Record.of({"x": x, "a": a}, fs=8.0), method="residual")
-    assert found.delay.includes(0.0)
+    delay = ss.balance.sensor_delay(ss.Record.of({"x": x, "a": a}, fs=8.0), method="residual")
+    assert delay.delay.includes(0.0)
 
 
 def test_a_stated_mount_is_held_and_a_hidden_one_is_said() -> None:
@@ -135,24 +135,24 @@ def test_a_stated_mount_is_held_and_a_hidden_one_is_said() -> None:
     blind = ss.balance.sensor_delay(record)
     assert blind.delay.value + 1.2585e-3 == pytest.approx(2 * 0.1 / (2 * math.pi * 125), rel=0.02)
     assert "mount of a delays" in blind.status
-    told = ss.balance.sensor_delay(record.with_details("a", mount=(125.0, 0.1)))
-    assert abs(told.delay.value + 1.2585e-3) < 4 * bound()
-    assert told.mount_frequency is None
-    assert "held at 125 Hz" in told.delay.checks[0]
+    delay = ss.balance.sensor_delay(record.with_details("a", mount=(125.0, 0.1)))
+    assert abs(delay.delay.value + 1.2585e-3) < 4 * bound()
+    assert delay.mount_frequency is None
+    assert "held at 125 Hz" in delay.delay.checks[0]
 
 
 def test_a_whole_cycle_more_is_named() -> None:
-    found = ss.balance.sensor_delay(ring_down(1.2585e-3, 3))
-    assert "repeats itself" in found.status
-    assert any(abs(other + 1.2585e-3 - 2 * math.pi / RATE) < 2e-3 for other in found.others)
+    delay = ss.balance.sensor_delay(ring_down(1.2585e-3, 3))
+    assert "repeats itself" in delay.status
+    assert any(abs(other + 1.2585e-3 - 2 * math.pi / RATE) < 2e-3 for other in delay.others)
 
 
 def test_a_sensor_of_the_wrong_sign_is_found() -> None:
     record = ring_down(1.2585e-3, 3)
     turned = record.with_channel("a", -record["a"], unit="m/s^2")
-    found = ss.balance.sensor_delay(turned)
-    assert found.gain.value == pytest.approx(-1, abs=1e-3)
-    assert "wrong sign" in found.status
+    delay = ss.balance.sensor_delay(turned)
+    assert delay.gain.value == pytest.approx(-1, abs=1e-3)
+    assert "wrong sign" in delay.status
 
 
 FRICTION = ((11.1, 2e-3, 1.1), (8.7, 1.1e-3, 1.1), (0.0, 8e-3, 0.0))
@@ -174,13 +174,13 @@ def measured(frequency: float, amplitude: float, kinetic: float, seed: int = 1) 
 
 
 def test_runs_with_friction_tell_the_mount_and_the_delay() -> None:
-    found = ss.balance.sensor_delay(measured(*FRICTION[0]))
-    assert found.mount_frequency is not None
-    assert found.mount_damping is not None
-    assert found.mount_frequency.includes(125)
-    assert found.mount_damping.includes(0.1)
-    assert found.delay.includes(-LAG)
-    assert found.mount_frequency.sd < 2.0
+    delay = ss.balance.sensor_delay(measured(*FRICTION[0]))
+    assert delay.mount_frequency is not None
+    assert delay.mount_damping is not None
+    assert delay.mount_frequency.includes(125)
+    assert delay.mount_damping.includes(0.1)
+    assert delay.delay.includes(-LAG)
+    assert delay.mount_frequency.sd < 2.0
 
 
 def test_several_runs_are_answered_together() -> None:
@@ -195,16 +195,16 @@ def test_several_runs_are_answered_together() -> None:
 def test_what_is_found_is_used() -> None:
     """The whole way: the delay and the mount found in one run, stated for another, and the friction of that."""
     runs = [measured(*each) for each in FRICTION]
-    found = ss.balance.sensor_delay([runs[0], runs[2]])
-    assert found.mount_frequency is not None
-    assert found.mount_damping is not None
-    record = runs[1].with_details("a", mount=(found.mount_frequency.value, found.mount_damping.value))
+    delay = ss.balance.sensor_delay([runs[0], runs[2]])
+    assert delay.mount_frequency is not None
+    assert delay.mount_damping is not None
+    record = runs[1].with_details("a", mount=(delay.mount_frequency.value, delay.mount_damping.value))
     for channel in ("x", "z"):
-        record = record.with_details(channel, delay=-found.delay.value)
+        record = record.with_details(channel, delay=-delay.delay.value)
     force = ss.friction_force(record, mass=2.42, stiffness=2310, damping=0.1196, method="motion")
     true = moved(*FRICTION[1]).sample(4.0 + force.time, ("friction",))[0][0]
     assert np.sqrt(np.mean((force["friction"] - true)[400:-400] ** 2)) < 0.03
-    late = runs[1].with_details("a", mount=(found.mount_frequency.value, found.mount_damping.value))
+    late = runs[1].with_details("a", mount=(delay.mount_frequency.value, delay.mount_damping.value))
     raw = ss.friction_force(late, mass=2.42, stiffness=2310, damping=0.1196, method="motion")
     true = moved(*FRICTION[1]).sample(4.0 + raw.time, ("friction",))[0][0]
     assert np.sqrt(np.mean((raw["friction"] - true)[400:-400] ** 2)) > 0.05
@@ -223,9 +223,9 @@ def test_swapped_channels_are_found() -> None:
 
 def test_a_wrong_unit_is_named() -> None:
     record = ring_down(1.2585e-3, 3)
-    found = ss.balance.sensor_delay(record.with_channel("a", record["a"] / 9.80665, unit="m/s^2"))
-    assert "0.102 times" in found.status
-    assert found.delay.includes(-1.2585e-3)
+    delay = ss.balance.sensor_delay(record.with_channel("a", record["a"] / 9.80665, unit="m/s^2"))
+    assert "0.102 times" in delay.status
+    assert delay.delay.includes(-1.2585e-3)
 
 
 def test_noise_that_is_not_white_widens_the_interval() -> None:
@@ -234,9 +234,9 @@ def test_noise_that_is_not_white_widens_the_interval() -> None:
     slow = np.fft.rfft(rng.standard_normal(T.size))
     slow *= 10 / np.maximum(np.fft.rfftfreq(T.size, 1 / FS), 0.5)
     louder = record.with_channel("a", record["a"] + 0.04 * np.fft.irfft(slow, T.size), unit="m/s^2", noise=0.04)
-    found = ss.balance.sensor_delay(louder).delay
-    assert 1.5 < found.sd / bound() < 4  # (1 + (10/5)^2)^(1/2) = 2.2 at the line
-    assert found.includes(-1.2585e-3)
+    delay = ss.balance.sensor_delay(louder).delay
+    assert 1.5 < delay.sd / bound() < 4  # (1 + (10/5)^2)^(1/2) = 2.2 at the line
+    assert delay.includes(-1.2585e-3)
 
 
 def test_a_long_record_in_blocks_says_the_same(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -68,8 +68,8 @@ def run(*arguments: str) -> Result:
 def told(*arguments: str) -> dict[str, Any]:
     result = run(*arguments, "--json")
     assert result.exit_code == 0, result.output
-    found: dict[str, Any] = json.loads(result.stdout)
-    return found
+    data: dict[str, Any] = json.loads(result.stdout)
+    return data
 
 
 def quantities(found: dict[str, Any]) -> dict[str, float]:

@@ -36,18 +36,18 @@ def rung(
 
 
 def test_frequency_damping_and_difference_of_closed_forms() -> None:
-    found = ss.cycle.slip_ringing(rung())
+    ringing = ss.cycle.slip_ringing(rung())
     truth = {
         "forward": FORWARD, "back": BACK, "difference": FORWARD - BACK,
         "damping_forward": 10 / np.hypot(10, 2 * np.pi * FORWARD), "damping_back": 10 / np.hypot(10, 2 * np.pi * BACK),
     }  # fmt: skip
     for name, true in truth.items():
-        assert getattr(found, name).value == pytest.approx(true, rel=0.04), name
-    assert found.forward is not None
-    assert found.amplitude_forward is not None
-    assert 0.7 * 0.3 < found.amplitude_forward.value < 0.3  # slip is seen at a peak of the ring
-    assert found.forward.value == pytest.approx(FORWARD, rel=3e-3)
-    assert found.verdict == "higher back"
+        assert getattr(ringing, name).value == pytest.approx(true, rel=0.04), name
+    assert ringing.forward is not None
+    assert ringing.amplitude_forward is not None
+    assert 0.7 * 0.3 < ringing.amplitude_forward.value < 0.3  # slip is seen at a peak of the ring
+    assert ringing.forward.value == pytest.approx(FORWARD, rel=3e-3)
+    assert ringing.verdict == "higher back"
 
 
 @pytest.mark.parametrize(("trials", "least"), [(12, 0.82), pytest.param(40, 0.88, marks=pytest.mark.soak)])
@@ -55,8 +55,8 @@ def test_intervals_hold_the_truth(trials: int, least: float) -> None:
     """Three intervals of a record; fewer of the short form's 36 hold by chance once in 500."""
     held = []
     for seed in range(trials):
-        found = ss.cycle.slip_ringing(rung(noise=0.05, seed=seed))
-        for estimate, true in ((found.forward, FORWARD), (found.back, BACK), (found.difference, FORWARD - BACK)):
+        ringing = ss.cycle.slip_ringing(rung(noise=0.05, seed=seed))
+        for estimate, true in ((ringing.forward, FORWARD), (ringing.back, BACK), (ringing.difference, FORWARD - BACK)):
             assert estimate is not None
             held.append(estimate.interval[0] <= true <= estimate.interval[1])
     assert np.mean(held) > least
@@ -104,12 +104,12 @@ def test_what_is_taken_for_the_course_of_the_friction_widens_the_interval() -> N
     record = ss.Record.of(
         {"x": np.sin(np.pi * time) / np.pi, "friction": way * (1 + 0.3 * ring + bent) + noises}, fs=1000
     )
-    found = ss.cycle.slip_ringing(record)
-    assert found.forward is not None
-    assert "takes part of the ring" in found.forward.status
-    low, high = found.forward.interval
+    ringing = ss.cycle.slip_ringing(record)
+    assert ringing.forward is not None
+    assert "takes part of the ring" in ringing.forward.status
+    low, high = ringing.forward.interval
     assert low < FORWARD < high
-    assert found.verdict == "no difference can be told"
+    assert ringing.verdict == "no difference can be told"
 
 
 def test_a_band_brake_rings(dataset: Callable[[str], Path], tmp_path: Path) -> None:
@@ -125,9 +125,9 @@ def test_a_band_brake_rings(dataset: Callable[[str], Path], tmp_path: Path) -> N
         ran = CliRunner().invoke(main, called)
         assert ran.exit_code == 0, ran.output
         assert "After slip begins the friction rings at" in " ".join(ran.output.split())
-        told = json.loads((tmp_path / "results.json").read_text())
-        assert told["slip_ringing"] == verdict
-        values = {each["name"]: each["value"] for each in told["estimates"]}
+        data = json.loads((tmp_path / "results.json").read_text())
+        assert data["slip_ringing"] == verdict
+        values = {each["name"]: each["value"] for each in data["estimates"]}
         assert 41 < values["ringing after slip begins, forward"] < 56
         assert 53 < values["ringing after slip begins, back"] < 59
         assert values["ringing after slip begins, forward less back"] < -2

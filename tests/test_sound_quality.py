@@ -42,9 +42,9 @@ def test_a_recording_at_another_rate_is_as_loud() -> None:
     pytest.importorskip("mosqito", reason="the extra sound is not installed")
     t = np.arange(5000) / 10_000
     slow = ss.Record.of({"sound": np.sqrt(2) * 0.02 * np.sin(2 * np.pi * 1000 * t)}, fs=10_000)
-    found = ss.squeak.sound_quality(slow)
-    assert found.loudness == pytest.approx(ss.squeak.sound_quality(tone(60.0, duration=0.5)).loudness, rel=0.01)
-    assert found.to_dict()["method"] == "MoSQITo, of what lies below 5000 Hz"
+    quality = ss.squeak.sound_quality(slow)
+    assert quality.loudness == pytest.approx(ss.squeak.sound_quality(tone(60.0, duration=0.5)).loudness, rel=0.01)
+    assert quality.to_dict()["method"] == "MoSQITo, of what lies below 5000 Hz"
     short = ss.squeak.sound_quality(slow.rows(0, 1000))
     assert np.isnan(short.roughness)
     assert short.to_dict()["roughness"] is None
@@ -79,9 +79,9 @@ def test_without_the_program_the_error_names_the_extra(monkeypatch: pytest.Monke
     ids=["sine", "noise"],
 )
 def test_crest_factor_and_kurtosis(values: np.ndarray, crest: float, kurtosis: float) -> None:
-    found = ss.squeak.impulsiveness(ss.Record.of({"a": values}, fs=10_000))
-    assert found.crest_factor == pytest.approx(crest, rel=0.07)  # of n normal samples about sqrt(2 ln n)
-    assert found.kurtosis == pytest.approx(kurtosis, rel=0.03)
+    impulsiveness = ss.squeak.impulsiveness(ss.Record.of({"a": values}, fs=10_000))
+    assert impulsiveness.crest_factor == pytest.approx(crest, rel=0.07)  # of n normal samples about sqrt(2 ln n)
+    assert impulsiveness.kurtosis == pytest.approx(kurtosis, rel=0.03)
 
 
 @pytest.mark.parametrize("rate", [5, 20, 60])
@@ -90,10 +90,10 @@ def test_pulses_are_counted(rate: int) -> None:
     rng = np.random.default_rng(rate)
     since = np.mod(t - 0.003, 1 / rate)
     pulses = np.exp(-since / 0.001) * np.sin(2 * np.pi * 3000 * since) + 0.01 * rng.standard_normal(len(t))
-    found = ss.squeak.impulsiveness(ss.Record.of({"sound": 3 * pulses}, fs=20_000))
-    assert found.rate == pytest.approx(rate, abs=0.51)
-    assert np.diff(found.pulses) == pytest.approx(1 / rate, abs=2e-3)
-    assert found.kurtosis > 10
+    impulsiveness = ss.squeak.impulsiveness(ss.Record.of({"sound": 3 * pulses}, fs=20_000))
+    assert impulsiveness.rate == pytest.approx(rate, abs=0.51)
+    assert np.diff(impulsiveness.pulses) == pytest.approx(1 / rate, abs=2e-3)
+    assert impulsiveness.kurtosis > 10
 
 
 def test_what_has_no_pulses_is_refused() -> None:

@@ -44,9 +44,9 @@ def test_nothing_else_is_said_to_rub(benchmark: ModuleType, kind: str) -> None:
 )
 def test_what_sounds_like_a_squeak_without_any_friction_is_not_said_to_rub(kind: str, seed: int) -> None:
     sound = sound_strangers.draw(kind, seed)  # each was called a squeal by its overtones alone
-    found = heard(sound.values)
-    assert found.answer == "can not be told"
-    assert any("of sound alone" in burst.evidence for burst in found.bursts)
+    squeaks = heard(sound.values)
+    assert squeaks.answer == "can not be told"
+    assert any("of sound alone" in burst.evidence for burst in squeaks.bursts)
 
 
 def test_a_level_that_holds_is_one_burst_and_one_overtone_is_enough_where_the_band_holds_no_more() -> None:
@@ -54,9 +54,9 @@ def test_a_level_that_holds_is_one_burst_and_one_overtone_is_enough_where_the_ba
     shapes = [1 / (1 + np.exp(-(t - at) / 0.004) + np.exp((t - at - 0.12) / 0.004)) for at in (0.3, 0.7, 1.5)]
     wave = sum(np.sin(2 * np.pi * order * 4200 * t) / order for order in (1, 2))
     noise = 0.02 * np.random.default_rng(6).standard_normal(len(t))
-    found = heard(sum(shapes) * wave + noise)  # two frames of one level were taken for two peaks
-    assert [burst.start for burst in found.of("squeak")] == pytest.approx([0.3, 0.7, 1.5], abs=0.02)
-    assert len(found.bursts) == 3
+    squeaks = heard(sum(shapes) * wave + noise)  # two frames of one level were taken for two peaks
+    assert [burst.start for burst in squeaks.of("squeak")] == pytest.approx([0.3, 0.7, 1.5], abs=0.02)
+    assert len(squeaks.bursts) == 3
 
 
 @pytest.mark.soak
@@ -83,9 +83,9 @@ def test_three_faint_squeaks_above_every_instrument_squeak_three_times() -> None
     shapes = [1 / (1 + np.exp(-(t - at) / 0.004) + np.exp((t - at - 0.12) / 0.004)) for at in (0.3, 0.94, 1.5)]
     wave = sum(np.sin(2 * np.pi * order * 3000 * t) / order for order in (1, 2, 3))
     noise = 10 ** (-9 / 20) * np.std(wave) * np.random.default_rng(5).standard_normal(len(t))
-    found = heard(sum(shapes) * wave + noise)
-    assert found.answer == "squeaks"
-    assert [burst.start for burst in found.of("squeak")] == pytest.approx([0.3, 0.94, 1.5], abs=0.02)
+    squeaks = heard(sum(shapes) * wave + noise)
+    assert squeaks.answer == "squeaks"
+    assert [burst.start for burst in squeaks.of("squeak")] == pytest.approx([0.3, 0.94, 1.5], abs=0.02)
 
 
 def test_two_partials_that_beat_are_no_creak() -> None:
@@ -100,9 +100,9 @@ def test_a_clock_is_no_creak_and_a_tick_that_is_missed_changes_nothing() -> None
     ticks = (
         np.exp(-np.mod(t, 0.1) / 2e-3) * np.random.default_rng(1).standard_normal(len(t)) * (np.abs(t - 0.75) > 0.05)
     )
-    found = heard(ticks)
-    assert found.answer == "can not be told"
-    assert not found.of("creak")
+    squeaks = heard(ticks)
+    assert squeaks.answer == "can not be told"
+    assert not squeaks.of("creak")
 
 
 def test_a_tone_that_leaps_to_its_overtones_is_one_squeak() -> None:

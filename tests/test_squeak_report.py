@@ -52,7 +52,7 @@ def tone(duration: float = 0.4, *, frequency: float = 500.0, fs: float = FS) -> 
 
 
 def test_the_four_conditions_show_the_four_observations() -> None:
-    found = {each.name: each for each in compared().conditions}
+    found = {condition.name: condition for condition in compared().conditions}
     assert compared().squeaking == ("wet, 6.13 N",)
     assert {name: each.trend for name, each in found.items() if name != "wet, 6.13 N"} == {
         "dry, 6.13 N": "rises", "dry, 1.23 N": "rises", "wet, 1.23 N": "falls",
@@ -93,7 +93,7 @@ def test_what_creaks_or_whistles_is_not_called_silent() -> None:
     chalk = of_sound(tone(frequency=2500, fs=20_000), "Chalk", 20_000)
     found = [chalk, of_sound(creak * (t > 0.1) * (t < 0.9), "Door"), of_sound(whistle, "Pipe")]
     together = ss.answers.compare_squeaks(found)
-    assert [each.answer for each in together.conditions] == ["squeals", "creaks", "can not be told"]
+    assert [condition.answer for condition in together.conditions] == ["squeals", "creaks", "can not be told"]
     assert together.verdicts == ("Chalk squeals; Door creaks.", "Whether Pipe squeaks can not be told.")
     (table,) = ss.summary(together).tables
     assert table.headings == ["condition", "heard", "Hz", "dB"]  # no column of dashes
@@ -107,9 +107,9 @@ def test_what_creaks_or_whistles_is_not_called_silent() -> None:
 
 
 def test_no_squeak_is_said_with_what_sounds_instead() -> None:
-    told = ss.summary(findings("dry", 6.13)).headline
+    headline = ss.summary(findings("dry", 6.13)).headline
     count = len(findings("dry", 6.13).squeaks.bursts)
-    assert told[0] == f"No squeak. {count} bursts, tonal, with no sign of friction."
+    assert headline[0] == f"No squeak. {count} bursts, tonal, with no sign of friction."
 
 
 def test_friction_falls_too_only_where_it_is_known_to_fall_in_what_squeaks() -> None:
@@ -118,7 +118,9 @@ def test_friction_falls_too_only_where_it_is_known_to_fall_in_what_squeaks() -> 
     for low, too in ((-3.0, True), (-4.0, False)):
         ends = replace(slope, value=-2.0, interval=(low, -4.0 - low))
         squeaking = pair[0].having(loops=replace(pair[0].loops, slope=ends))
-        (told,) = (each for each in ss.answers.compare_squeaks([squeaking, pair[1]]).verdicts if "falls" in each)
+        (told,) = (
+            verdict for verdict in ss.answers.compare_squeaks([squeaking, pair[1]]).verdicts if "falls" in verdict
+        )
         assert (" too," in told) == too
         assert "a falling friction alone is not enough" in told
 
@@ -151,11 +153,11 @@ def test_the_load_is_read_where_it_is_measured() -> None:
 
 def test_the_tone_stands_in_the_bursts_alone() -> None:
     record = ss.Record.of({"sound": tone()}, fs=FS)
-    found = ss.squeak.burst_spectra(record)
-    place = int(np.argmax(found.inside["sound"]))
-    assert found.frequency[place] == pytest.approx(500, abs=found.resolution)
-    assert found.inside["sound"][place] > 1e4 * found.outside["sound"][place]
-    assert "pauses" in found.compared
+    spectra = ss.squeak.burst_spectra(record)
+    place = int(np.argmax(spectra.inside["sound"]))
+    assert spectra.frequency[place] == pytest.approx(500, abs=spectra.resolution)
+    assert spectra.inside["sound"][place] > 1e4 * spectra.outside["sound"][place]
+    assert "pauses" in spectra.compared
 
 
 def test_the_spectrum_has_the_power_of_the_noise() -> None:
@@ -163,9 +165,9 @@ def test_the_spectrum_has_the_power_of_the_noise() -> None:
     noise = 0.3 * rng.standard_normal(60_000)
     loud = np.zeros(60_000)
     loud[20_000:40_000] = 10 * np.sin(2 * np.pi * 1000 * np.arange(20_000) / FS)
-    found = ss.squeak.burst_spectra(ss.Record.of({"sound": noise + loud}, fs=FS))
-    assert np.mean(found.outside["sound"][5:-5]) == pytest.approx(0.3**2 / (FS / 2), rel=0.1)
-    assert found.inside["sound"].sum() * found.resolution == pytest.approx(50 + 0.09, rel=0.02)
+    spectra = ss.squeak.burst_spectra(ss.Record.of({"sound": noise + loud}, fs=FS))
+    assert np.mean(spectra.outside["sound"][5:-5]) == pytest.approx(0.3**2 / (FS / 2), rel=0.1)
+    assert spectra.inside["sound"].sum() * spectra.resolution == pytest.approx(50 + 0.09, rel=0.02)
 
 
 def test_channels_without_a_tie_are_below_chance_as_often_as_said() -> None:
@@ -174,8 +176,8 @@ def test_channels_without_a_tie_are_below_chance_as_often_as_said() -> None:
     gate = (t > 1) & (t < 3)
     record = ss.Record.of({"sound": gate * np.sin(2 * np.pi * 500 * t) + 0.1 * rng.standard_normal(t.size),
                            "a": rng.standard_normal(t.size)}, fs=FS)  # fmt: skip
-    found = ss.squeak.burst_spectra(record)
-    beyond = np.mean(found.coherence["a", "sound"][2:-2] > found.significant)
+    spectra = ss.squeak.burst_spectra(record)
+    beyond = np.mean(spectra.coherence["a", "sound"][2:-2] > spectra.significant)
     assert 0.02 < beyond < 0.09
 
 
@@ -227,7 +229,7 @@ def test_what_a_squeak_adds_is_said_and_not_what_is_there_without_it() -> None:
 
 
 def test_half_a_period_is_no_delay_and_inertia_no_coupling() -> None:
-    (table,) = (each for each in ss.summary(findings("wet", 6.13)).tables if each.title.startswith("What moves"))
+    (table,) = (table for table in ss.summary(findings("wet", 6.13)).tables if table.title.startswith("What moves"))
     assert table.rows[-1][0] == "a, friction"
     assert table.rows[-1][-1] == "half a period"
     assert "it can not be told which leads" in table.note
@@ -283,11 +285,11 @@ def test_a_slow_record_is_written_faster_and_sounds_alike(tmp_path: Path) -> Non
 
 def test_bursts_are_cut_out_in_proportion() -> None:
     quiet = np.concatenate([tone(), 0.1 * tone()])
-    found = ss.find_squeaks(ss.Record.of({"sound": quiet}, fs=FS))
-    loud, soft = ss.squeak.burst_clips(found)
+    squeaks = ss.find_squeaks(ss.Record.of({"sound": quiet}, fs=FS))
+    loud, soft = ss.squeak.burst_clips(squeaks)
     assert loud.full_scale == soft.full_scale == pytest.approx(np.max(np.abs(tone())), rel=0.05)
     assert loud.level > 50 * soft.level
-    assert ss.squeak.burst_clips(found, most=1) == (loud,)
+    assert ss.squeak.burst_clips(squeaks, most=1) == (loud,)
 
 
 # ---- the command
@@ -299,14 +301,14 @@ def test_a_record_becomes_a_page_with_its_sounds(tmp_path: Path) -> None:
     result = run(tmp_path / "wet.csv", "--normal", "6.13 N", "--output", tmp_path / "out")
     assert result.exit_code == 0, result.output
     assert "It squeaks" in result.output
-    told = json.loads((tmp_path / "out" / "results.json").read_text("utf-8"))
-    assert told["squeaks"]["squeaking"]
-    assert told["normal_load"] == 6.13
-    assert set(told["files"]) == {
+    data = json.loads((tmp_path / "out" / "results.json").read_text("utf-8"))
+    assert data["squeaks"]["squeaking"]
+    assert data["normal_load"] == 6.13
+    assert set(data["files"]) == {
         path.relative_to(tmp_path / "out").as_posix() for path in (tmp_path / "out").rglob("*") if path.is_file()
     }
     sounds = sorted((tmp_path / "out" / "sounds").iterdir())
-    assert len(sounds) == len(told["squeaks"]["bursts"])
+    assert len(sounds) == len(data["squeaks"]["bursts"])
     assert ss.find_squeaks(ss.read_record(sounds[1])).bursts[0].frequency == pytest.approx(483, rel=0.02)
     page = (tmp_path / "out" / "report.html").read_text("utf-8")
     assert page.count("<audio") == len(sounds)
@@ -323,8 +325,8 @@ def test_several_records_are_compared(tmp_path: Path) -> None:
     assert result.exit_code == 0, result.output
     assert len(result.stdout.splitlines()) < 30, "a line for each record, then the comparison"
     assert "wet_6.13.csv: It squeaks" in result.stdout
-    told = json.loads((tmp_path / "out" / "results.json").read_text("utf-8"))
-    rows = {each["name"]: each for each in told["comparison"]["conditions"]}
+    data = json.loads((tmp_path / "out" / "results.json").read_text("utf-8"))
+    rows = {each["name"]: each for each in data["comparison"]["conditions"]}
     assert rows["wet_6.13.csv"]["normal"] == 6.13
     assert rows["wet_6.13.csv"]["count"] > 5 > rows["wet_1.23.csv"]["count"] == 0
     assert (tmp_path / "out" / "figures" / "0-2-conditions-compared-conditions.svg").exists()
@@ -457,16 +459,16 @@ def test_of_stereo_the_other_channel_is_named(tmp_path: Path) -> None:
     both = ss.Record.of({"ch1": 0.2 * tone(), "ch2": tone()}, fs=FS)
     assert any("ch2 too, 14 dB louder" in note and 'channel="ch2"' in note for note in ss.find_squeaks(both).notes)
     assert not any("ch1" in note for note in ss.find_squeaks(both, channel="ch2").notes if "alone" in note)
-    told = ss.summary(ss.analyze_squeaks(both)).cautions
-    assert [spoken(each) for each in told if "--channel ch2" in spoken(each)]
+    cautions = ss.summary(ss.analyze_squeaks(both)).cautions
+    assert [spoken(caution) for caution in cautions if "--channel ch2" in spoken(caution)]
 
 
 def test_a_spike_may_be_a_contact() -> None:
     found = ss.analyze_squeaks(ss.Record.of({"sound": tone()}, fs=FS))
     spike = ss.record.Fault("spike", "a", ((3, 9),), "7 samples that stand off as spikes", "replace them")
     cautions = ss.summary(replace(found, faults=(spike,))).cautions
-    assert any("lifts or lands" in each for each in cautions)
-    assert not any("lifts or lands" in each for each in ss.summary(found).cautions)
+    assert any("lifts or lands" in caution for caution in cautions)
+    assert not any("lifts or lands" in caution for caution in ss.summary(found).cautions)
 
 
 def test_what_is_asked_in_vain_is_said() -> None:
@@ -479,6 +481,6 @@ def test_what_is_asked_in_vain_is_said() -> None:
 def test_json_alone_writes_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     ss.squeak.write_sound(ss.Record.of({"sound": tone()}, fs=FS), tmp_path / "squeal.wav")
-    told = json.loads(run("squeal.wav", "--json").output)
-    assert (told["program"], told["version"], told["squeaks"]["reference"]) == ("stickslip", ss.__version__, "1")
+    data = json.loads(run("squeal.wav", "--json").output)
+    assert (data["program"], data["version"], data["squeaks"]["reference"]) == ("stickslip", ss.__version__, "1")
     assert [path.name for path in tmp_path.iterdir()] == ["squeal.wav"]

@@ -29,17 +29,17 @@ def normal_acceleration(run: ss.solve.Trajectory) -> np.ndarray:
 
 @pytest.mark.parametrize(("surface", "load"), CASES)
 def test_it_slides_steadily_unless_wet_and_heavily_loaded(surface: str, load: float) -> None:
-    found = [ss.stability(ss.squeak.squeak_rig(surface, load), speed=speed) for speed in (-0.1, 0.1)]
-    assert [one.mechanism == "mode coupling" for one in found] == [(surface, load) == SQUEAKS, False]
-    assert all(one.stable == (one.mechanism == "stable") and one.status == "ok" for one in found)
+    stabilities = [ss.stability(ss.squeak.squeak_rig(surface, load), speed=speed) for speed in (-0.1, 0.1)]
+    assert [one.mechanism == "mode coupling" for one in stabilities] == [(surface, load) == SQUEAKS, False]
+    assert all(one.stable == (one.mechanism == "stable") and one.status == "ok" for one in stabilities)
 
 
 def test_falling_friction_alone_does_not_squeak() -> None:
     rig = ss.squeak.squeak_rig(*SQUEAKS)
     assert rig.contacts[0].law.slope < 0 < ss.squeak.squeak_rig("dry", 6.13).contacts[0].law.slope
-    found = ss.stability(rig, speed=-0.1)
-    assert found.without_coupling < 0 < found.without_slope < found.growth
-    assert 475 < found.frequency < 500
+    stability = ss.stability(rig, speed=-0.1)
+    assert stability.without_coupling < 0 < stability.without_slope < stability.growth
+    assert 475 < stability.frequency < 500
 
 
 @pytest.mark.parametrize(("surface", "load"), CASES)
@@ -60,10 +60,10 @@ def uncoupled(rig: ss.Structure) -> ss.Structure:
 
 def test_driven_it_squeaks_without_the_slope_but_not_without_the_coupling() -> None:
     rig = ss.squeak.squeak_rig(*SQUEAKS)
-    found = ss.stability(rig, speed=-0.1)
+    stability = ss.stability(rig, speed=-0.1)
     for other, growth, squeaks in (
-        (rig.having(slope=0.0), found.without_slope, True),
-        (uncoupled(rig), found.without_coupling, False),
+        (rig.having(slope=0.0), stability.without_slope, True),
+        (uncoupled(rig), stability.without_coupling, False),
     ):
         assert ss.stability(other, speed=-0.1).growth == pytest.approx(growth, rel=1e-9)
         assert (np.std(normal_acceleration(ss.simulate(other, duration=2.0))) > 30) == squeaks
@@ -132,9 +132,9 @@ def test_the_angle_is_told_in_radians() -> None:
     drawn = [axes.get_ylabel().replace("\n", " ") for axes in plot_motion(run).axes]
     assert drawn[2:4] == ["angle [rad]", "angular velocity [rad/s]"]
     assert plot_phase(run, mass=2).get_xlabel() == "angle x3 [rad]"
-    told = ss.story.outcome(ss.systems.scenario_case("SQUEAK wet 6.13 N"))
-    assert "rad, at up to" in told.sentences[0]
-    assert told.values["largest angular speed v3"][1] == "rad/s"
+    story = ss.story.outcome(ss.systems.scenario_case("SQUEAK wet 6.13 N"))
+    assert "rad, at up to" in story.sentences[0]
+    assert story.values["largest angular speed v3"][1] == "rad/s"
 
 
 def test_what_is_no_rig_is_refused_in_words() -> None:
@@ -154,6 +154,6 @@ def test_an_angle_that_is_no_degree_of_freedom_is_refused(rotations: Any) -> Non
 def test_just_below_the_threshold_it_can_not_be_told_whether_it_squeaks(load: float, answer: str) -> None:
     """Sliding is stable up to 1.797 N, and what is struck at a reversal hardly dies away just below."""
     run = ss.simulate(ss.squeak.squeak_rig("wet", load), duration=1.7)
-    found = ss.find_squeaks(ss.squeak.squeak_record(run, snr=30, rng=1).between(0.4, 1.4))
-    assert found.answer == answer
-    assert all("near the threshold" in burst.evidence for burst in found.untold)
+    squeaks = ss.find_squeaks(ss.squeak.squeak_record(run, snr=30, rng=1).between(0.4, 1.4))
+    assert squeaks.answer == answer
+    assert all("near the threshold" in burst.evidence for burst in squeaks.untold)

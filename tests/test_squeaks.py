@@ -123,9 +123,9 @@ def test_a_ring_that_fades_into_a_lower_hum_is_named_by_what_is_loud() -> None:
     ring = np.where(t > 0.2, np.exp(-(t - 0.2) / 0.02), 0.0) * np.sin(2 * np.pi * 415 * t)
     hum = 0.12 * np.sin(2 * np.pi * 345 * t) * ((t > 0.2) & (t < 0.45))
     record = ss.Record.of({"sound": ring + hum + 1e-5 * np.random.default_rng(0).standard_normal(t.size)}, fs=FS)
-    found = max(ss.find_squeaks(record).bursts, key=lambda each: each.level)
-    assert found.frequency == pytest.approx(415, rel=0.01)
-    assert found.duration > 0.2
+    largest = max(ss.find_squeaks(record).bursts, key=lambda each: each.level)
+    assert largest.frequency == pytest.approx(415, rel=0.01)
+    assert largest.duration > 0.2
 
 
 def test_pulses_whose_rate_wanders_are_a_creak() -> None:
@@ -133,9 +133,9 @@ def test_pulses_whose_rate_wanders_are_a_creak() -> None:
     rng = np.random.default_rng(3)
     since = np.mod(20 * t + 10 * t**2, 1) / (20 + 20 * t)  # 20 to 40 in a second
     creak = np.exp(-since / 0.002) * rng.standard_normal(len(t)) * (np.abs(t - 0.5) < 0.4)
-    found = ss.find_squeaks(ss.Record.of({"sound": creak}, fs=20_000)).of("creak")
-    assert len(found) == 1
-    assert found[0].rate == pytest.approx(30, rel=0.05)  # that of the middle
+    record = ss.find_squeaks(ss.Record.of({"sound": creak}, fs=20_000)).of("creak")
+    assert len(record) == 1
+    assert record[0].rate == pytest.approx(30, rel=0.05)  # that of the middle
 
 
 def test_what_is_struck_is_no_squeak() -> None:
@@ -148,12 +148,12 @@ def test_what_is_struck_is_no_squeak() -> None:
 
 def test_a_microphone_without_calibration_gives_relative_levels() -> None:
     record = ss.Record.of({"sound": burst()}, fs=FS, units={"sound": "1"})
-    found = ss.find_squeaks(record)
-    assert (found.reference, found.bursts[0].kind) == ("1", "squeal")
-    assert found.bursts[0].level < 0
-    assert math.isnan(found.bursts[0].weighted_level)
-    assert "not calibrated" in found.notes[0]
-    assert found.to_dict()["bursts"][0]["weighted_level"] is None
+    squeaks = ss.find_squeaks(record)
+    assert (squeaks.reference, squeaks.bursts[0].kind) == ("1", "squeal")
+    assert squeaks.bursts[0].level < 0
+    assert math.isnan(squeaks.bursts[0].weighted_level)
+    assert "not calibrated" in squeaks.notes[0]
+    assert squeaks.to_dict()["bursts"][0]["weighted_level"] is None
 
 
 def test_a_clipped_burst_has_no_level() -> None:
@@ -195,10 +195,10 @@ def test_what_can_not_be_heard_is_refused(record: ss.Record, options: dict, erro
 
 @pytest.mark.parametrize("name", REAL)
 def test_real_sounds_are_called_what_they_are(heard: Heard, name: str) -> None:
-    found = heard(name)
-    assert {burst.kind for burst in found.bursts} == REAL[name]
+    squeaks = heard(name)
+    assert {burst.kind for burst in squeaks.bursts} == REAL[name]
     if name not in ("chalk_screech_01.ogg", "door_creak.ogg"):
-        assert {burst.friction for burst in found.bursts} <= {"no", "not told"}
+        assert {burst.friction for burst in squeaks.bursts} <= {"no", "not told"}
 
 
 def test_the_chalk_squeals_near_three_kilohertz(heard: Heard) -> None:

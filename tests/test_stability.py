@@ -39,10 +39,10 @@ def crossed(eta: tuple[float, float] = (0.0, 0.0)) -> ss.Structure:
 
 
 def test_the_inclined_springs_couple_at_the_closed_form() -> None:
-    found = ss.squeak.critical_value(inclined(), "kinetic", between=(0.05, 1.0))
-    assert found.value == pytest.approx(0.47237749297333017, rel=1e-13)
-    assert 2 * math.pi * found.frequency == pytest.approx(4.58257569495584, rel=1e-13)
-    assert (found.mechanism, found.stable_below) == ("mode coupling", True)
+    critical = ss.squeak.critical_value(inclined(), "kinetic", between=(0.05, 1.0))
+    assert critical.value == pytest.approx(0.47237749297333017, rel=1e-13)
+    assert 2 * math.pi * critical.frequency == pytest.approx(4.58257569495584, rel=1e-13)
+    assert (critical.mechanism, critical.stable_below) == ("mode coupling", True)
 
 
 @pytest.mark.parametrize(
@@ -87,9 +87,9 @@ def test_a_sprag_jams_at_its_angle(friction: float) -> None:
         pad = ss.Contact(law, tangent, normal=normal, stiffness=1e4, preload=10.0)
         return ss.Structure([[1.0]], [[0.0]], [[0.0]], contacts=[pad], drive=ss.drives.Belt(1.0))
 
-    found = ss.squeak.critical_value(inclined_by(1.0), inclined_by, between=(0.1, 1.5))
-    assert found.value == pytest.approx(math.atan(1 / friction), rel=1e-12)
-    assert (found.mechanism, found.frequency) == ("jamming", 0.0)
+    critical = ss.squeak.critical_value(inclined_by(1.0), inclined_by, between=(0.1, 1.5))
+    assert critical.value == pytest.approx(math.atan(1 / friction), rel=1e-12)
+    assert (critical.mechanism, critical.frequency) == ("jamming", 0.0)
 
 
 def test_each_mechanism_is_told_by_switching_it_off() -> None:
@@ -125,9 +125,9 @@ def test_what_nothing_damps_neither_grows_nor_dies_away() -> None:
 @pytest.mark.parametrize("friction", [0.0, 0.1])
 def test_what_grows_without_friction_is_the_structure(damping: Any, stiffness: Any, friction: float) -> None:
     pad = ss.Contact(ss.laws.Coulomb(friction), [1, 0], normal=[0, 1], stiffness=11.0, preload=5.0)
-    found = ss.stability(ss.Structure(np.eye(2), damping, stiffness, contacts=[pad], drive=ss.drives.Belt(1.0)))
-    assert not found.stable
-    assert found.mechanism == "the structure itself"
+    stability = ss.stability(ss.Structure(np.eye(2), damping, stiffness, contacts=[pad], drive=ss.drives.Belt(1.0)))
+    assert not stability.stable
+    assert stability.mechanism == "the structure itself"
 
 
 def test_one_mass_neither_couples_nor_jams() -> None:
@@ -136,31 +136,31 @@ def test_one_mass_neither_couples_nor_jams() -> None:
     steep = ss.stability(block(ss.laws.LinearSlope(10.0, slope=-5.0)))
     assert (steep.frequency, steep.mechanism) == (0.0, "falling friction")
     buckles = lambda k: ss.Structure(np.eye(2), np.zeros((2, 2)), [[k, 0], [0, 8.0]], contacts=inclined().contacts)  # noqa: E731
-    found = ss.squeak.critical_value(buckles(1.0), buckles, between=(-1.0, 1.0), speed=1.0)
-    assert (found.value, found.frequency) == (pytest.approx(0.0, abs=1e-9), 0.0)
+    critical = ss.squeak.critical_value(buckles(1.0), buckles, between=(-1.0, 1.0), speed=1.0)
+    assert (critical.value, critical.frequency) == (pytest.approx(0.0, abs=1e-9), 0.0)
 
 
 def test_a_slope_counts_with_the_load() -> None:
     damped = inclined(0.0, slope=-0.01).having(damping=0.05 * np.eye(2))
-    found = ss.squeak.critical_value(damped, "preload", between=(0.1, 50.0))
-    assert (found.mechanism, found.stable_below) == ("falling friction", True)
+    critical = ss.squeak.critical_value(damped, "preload", between=(0.1, 50.0))
+    assert (critical.mechanism, critical.stable_below) == ("falling friction", True)
     heavier = ss.squeak.critical_value(damped.having(slope=-0.005), "preload", between=(0.1, 50.0))
-    assert heavier.value == pytest.approx(2 * found.value, rel=1e-12)
+    assert heavier.value == pytest.approx(2 * critical.value, rel=1e-12)
 
 
 @pytest.mark.parametrize("change", [{"kinetic": 0.6}, {"slope": -0.02}, {"kinetic": 0.6, "slope": 0.01}])
 def test_the_exact_engine_grows_as_the_eigenvalue_says(change: dict[str, float]) -> None:
     block = inclined().having(damping=0.05 * np.eye(2), **change)
-    found = ss.stability(block)
-    rest = np.array(found.place)
+    stability = ss.stability(block)
+    rest = np.array(stability.place)
     start = dict(zip(("x1", "x2", "v1", "v2"), [rest[0] + 1e-6, rest[1], 0.0, 0.0], strict=True))
-    period = 1 / found.frequency
+    period = 1 / stability.frequency
     run = ss.simulate(block, duration=12 * period, start=start)
     assert run.events == ()
-    assert found.loads[0] == pytest.approx(10.0 + 11.0 * rest[1], rel=1e-12)
+    assert stability.loads[0] == pytest.approx(10.0 + 11.0 * rest[1], rel=1e-12)
     early, late = (run.sample([n * period], ("x", "v"))[0][:, 0] - [*rest, 0, 0] for n in (11.0, 12.0))
-    grown = complex(*_share(found, late)) / complex(*_share(found, early))
-    assert math.log(abs(grown)) == pytest.approx(found.growth * period, abs=1e-6)
+    grown = complex(*_share(stability, late)) / complex(*_share(stability, early))
+    assert math.log(abs(grown)) == pytest.approx(stability.growth * period, abs=1e-6)
 
 
 def _share(found: ss.squeak.Stability, state: np.ndarray) -> tuple[float, float]:
@@ -176,22 +176,22 @@ def _share(found: ss.squeak.Stability, state: np.ndarray) -> tuple[float, float]
 
 def test_a_map_says_what_ends_the_sliding() -> None:
     block = inclined().having(damping=0.05 * np.eye(2))
-    found = ss.squeak.stability_map(block, grid={"kinetic": [0.3, 0.6], "slope": [-0.02, 0.0, 0.02]})
-    assert found.mechanism.sel(kinetic=0.3, slope=0.0) == "stable"
-    assert found.mechanism.sel(kinetic=0.6, slope=0.0) == "mode coupling"
-    assert found.mechanism.sel(kinetic=0.3, slope=-0.02) == "falling friction"
-    assert dict(found.growth.sizes) == {"kinetic": 2, "slope": 3}
+    chart = ss.squeak.stability_map(block, grid={"kinetic": [0.3, 0.6], "slope": [-0.02, 0.0, 0.02]})
+    assert chart.mechanism.sel(kinetic=0.3, slope=0.0) == "stable"
+    assert chart.mechanism.sel(kinetic=0.6, slope=0.0) == "mode coupling"
+    assert chart.mechanism.sel(kinetic=0.3, slope=-0.02) == "falling friction"
+    assert dict(chart.growth.sizes) == {"kinetic": 2, "slope": 3}
     one = ss.stability(block.having(kinetic=0.6, slope=0.02))
-    assert float(found.growth.sel(kinetic=0.6, slope=0.02)) == one.growth
+    assert float(chart.growth.sel(kinetic=0.6, slope=0.02)) == one.growth
 
 
 def test_a_contact_that_would_lift_off_is_named() -> None:
     lifting = inclined()
     pull = ss.Contact(ss.laws.Coulomb(30.0), [0, -1])
-    found = ss.stability(lifting.having(contacts=[*lifting.contacts, pull]))
-    assert found.loads[0] <= 0
-    assert found.status == "contact 1 would lift off before it slides steadily"
-    assert "lift off" in repr(found)
+    stability = ss.stability(lifting.having(contacts=[*lifting.contacts, pull]))
+    assert stability.loads[0] <= 0
+    assert stability.status == "contact 1 would lift off before it slides steadily"
+    assert "lift off" in repr(stability)
 
 
 @pytest.mark.parametrize(
@@ -249,14 +249,14 @@ def test_a_map_that_turns_back_is_refused() -> None:
 @pytest.mark.parametrize("power", [1.5, 2.5])
 def test_a_load_of_a_power_slides_where_its_forces_balance(power: float) -> None:
     rig = ss.squeak.squeak_rig("wet", 6.13).having(power=power)
-    found = ss.stability(rig, speed=-0.1)
-    left = rig.stiffness @ np.array(found.place)
-    for contact, load in zip(rig.contacts, found.loads, strict=True):
-        approach = contact.normal @ np.array(found.place) * contact.stiffness / (power * contact.preload)
+    stability = ss.stability(rig, speed=-0.1)
+    left = rig.stiffness @ np.array(stability.place)
+    for contact, load in zip(rig.contacts, stability.loads, strict=True):
+        approach = contact.normal @ np.array(stability.place) * contact.stiffness / (power * contact.preload)
         assert load == pytest.approx(contact.preload * (1 + approach) ** power, rel=1e-12)
         friction = contact.law.kinetic * load + 0.1 * contact.law.slope * contact.preload
         left = left + (load - contact.preload) * np.asarray(contact.normal) + friction * np.asarray(contact.tangent)
-    assert np.max(np.abs(left)) < 1e-12 * np.max(found.loads)
+    assert np.max(np.abs(left)) < 1e-12 * np.max(stability.loads)
 
 
 def test_a_vibration_under_a_power_grows_as_its_eigenvalue_says() -> None:
@@ -270,10 +270,10 @@ def test_a_vibration_under_a_power_grows_as_its_eigenvalue_says() -> None:
 def test_friction_that_rises_is_not_said_to_fall() -> None:
     """What damps the slide alone may let two coupled motions grow: the paradox of destabilising damping."""
     dry = ss.squeak.squeak_rig("dry", 12.0)
-    found = ss.stability(dry, speed=-0.1)
+    stability = ss.stability(dry, speed=-0.1)
     assert dry.contacts[0].law.slope > 0
-    assert found.mechanism == "mode coupling and rising friction together"
-    assert found.without_slope < 0 < found.growth
+    assert stability.mechanism == "mode coupling and rising friction together"
+    assert stability.without_slope < 0 < stability.growth
 
 
 def test_a_power_without_a_preload_is_refused() -> None:

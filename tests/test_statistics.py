@@ -18,9 +18,9 @@ def coverage(count, rho, *, trials=800):
     """Share of series whose interval holds the truth, and the intervals' half width over that of a known variance."""
     rng = np.random.default_rng(count)
     series = [autoregression(rng, count, rho) for _ in range(trials)]
-    found = [mean_uncertainty(each) for each in series]
-    half = np.array([student(freedom) * sd for sd, freedom in found])
-    means = np.array([each.mean() for each in series])
+    uncertainties = [mean_uncertainty(item) for item in series]
+    half = np.array([student(freedom) * sd for sd, freedom in uncertainties])
+    means = np.array([item.mean() for item in series])
     return np.mean(np.abs(means) <= half), np.median(half) / (1.96 * means.std())
 
 

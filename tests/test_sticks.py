@@ -119,8 +119,8 @@ def test_a_stated_delay_is_taken_out():
     x = record_of(v, noise=0)["x"] + base
     late = Record.of({"x": x[rows:], "z": base[:-rows]}, fs=FS)
     assert find_sticks(late, contact="base").share.value < 0.2
-    told = find_sticks(late.with_details("z", delay=rows / FS), contact="base")
-    assert told.share.value == pytest.approx(1 / 3, abs=0.03)
+    sticks = find_sticks(late.with_details("z", delay=rows / FS), contact="base")
+    assert sticks.share.value == pytest.approx(1 / 3, abs=0.03)
 
 
 def test_slider_pulled_one_way():

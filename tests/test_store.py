@@ -264,7 +264,7 @@ def test_a_full_disk_is_one_sentence_and_the_map_goes_on(whole: Path, tmp_path: 
 def test_every_event_is_kept_beside_the_map(tmp_path: Path) -> None:
     parquet = pytest.importorskip("pyarrow.parquet")
     path, grid = tmp_path / "map.zarr", {"kinetic": [0.3, 0.6], "frequency": [0.1, 0.127]}
-    found = sweep(SLIDER, grid, measures=["events", "stops"], settle=3, cycles=2, store=path)
+    swept = sweep(SLIDER, grid, measures=["events", "stops"], settle=3, cycles=2, store=path)
     folder = tmp_path / "map.zarr.events"
     kept = parquet.read_table(folder).to_pandas()
     for j, kinetic in enumerate(grid["kinetic"]):
@@ -273,7 +273,7 @@ def test_every_event_is_kept_beside_the_map(tmp_path: Path) -> None:
             own = kept[(kept.kinetic == j) & (kept.frequency == k)]
             late = [event for event in run.events if event.time >= 3 / frequency]
             assert [tuple(row) for row in own[list(late[0]._fields)].itertuples(index=False)] == late
-            assert int(found.events[j, k]) == len(late) > 0
+            assert int(swept.events[j, k]) == len(late) > 0
     before, part = files(folder), folder / "00000000.parquet"
     part.unlink()
     sweep(SLIDER, grid, measures=["events", "stops"], settle=3, cycles=2, store=path)

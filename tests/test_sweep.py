@@ -36,20 +36,20 @@ def test_amplitudes_are_den_hartogs() -> None:
     """x0 = sqrt(V^2 - (U r)^2) for the motion without stops, V = 1 / (1 - b^2), U = tan(pi / 2b) / b."""
     b, r = np.array([0.6, 0.8, 1.3, 2.0]), np.array([0.3, 0.5, 0.4, 0.2])
     grid = [{"frequency": p / CIRCLE, "kinetic": q} for p, q in zip(b, r, strict=True)]
-    found = ss.sweep(UNIT.having(damping=1e-3), grid, measures=["amplitude", "stops"], settle=4000, cycles=4)
+    swept = ss.sweep(UNIT.having(damping=1e-3), grid, measures=["amplitude", "stops"], settle=4000, cycles=4)
     known = np.sqrt((1 / (1 - b**2)) ** 2 - (np.tan(np.pi / 2 / b) / b * r) ** 2)
-    assert found.amplitude.values == pytest.approx(known, rel=1e-2)  # the damping of 0.05 % takes some of it
-    assert not found.normal_stops.values.any()
+    assert swept.amplitude.values == pytest.approx(known, rel=1e-2)  # the damping of 0.05 % takes some of it
+    assert not swept.normal_stops.values.any()
 
 
 def test_a_map_is_its_points_one_by_one() -> None:
-    found = ss.sweep(RIGID, {"frequency": [2.5, 5.61], "kinetic": [0.9, 1.1]}, settle=300, cycles=10,
+    swept = ss.sweep(RIGID, {"frequency": [2.5, 5.61], "kinetic": [0.9, 1.1]}, settle=300, cycles=10,
                      measures=["stops", "amplitude", "stick_share", "period", "multipliers"])  # fmt: skip
     for f in (2.5, 5.61):
         for level in (0.9, 1.1):
             orbit, here = (
                 ss.steady_state(RIGID.having(frequency=f, kinetic=level)),
-                found.sel(frequency=f, kinetic=level),
+                swept.sel(frequency=f, kinetic=level),
             )
             assert (int(here.normal_stops), int(here.abnormal_stops)) == orbit.stops
             assert float(here.amplitude) == pytest.approx(orbit.amplitude, rel=1e-9)
@@ -59,12 +59,12 @@ def test_a_map_is_its_points_one_by_one() -> None:
 
 def test_micro_slips_and_transition_speed_are_those_of_the_contact() -> None:
     """Thesis, the 2.5 Hz case: two micro-slips in each of two sticks a cycle."""
-    found = ss.sweep(COMPLIANT, {"kinetic": [1.1]}, settle=20, cycles=4,
+    swept = ss.sweep(COMPLIANT, {"kinetic": [1.1]}, settle=20, cycles=4,
                      measures=["micro_slips", "transition_speed", "energy", "stick_share"])  # fmt: skip
     orbit = ss.steady_state(COMPLIANT)
-    assert float(found.micro_slips[0]) == 4
-    assert float(found.transition_speed[0]) == pytest.approx(orbit.transition_speed, rel=1e-9)
-    assert float(found.energy[0]) == pytest.approx(ss.solve.energy(orbit.orbit).friction, rel=1e-9)
+    assert float(swept.micro_slips[0]) == 4
+    assert float(swept.transition_speed[0]) == pytest.approx(orbit.transition_speed, rel=1e-9)
+    assert float(swept.energy[0]) == pytest.approx(ss.solve.energy(orbit.orbit).friction, rel=1e-9)
 
 
 def test_laws_arrays_starts_and_own_functions() -> None:
@@ -72,11 +72,11 @@ def test_laws_arrays_starts_and_own_functions() -> None:
         return float(len(run.events))
 
     grid = {"law": [ss.laws.Coulomb(1.0), COMPLIANT.law], ("start.x", "start.v"): [(0.0, 0.0), (1e-3, 0.02)]}
-    found = ss.sweep(RIGID, grid, measures=[events, "amplitude"], settle=2, cycles=2)
-    assert dict(found.sizes) == {"law": 2, "start.x_start.v": 2}
-    assert found["start.x"].values.tolist() == [0.0, 1e-3]
+    swept = ss.sweep(RIGID, grid, measures=[events, "amplitude"], settle=2, cycles=2)
+    assert dict(swept.sizes) == {"law": 2, "start.x_start.v": 2}
+    assert swept["start.x"].values.tolist() == [0.0, 1e-3]
     run = ss.simulate(RIGID.having(law=COMPLIANT.law), cycles=4, start={"x": 1e-3, "v": 0.02})
-    assert int(found.events[1, 1]) == len(run.events)
+    assert int(swept.events[1, 1]) == len(run.events)
 
 
 @pytest.mark.parametrize(
@@ -119,9 +119,9 @@ def test_a_sweep_without_meaning_is_refused(options: dict[str, object], words: s
 
 
 def test_a_parameter_called_as_an_answer_goes_by_its_place() -> None:
-    found = ss.sweep(RIGID, {"amplitude": [5e-4, 6e-4]}, measures=["amplitude"], settle=2, cycles=2)
-    assert found.amplitude.dims == ("drive.amplitude",)
-    assert found["drive.amplitude"].values.tolist() == [5e-4, 6e-4]
+    swept = ss.sweep(RIGID, {"amplitude": [5e-4, 6e-4]}, measures=["amplitude"], settle=2, cycles=2)
+    assert swept.amplitude.dims == ("drive.amplitude",)
+    assert swept["drive.amplitude"].values.tolist() == [5e-4, 6e-4]
 
     def mass(run: ss.solve.Trajectory) -> float:
         return 1.0
@@ -131,10 +131,10 @@ def test_a_parameter_called_as_an_answer_goes_by_its_place() -> None:
 
 
 def test_a_point_without_meaning_is_marked_and_the_rest_stands() -> None:
-    found = ss.sweep(UNIT.having(static=0.6), {"kinetic": [0.5, 0.7]}, settle=2, cycles=2)
-    words = dict(zip(found.status.flag_values, found.status.flag_meanings.split(), strict=True))
-    assert [words[int(code)] for code in found.status] == ["moving", "no_such_system"]
-    assert math.isnan(found.amplitude[1])
+    swept = ss.sweep(UNIT.having(static=0.6), {"kinetic": [0.5, 0.7]}, settle=2, cycles=2)
+    words = dict(zip(swept.status.flag_values, swept.status.flag_meanings.split(), strict=True))
+    assert [words[int(code)] for code in swept.status] == ["moving", "no_such_system"]
+    assert math.isnan(swept.amplitude[1])
 
 
 @pytest.mark.parametrize(("key", "wrong"), [("kinetic", -1.0), ("mass", 0.0), ("static", 0.1), ("frequency", 0.0)])
@@ -142,16 +142,16 @@ def test_a_point_that_is_no_system_may_stand_first_and_where_all_are_wrong_the_g
     key: str, wrong: float
 ) -> None:
     base = UNIT.having(static=0.6)
-    found = ss.sweep(base, {key: [wrong, wrong, 0.6]}, measures=["stops"], settle=2, cycles=2)
-    assert found.status.values.tolist() == [3, 3, 0]
+    swept = ss.sweep(base, {key: [wrong, wrong, 0.6]}, measures=["stops"], settle=2, cycles=2)
+    assert swept.status.values.tolist() == [3, 3, 0]
     with pytest.raises(ModelError, match=f"no point of the grid is a system: .*; correct the grid of {key}[.]"):
         ss.sweep(base, {key: [wrong, wrong]}, measures=["stops"], settle=2, cycles=2)
 
 
 def test_a_border_of_what_is_a_system_is_refined() -> None:
-    found = ss.maps.refine(UNIT, {"mass": [-1.0, 1.0]}, halvings=3, settle=2, cycles=2)
-    assert found.status.values.tolist()[:5] == [3] * 5  # up to and with a mass of 0
-    assert 3 not in found.status.values[5:]
+    refined = ss.maps.refine(UNIT, {"mass": [-1.0, 1.0]}, halvings=3, settle=2, cycles=2)
+    assert refined.status.values.tolist()[:5] == [3] * 5  # up to and with a mass of 0
+    assert 3 not in refined.status.values[5:]
     with pytest.raises(ModelError, match="correct the grid of mass"):
         ss.maps.refine(UNIT, {"mass": [-1.0, -0.5]}, halvings=3)
 
@@ -199,29 +199,29 @@ def test_a_map_draws_by_default_its_first_answer() -> None:
     names = ["energy", "stick_share", "amplitude", "micro_slips"]
     for first in names:
         measures = [first, *(name for name in names if name != first)]
-        found = ss.sweep(UNIT, {"kinetic": [0.3, 0.5]}, measures=measures, settle=1, cycles=1)
-        words = found[first].attrs["long_name"]
-        assert plot_map(found).get_ylabel().startswith(words)
+        swept = ss.sweep(UNIT, {"kinetic": [0.3, 0.5]}, measures=measures, settle=1, cycles=1)
+        words = swept[first].attrs["long_name"]
+        assert plot_map(swept).get_ylabel().startswith(words)
 
 
 def test_the_answer_says_what_made_it() -> None:
-    found = ss.sweep(UNIT, {"kinetic": [0.5]}, settle=2, cycles=2)
-    assert found.attrs["version"] == ss.__version__
-    assert "Coulomb" in found.attrs["system"]
-    assert found.kinetic.units == "N"
+    swept = ss.sweep(UNIT, {"kinetic": [0.5]}, settle=2, cycles=2)
+    assert swept.attrs["version"] == ss.__version__
+    assert "Coulomb" in swept.attrs["system"]
+    assert swept.kinetic.units == "N"
     other = ss.sweep(UNIT, {"kinetic": [0.5 * (1 + 1e-16 * 4)]}, settle=2, cycles=2)
-    assert other.attrs["checksum"] != found.attrs["checksum"]
+    assert other.attrs["checksum"] != swept.attrs["checksum"]
 
 
 def test_a_border_is_refined_with_few_runs_and_none_wrong() -> None:
     slider = ss.scenarios.forced(0.8, 0.5)
     coarse = {"frequency": np.linspace(0.08, 0.3, 9), "kinetic": np.linspace(0.1, 1.2, 9)}
-    found = ss.maps.refine(slider, coarse, halvings=3, settle=200, cycles=10)
-    fine = {name: found[name].values for name in coarse}
+    refined = ss.maps.refine(slider, coarse, halvings=3, settle=200, cycles=10)
+    fine = {name: refined[name].values for name in coarse}
     whole = ss.sweep(slider, fine, measures=["stops"], settle=200, cycles=10)
     for name in ("normal_stops", "abnormal_stops", "status"):
-        assert np.array_equal(np.round(found[name]), np.round(whole[name])), name
-    assert found.run.sum() < found.run.size / 5
+        assert np.array_equal(np.round(refined[name]), np.round(whole[name])), name
+    assert refined.run.sum() < refined.run.size / 5
     with pytest.raises(ModelError, match="halvings = 0"):
         ss.maps.refine(slider, coarse, halvings=0)
     with pytest.raises(ModelError, match="has 1 values"):
@@ -233,12 +233,12 @@ def test_a_border_is_refined_with_few_runs_and_none_wrong() -> None:
 
 
 def test_between_two_runs_that_failed_nothing_is_claimed() -> None:
-    found = ss.maps.refine(UNIT, {"damping": [-2e4, -1e4, 0.1]}, halvings=2, settle=2, cycles=40)
-    status, run = found.status.values, found.run.values
+    refined = ss.maps.refine(UNIT, {"damping": [-2e4, -1e4, 0.1]}, halvings=2, settle=2, cycles=40)
+    status, run = refined.status.values, refined.run.values
     assert status[0] == status[4] == FAILED
     assert np.all(run[[0, 4, 8]])
     assert np.all(status[~run][:3] == -1)
-    assert np.all(np.isnan(found.normal_stops.values[~run][:3]))
+    assert np.all(np.isnan(refined.normal_stops.values[~run][:3]))
 
 
 def test_an_own_measure_of_a_run_that_fails_alone_marks_its_point() -> None:
@@ -249,19 +249,19 @@ def test_an_own_measure_of_a_run_that_fails_alone_marks_its_point() -> None:
             raise SolveError("a state", "it is told by the engine", "ask another")
         return 1.0
 
-    found = ss.sweep(UNIT, {"mass": [1.0, 2.0]}, measures=["amplitude", refused], settle=0, cycles=2, engine="serial")
-    assert found.status.values.tolist() == [MOVING, FAILED]
-    assert np.isnan(found.amplitude.values).tolist() == [False, True]
-    assert np.isnan(found.refused.values).tolist() == [False, True]
+    swept = ss.sweep(UNIT, {"mass": [1.0, 2.0]}, measures=["amplitude", refused], settle=0, cycles=2, engine="serial")
+    assert swept.status.values.tolist() == [MOVING, FAILED]
+    assert np.isnan(swept.amplitude.values).tolist() == [False, True]
+    assert np.isnan(swept.refused.values).tolist() == [False, True]
 
 
 def test_lines_of_a_table_fail_no_motion_of_a_map() -> None:
     """A table of many lines passes them all in each period: thousands of changes of mode, two events."""
     table = ss.laws.Tabulated.of(lambda v: 0.3 + 0.1 * math.exp(-v), np.linspace(0, 4, 4001))
-    found = ss.sweep(UNIT.having(law=table), {"amplitude": [2.0]}, settle=2, cycles=2)
+    swept = ss.sweep(UNIT.having(law=table), {"amplitude": [2.0]}, settle=2, cycles=2)
     run = ss.simulate(UNIT.having(law=table, amplitude=2.0), cycles=4)
     assert len(run.modes) > 4 * 10_000
-    assert found.status.values.tolist() == [MOVING]
+    assert swept.status.values.tolist() == [MOVING]
 
 
 @pytest.mark.parametrize("last", [12, 17])
@@ -279,14 +279,14 @@ def test_an_interrupt_ends_a_refinement_with_what_is_known(last: int, monkeypatc
     options: dict[str, Any] = {"halvings": 1, "settle": 5, "cycles": 2, "engine": "serial"}
     whole = ss.maps.refine(slider, coarse, **options)
     monkeypatch.setattr(engines, "run_block", interrupted)
-    found = ss.maps.refine(slider, coarse, **options)
+    refined = ss.maps.refine(slider, coarse, **options)
     assert next(begun) == last + 1
-    assert found.attrs["status"] == f"interrupted: {int(found.run.sum())} points were run"
-    assert 0 < found.run.sum() < whole.run.sum()
-    known = found.status.values >= 0
-    assert not np.any(found.run.values & ~known)
-    assert np.array_equal(found.normal_stops.values[known], whole.normal_stops.values[known])
-    assert np.all(np.isnan(found.normal_stops.values[~known]))
+    assert refined.attrs["status"] == f"interrupted: {int(refined.run.sum())} points were run"
+    assert 0 < refined.run.sum() < whole.run.sum()
+    known = refined.status.values >= 0
+    assert not np.any(refined.run.values & ~known)
+    assert np.array_equal(refined.normal_stops.values[known], whole.normal_stops.values[known])
+    assert np.all(np.isnan(refined.normal_stops.values[~known]))
 
 
 def test_a_design_tells_what_an_answer_depends_on() -> None:
@@ -295,10 +295,10 @@ def test_a_design_tells_what_an_answer_depends_on() -> None:
 
     points = ss.maps.design({"mass": (1.0, 2.0), "stiffness": (1.0, 2.0), "kinetic": (0.1, 0.2)}, count=64)
     assert len(points) == 64 * 5
-    found = ss.maps.sensitivity(ss.sweep(UNIT, points, measures=[of_two], settle=0, cycles=1), variable="of_two")
+    sensitivity = ss.maps.sensitivity(ss.sweep(UNIT, points, measures=[of_two], settle=0, cycles=1), variable="of_two")
     for name, share in (("mass", 0.2), ("stiffness", 0.8), ("kinetic", 0.0)):  # variances 1 : 4 : 0
-        assert found[name]["total"].value == pytest.approx(share, abs=0.03)
-        assert found[name]["first"].value == pytest.approx(share, abs=0.05)
+        assert sensitivity[name]["total"].value == pytest.approx(share, abs=0.03)
+        assert sensitivity[name]["first"].value == pytest.approx(share, abs=0.05)
     with pytest.raises(ModelError, match="power of two"):
         ss.maps.design({"mass": (1.0, 2.0)}, count=3)
     with pytest.raises(ModelError, match="lowest and a higher"):

@@ -95,9 +95,9 @@ def test_the_command_maps_keeps_and_draws(file: Path, tmp_path: Path) -> None:
     command = ["sweep", str(file), "--store", str(store), "--output", str(tmp_path / "maps"), "--json"]
     run = CliRunner().invoke(main, command, catch_exceptions=False)
     assert run.exit_code == 0, run.output
-    told = json.loads(run.output)
-    assert told["status"] == "complete"
-    assert told["variables"]["amplitude"]["known"] == 24
+    data = json.loads(run.output)
+    assert data["status"] == "complete"
+    assert data["variables"]["amplitude"]["known"] == 24
     assert {path.name for path in (tmp_path / "maps" / "figures").glob("*.png")} == {"stops.png", "amplitude.png"}
     page = (tmp_path / "maps" / "report.html").read_text("utf-8")
     assert "24 motions over frequency and kinetic: " in page

@@ -112,9 +112,9 @@ def test_an_interrupt_keeps_what_is_done() -> None:
             raise KeyboardInterrupt
         return float(len(run.events))
 
-    found = ss.sweep(RIGID, {"kinetic": np.linspace(0.2, 1.6, 8)}, measures=[stop], settle=1, cycles=1, engine="serial")
-    assert found.attrs["status"].startswith("interrupted: 4 of 8")
-    assert np.isfinite(found.stop).sum() == 4
+    swept = ss.sweep(RIGID, {"kinetic": np.linspace(0.2, 1.6, 8)}, measures=[stop], settle=1, cycles=1, engine="serial")
+    assert swept.attrs["status"].startswith("interrupted: 4 of 8")
+    assert np.isfinite(swept.stop).sum() == 4
 
 
 def test_a_failed_point_does_not_stop_the_threads() -> None:

@@ -87,8 +87,8 @@ CASES: dict[str, tuple[ss.Oscillator, list[dict[str, float]], int]] = {
 def answers(name: str, engine: str) -> dict[str, Any]:
     system, points, settle = CASES[name]
     asked = ["stops", "amplitude", "stick_share", "energy", "micro_slips"]
-    found = ss.sweep(system, points, measures=asked, settle=settle, cycles=1, engine=engine)
-    return {str(key): column.values for key, column in found.data_vars.items()}
+    swept = ss.sweep(system, points, measures=asked, settle=settle, cycles=1, engine=engine)
+    return {str(key): column.values for key, column in swept.data_vars.items()}
 
 
 def events(name: str, engine: str, folder: Path) -> pd.DataFrame:
@@ -121,9 +121,9 @@ def test_the_grid_of_stops(engine: str) -> None:
     """Stops over frequency ratio and friction (Hong and Liu 2000), undamped, from rest."""
     known = grid("HL-1")
     values = {"frequency": np.array(known["ratios"]) / CIRCLE, "kinetic": known["loads"]}
-    found = ss.sweep(forced(0.5, 0.5), values, measures=["stops"], settle=4000, cycles=4, engine=engine)
-    assert np.array_equal(found.normal_stops, np.array(known["normal"], float))
-    assert np.array_equal(found.abnormal_stops, np.array(known["abnormal"], float))
+    swept = ss.sweep(forced(0.5, 0.5), values, measures=["stops"], settle=4000, cycles=4, engine=engine)
+    assert np.array_equal(swept.normal_stops, np.array(known["normal"], float))
+    assert np.array_equal(swept.abnormal_stops, np.array(known["abnormal"], float))
 
 
 def test_den_hartogs_boundary_by_bisection(engine: str) -> None:
@@ -143,8 +143,8 @@ def bisected(rows: list[list[float]], settle: int, engine: str) -> None:
     while np.max((high - low) / edge) > 1e-8:
         middle = (low + high) / 2
         points = border(0.0, [[*row[:2], force] for row, force in zip(rows, middle, strict=True)])[::2]
-        found = ss.sweep(forced(0.5, 0.5), points, measures=["stops"], settle=settle, cycles=4, engine=engine)
-        stops = (found.normal_stops + found.abnormal_stops).values > 0
+        swept = ss.sweep(forced(0.5, 0.5), points, measures=["stops"], settle=settle, cycles=4, engine=engine)
+        stops = (swept.normal_stops + swept.abnormal_stops).values > 0
         low, high = np.where(stops, low, middle), np.where(stops, middle, high)
     assert np.max(np.abs((low + high) / 2 - edge) / edge) < 1e-8
 
@@ -167,16 +167,16 @@ def test_the_band_in_which_steady_sliding_is_lost(engine: str) -> None:
         with pytest.raises(ModelError, match=r"Stribeck.*linear modes.*threads"):
             ss.sweep(STRIBECK, belts(), settle=1, cycles=1, engine=engine)
         return
-    found = ss.sweep(STRIBECK, belts(), measures=["stick_share"], settle=600, cycles=5, engine=engine)
-    assert (found.stick_share > 0).values.tolist() == [False, True, True, False]
+    swept = ss.sweep(STRIBECK, belts(), measures=["stick_share"], settle=600, cycles=5, engine=engine)
+    assert (swept.stick_share > 0).values.tolist() == [False, True, True, False]
 
 
 def test_the_exponent_of_chaos(engine: str) -> None:
     """Feeny and Moon's load that grows with position: 0.596 +- 0.004 per forcing period."""
     starts = {"start.x": np.linspace(0.4, 0.6, 8)}
-    found = ss.sweep(CHAOS, starts, measures=["lyapunov", "period"], settle=200, cycles=10_000, engine=engine)
-    assert float(found.lyapunov.mean()) / CHAOS.drive.frequency == pytest.approx(0.596, abs=0.004)  # type: ignore[union-attr]
-    assert not found.order.any()
+    swept = ss.sweep(CHAOS, starts, measures=["lyapunov", "period"], settle=200, cycles=10_000, engine=engine)
+    assert float(swept.lyapunov.mean()) / CHAOS.drive.frequency == pytest.approx(0.596, abs=0.004)  # type: ignore[union-attr]
+    assert not swept.order.any()
 
 
 @pytest.fixture(scope="module")
@@ -210,8 +210,8 @@ def pieces(name: str, *, gpu: bool) -> dict[str, Any]:
 
 def exponent(engine: str) -> float:
     """Feeny and Moon's, of so few periods that roundings do not grow to a part in a million [1/s]."""
-    found = ss.sweep(CHAOS, {"start.x": [0.5]}, measures=["lyapunov"], settle=0, cycles=25, engine=engine)
-    return float(found.lyapunov[0])
+    swept = ss.sweep(CHAOS, {"start.x": [0.5]}, measures=["lyapunov"], settle=0, cycles=25, engine=engine)
+    return float(swept.lyapunov[0])
 
 
 @pytest.mark.parametrize("name", CASES)

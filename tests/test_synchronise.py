@@ -106,9 +106,9 @@ def test_clocks_of_different_rate_are_told_and_mended():
 def test_a_motion_that_repeats_is_told():
     t = np.arange(4000) / FS_A
     a, b = (Record.of({"x": np.sin(2 * np.pi * 3 * s)}, fs=FS_A) for s in (t, t + 0.05))
-    found = clock_offset(a, b)
-    assert found.value == pytest.approx(0.05, abs=1e-6)
-    assert "the motion repeats" in found.status
+    offset = clock_offset(a, b)
+    assert offset.value == pytest.approx(0.05, abs=1e-6)
+    assert "the motion repeats" in offset.status
 
 
 def test_channels_that_saw_different_things_are_refused():
@@ -138,9 +138,9 @@ def test_the_two_instruments_of_the_rack(dataset):
     from scipy.ndimage import gaussian_filter1d
 
     a, b = rack(dataset("rack_two_daq"), "24072020-sym_br_r0_ni.csv", "24072020-sym_br_r0_mr.csv", ("#2", "#4"))
-    found = clock_offset(a, b, on=("x", "v"))
-    assert found.value == pytest.approx(0.0248, abs=3e-4)
-    assert found.sd < 1e-4
+    offset = clock_offset(a, b, on=("x", "v"))
+    assert offset.value == pytest.approx(0.0248, abs=3e-4)
+    assert offset.sd < 1e-4
     both = synchronise(a, b, on=("x", "v"))
     sigma = 8  # samples: 4 ms, far below the time of a stroke
     force, v = gaussian_filter1d(both["force"], sigma), gaussian_filter1d(both["v"], sigma)
@@ -156,9 +156,9 @@ def test_the_two_instruments_of_the_rack(dataset):
 
 def test_the_short_stroke_of_the_rack(dataset):
     a, b = rack(dataset("rack_two_daq"), "a3NI.csv", "a3MR.csv", ("#2", "#4"))
-    found = clock_offset(a, b, on=("x", "v"))
-    assert found.value == pytest.approx(-0.0060, abs=3e-4)
-    both = synchronise(a, b, on=("x", "v"), offset=found)
+    offset = clock_offset(a, b, on=("x", "v"))
+    assert offset.value == pytest.approx(-0.0060, abs=3e-4)
+    both = synchronise(a, b, on=("x", "v"), offset=offset)
     position = np.cumsum(both["v"]) / both.fs
     fit = np.polyfit(both["x"], position, 1)
     assert fit[0] == pytest.approx(1.0, abs=0.01)

@@ -144,11 +144,11 @@ def test_the_page_shows_tables_and_figures(folder: Path) -> None:
 
 
 def test_the_results_hold_every_number(folder: Path) -> None:
-    told = json.loads((folder / "results.json").read_text("utf-8"))
+    data = json.loads((folder / "results.json").read_text("utf-8"))
     six = [table for table in printed.tables() if table.chapter == "6"]
-    assert len(told["numbers"]) == sum(len(row.numbers) for table in six for row in table.rows)
-    assert told["verdicts"]["changed"] == 0
-    first = next(entry for entry in told["numbers"] if entry["place"] == "Table 6.1" and entry["entry"] == "i = 1")
+    assert len(data["numbers"]) == sum(len(row.numbers) for table in six for row in table.rows)
+    assert data["verdicts"]["changed"] == 0
+    first = next(entry for entry in data["numbers"] if entry["place"] == "Table 6.1" and entry["entry"] == "i = 1")
     assert {"printed": "-0.86728", "verdict": "same"}.items() <= first.items()
     assert first["ours"] == pytest.approx(-0.86727678404443999)
 

@@ -196,8 +196,8 @@ def test_the_printed_wavelet_has_its_peak_at_minus_the_centre() -> None:
 def test_the_ridge_of_a_tone_reads_low_by_two_per_cent() -> None:
     t = np.arange(8000) / 1000
     record = ss.Record.of({"a": np.sin(2 * np.pi * 47 * t)}, fs=1000)
-    found = ss.wavelet_map(record, "a", frequencies=(40.0, 55.0), voices=96, corrected=False)
-    read = float(found.frequency[np.argmax(np.abs(found.values[:, 4000]))])
+    wavelets = ss.wavelet_map(record, "a", frequencies=(40.0, 55.0), voices=96, corrected=False)
+    read = float(wavelets.frequency[np.argmax(np.abs(wavelets.values[:, 4000]))])
     assert read / 47 == pytest.approx(2 * 4.5 / (4.5 + math.sqrt(4.5**2 + 2)), abs=0.004)
 
 

@@ -49,37 +49,37 @@ def noisy(name: str, level: float, seed: int = 0, cycles: int = 10) -> ss.Record
 
 
 def test_the_mode_of_a_contact_without_noise() -> None:
-    found = ss.contact.transition(truth("two")[0], mass=MASS, stiffness=SPRING)
+    transition = ss.contact.transition(truth("two")[0], mass=MASS, stiffness=SPRING)
     damping = 23.8635 / (2 * np.sqrt(MASS * (SPRING + CONTACT)))
     natural = np.sqrt((SPRING + CONTACT) / MASS)
-    assert found.frequency.value == pytest.approx(natural * np.sqrt(1 - damping**2) / (2 * np.pi), rel=1e-8)
-    assert found.damping.value == pytest.approx(damping, rel=1e-6)
-    assert found.stiffness is not None
-    assert found.stiffness.value == pytest.approx(CONTACT, rel=1e-7)
-    assert found.loop_stiffness is not None
-    assert found.loop_stiffness.value == pytest.approx(CONTACT, rel=1e-6)
+    assert transition.frequency.value == pytest.approx(natural * np.sqrt(1 - damping**2) / (2 * np.pi), rel=1e-8)
+    assert transition.damping.value == pytest.approx(damping, rel=1e-6)
+    assert transition.stiffness is not None
+    assert transition.stiffness.value == pytest.approx(CONTACT, rel=1e-7)
+    assert transition.loop_stiffness is not None
+    assert transition.loop_stiffness.value == pytest.approx(CONTACT, rel=1e-6)
 
 
 @pytest.mark.parametrize("name", ["two", "one", "none"])
 def test_the_mode_at_40_db(name: str) -> None:
     damping = truth(name)[1].system.law.damping / (2 * np.sqrt(MASS * (SPRING + CONTACT)))
     true = np.sqrt((SPRING + CONTACT) / MASS * (1 - damping**2)) / (2 * np.pi)
-    found = ss.contact.transition(noisy(name, 40), mass=MASS, stiffness=SPRING)
-    assert found.frequency.value == pytest.approx(true, rel=3e-3)
-    assert found.frequency.sd < 1e-3 * true * 2
-    assert abs(found.frequency.value - true) < 4 * found.frequency.sd
-    assert abs(found.damping.value - damping) < 5 * found.damping.sd
-    assert len(found.sticks) >= 16
-    within = [abs(stick.frequency.value - true) < 4 * stick.frequency.sd for stick in found.sticks]
+    transition = ss.contact.transition(noisy(name, 40), mass=MASS, stiffness=SPRING)
+    assert transition.frequency.value == pytest.approx(true, rel=3e-3)
+    assert transition.frequency.sd < 1e-3 * true * 2
+    assert abs(transition.frequency.value - true) < 4 * transition.frequency.sd
+    assert abs(transition.damping.value - damping) < 5 * transition.damping.sd
+    assert len(transition.sticks) >= 16
+    within = [abs(stick.frequency.value - true) < 4 * stick.frequency.sd for stick in transition.sticks]
     assert np.mean(within) > 0.9
 
 
 def test_the_wavelet_reads_low_where_micro_slips_cut_in() -> None:
     """The local maximum of the simulated transition, by the thesis's wavelet: 39.0 Hz at 1.1 N."""
-    found = ss.contact.transition(truth("two")[0])
-    assert found.wavelet_frequency.value == pytest.approx(39.0, rel=0.02)
-    assert found.agreement.startswith("the mode and the wavelet differ: the wavelet reads 39")
-    assert "lower, less than its bandwidth resolves" in found.agreement
+    transition = ss.contact.transition(truth("two")[0])
+    assert transition.wavelet_frequency.value == pytest.approx(39.0, rel=0.02)
+    assert transition.agreement.startswith("the mode and the wavelet differ: the wavelet reads 39")
+    assert "lower, less than its bandwidth resolves" in transition.agreement
 
 
 def test_the_words_say_what_the_numbers_say() -> None:
@@ -178,14 +178,14 @@ def test_less_noise_takes_no_verdict_away(case: str, shares: tuple[float, ...]) 
     clean = ss.simulate(ss.scenarios.get(case).system, cycles=16).record(fs=FS).between(1.6, 6.4)["a"]
     white = np.random.default_rng(0).normal(size=len(clean)) * clean.std()
     for share in shares:
-        found = ss.contact.mechanism(ss.Record.of({"a": clean + share * white}, fs=FS))
-        assert found.name == "double stick-slip", (share, found)
+        mechanism = ss.contact.mechanism(ss.Record.of({"a": clean + share * white}, fs=FS))
+        assert mechanism.name == "double stick-slip", (share, mechanism)
 
 
 def test_friction_with_a_memory_is_no_contact_that_rings() -> None:
     record = noisy("state", 25, cycles=6)
-    told = ss.answers.time_frequency(record, frequencies=(20, 80))
-    found, mode, slips = told.mechanism, told.transition, told.microslips
+    maps = ss.answers.time_frequency(record, frequencies=(20, 80))
+    found, mode, slips = maps.mechanism, maps.transition, maps.microslips
     assert found.name == "non-sinusoidal oscillation"
     assert found.probability < found.probabilities[found.name]  # the mount of an acceleration alone might ring
     for each in (mode.frequency, mode.damping, mode.amplitude, mode.wavelet_frequency, slips.per_stick, mode, slips):
@@ -198,9 +198,9 @@ def test_friction_with_a_memory_is_no_contact_that_rings() -> None:
 def test_a_mount_that_rings_is_not_told_from_a_memory(mount: ss.rig.Mount) -> None:
     rig = ss.Rig.perfect().having("a", mount=mount)
     record = rig.measure(truth("none")[1], fs=FS, rng=1, start=2.4)
-    found = ss.contact.mechanism(ss.Record.of({"a": record["a"]}, fs=FS))
-    assert found.name == UNTOLD
-    assert "whose mount rings: state the mount" in found.reason
+    mechanism = ss.contact.mechanism(ss.Record.of({"a": record["a"]}, fs=FS))
+    assert mechanism.name == UNTOLD
+    assert "whose mount rings: state the mount" in mechanism.reason
 
 
 def test_a_rigid_contact_has_no_transition() -> None:
@@ -227,9 +227,9 @@ def test_what_never_sticks_has_no_transition(kind: str) -> None:
     record = spurious(kind)
     with pytest.raises(EstimateError, match=r"no transition|constant"):
         ss.contact.transition(record)
-    found = ss.contact.mechanism(record)
-    assert found.name == UNTOLD
-    assert found.reason
+    mechanism = ss.contact.mechanism(record)
+    assert mechanism.name == UNTOLD
+    assert mechanism.reason
 
 
 @pytest.mark.parametrize("noise", [0.0, 0.003])
@@ -272,14 +272,14 @@ def test_the_answer_does_not_know_units_of_time_and_length() -> None:
 
 
 def test_everything_at_once() -> None:
-    found = ss.answers.time_frequency(noisy("two", 40, cycles=6), mass="2.42 kg", stiffness="2.31 N/mm")
-    assert found.transition is not None
-    assert found.microslips is not None
-    assert found.transition.stiffness is not None
-    assert [plate.name for plate in ss.summary(found).plates] == ["map", "stick", "contours"]
-    told = found.to_dict()
+    maps = ss.answers.time_frequency(noisy("two", 40, cycles=6), mass="2.42 kg", stiffness="2.31 N/mm")
+    assert maps.transition is not None
+    assert maps.microslips is not None
+    assert maps.transition.stiffness is not None
+    assert [plate.name for plate in ss.summary(maps).plates] == ["map", "stick", "contours"]
+    told = maps.to_dict()
     assert json.loads(json.dumps(told, allow_nan=False))["channel"] == "a"
-    sentences = " ".join(ss.summary(found).headline)
+    sentences = " ".join(ss.summary(maps).headline)
     assert "the contact rings at 45" in sentences
 
 
@@ -302,18 +302,18 @@ def test_a_record_in_parts_is_mapped_whole_and_its_begin_asked(monkeypatch: pyte
 
 def test_a_channel_that_is_no_acceleration_is_mapped_alone() -> None:
     record = ss.Record.of({"x": np.sin(2 * np.pi * 40 * np.arange(8000) / 1000)}, fs=1000.0)
-    found = ss.answers.time_frequency(record)
-    assert (found.channel, found.mechanism, found.transition) == ("x", None, None)
-    assert float(np.median(found.ridges[0].frequency)) == pytest.approx(40, rel=0.01)
-    assert "no acceleration" in found.notes[-1]
+    maps = ss.answers.time_frequency(record)
+    assert (maps.channel, maps.mechanism, maps.transition) == ("x", None, None)
+    assert float(np.median(maps.ridges[0].frequency)) == pytest.approx(40, rel=0.01)
+    assert "no acceleration" in maps.notes[-1]
 
 
 def test_a_column_of_times_is_not_taken_for_a_vibration() -> None:
     t = np.arange(2000) / 1000
     record = ss.Record.of({"c1": 3 * t, "c2": np.sin(2 * np.pi * 40 * t)}, fs=1000.0)
-    found = ss.answers.time_frequency(record)
-    assert found.channel == "c2"
-    assert found.notes[0] == "Channel c1 only rises or only falls, as times do: c2 is mapped."
+    maps = ss.answers.time_frequency(record)
+    assert maps.channel == "c2"
+    assert maps.notes[0] == "Channel c1 only rises or only falls, as times do: c2 is mapped."
     with pytest.raises(RecordError, match="c1 only rise"):
         ss.answers.time_frequency(ss.Record.of({"c1": 3 * t}, fs=1000.0))
 
@@ -328,11 +328,11 @@ def test_a_ridge_that_wanders_is_told_as_one_that_may_be_chance() -> None:
 
 
 def test_the_page_tells_no_micro_slips_against_its_verdict() -> None:
-    found = ss.answers.time_frequency(noisy("state", 25, cycles=6))
-    assert found.mechanism is not None
-    assert found.mechanism.name == "non-sinusoidal oscillation"
-    assert "double stick-slip" not in " ".join(ss.summary(found).headline)
-    assert found.microslips is None or found.microslips.per_stick.interval[0] >= 0
+    maps = ss.answers.time_frequency(noisy("state", 25, cycles=6))
+    assert maps.mechanism is not None
+    assert maps.mechanism.name == "non-sinusoidal oscillation"
+    assert "double stick-slip" not in " ".join(ss.summary(maps).headline)
+    assert maps.microslips is None or maps.microslips.per_stick.interval[0] >= 0
     rigid = ss.answers.time_frequency(noisy("rigid", 40, cycles=6))
     stick = next(plate for plate in ss.summary(rigid).plates if plate.name == "stick").figure
     assert "rings" not in stick.axes[0].get_legend_handles_labels()[1]
@@ -358,7 +358,7 @@ def test_a_record_too_short_for_sticks_is_mapped_where_its_wavelets_fit() -> Non
     short = ss.Record.of({"a": np.sin(np.arange(30) / 6)}, fs=2000)
     with pytest.raises(RecordError, match=r"the lowest frequency that it allows is \d+\.\d Hz"):
         ss.answers.time_frequency(short, frequencies=(50, 800))
-    found = ss.answers.time_frequency(short, frequencies=(200, 800))
-    assert found.ridges == ()
-    assert found.mechanism is None
-    assert found.notes == ("30 samples are mapped, and too few to ask about spikes and sticks: give 256.",)
+    maps = ss.answers.time_frequency(short, frequencies=(200, 800))
+    assert maps.ridges == ()
+    assert maps.mechanism is None
+    assert maps.notes == ("30 samples are mapped, and too few to ask about spikes and sticks: give 256.",)

@@ -36,21 +36,21 @@ def strokes(cycles=40, coefficient=0.3, noise=0.01, seed=0, load=None, patch=0.0
 
 
 def test_each_definition_is_its_closed_form() -> None:
-    found = friction_coefficients(strokes(), normal="10 N")
+    coefficients = friction_coefficients(strokes(), normal="10 N")
     half, whole = np.arccos(1 - RISE / STROKE), np.arccos(1 - 2 * RISE / STROKE)  # phases at which it is none, and full
 
     def rising(phase: float) -> float:
         """Friction over its level, integrated over the phase from the reversal on."""
         return (STROKE / RISE - 1) * phase - STROKE / RISE * np.sin(phase)
 
-    assert found.plateau.value == pytest.approx(0.3, rel=2e-3)
-    assert found.by_energy.value == pytest.approx(0.3 * (1 - RISE / STROKE), rel=5e-3)
-    assert found.by_stroke.value == pytest.approx(0.3 * (rising(whole) + np.pi - whole) / np.pi, rel=5e-3)
+    assert coefficients.plateau.value == pytest.approx(0.3, rel=2e-3)
+    assert coefficients.by_energy.value == pytest.approx(0.3 * (1 - RISE / STROKE), rel=5e-3)
+    assert coefficients.by_stroke.value == pytest.approx(0.3 * (rising(whole) + np.pi - whole) / np.pi, rel=5e-3)
     mean = (rising(whole) - 2 * rising(half) + np.pi - whole) / np.pi
-    assert found.by_cycle.value == pytest.approx(0.3 * mean, rel=5e-3)
-    assert found.wear_in is None
-    assert stands(found.plateau.status)
-    assert len(found.time) == pytest.approx(40, abs=1)
+    assert coefficients.by_cycle.value == pytest.approx(0.3 * mean, rel=5e-3)
+    assert coefficients.wear_in is None
+    assert stands(coefficients.plateau.status)
+    assert len(coefficients.time) == pytest.approx(40, abs=1)
 
 
 def test_a_zero_that_is_off_stays_in_the_mean_of_a_cycle_alone() -> None:
@@ -63,10 +63,10 @@ def test_a_zero_that_is_off_stays_in_the_mean_of_a_cycle_alone() -> None:
 
 
 def test_a_load_that_was_measured_is_taken_cycle_by_cycle() -> None:
-    found = friction_coefficients(strokes(load="measured"))
-    assert found.measured
-    assert found.plateau.value == pytest.approx(0.3, rel=3e-3)
-    assert found.load.value == pytest.approx(LOAD, rel=0.01)
+    coefficients = friction_coefficients(strokes(load="measured"))
+    assert coefficients.measured
+    assert coefficients.plateau.value == pytest.approx(0.3, rel=3e-3)
+    assert coefficients.load.value == pytest.approx(LOAD, rel=0.01)
     assert friction_coefficients(strokes(load="measured"), normal=20.0).plateau.value == pytest.approx(0.15, rel=0.03)
 
 
@@ -87,10 +87,10 @@ def test_a_load_that_is_none_is_refused(normal, error, words) -> None:
 
 def test_wear_in_is_told_and_left_behind() -> None:
     cycle = np.arange(120)
-    found = friction_coefficients(strokes(120, 0.3 + 0.1 * np.exp(-cycle / 12)), normal=LOAD)
-    assert found.wear_in.cycles.value == pytest.approx(12, rel=0.05)
-    assert found.wear_in.change.value == pytest.approx(0.1, rel=0.05)
-    assert found.plateau.value == pytest.approx(0.3, rel=0.01)  # of the cycles after it: 0.31 of all
+    coefficients = friction_coefficients(strokes(120, 0.3 + 0.1 * np.exp(-cycle / 12)), normal=LOAD)
+    assert coefficients.wear_in.cycles.value == pytest.approx(12, rel=0.05)
+    assert coefficients.wear_in.change.value == pytest.approx(0.1, rel=0.05)
+    assert coefficients.plateau.value == pytest.approx(0.3, rel=0.01)  # of the cycles after it: 0.31 of all
     still = friction_coefficients(strokes(60, 0.3 + 0.1 * np.exp(-np.arange(60) / 40)), normal=LOAD)
     assert "still wearing in" in still.plateau.status
 
@@ -123,18 +123,18 @@ def test_intervals_of_a_wear_in_hold(draws, least) -> None:
         count, alike = int(chance.integers(100, 500)), chance.choice([0.0, 0.3, 0.6])
         true = 0.3, chance.uniform(0.05, 0.2) * chance.choice([-1, 1]), chance.uniform(5, count / 5)
         scatter = lfilter([1], [1, -alike], chance.normal(0, 0.008, count + 200))[200:]
-        found = fit_wear_in(true[0] + true[1] * np.exp(-np.arange(count) / true[2]) + scatter)
-        if found is not None:
-            held.append([one.includes(value) for one, value in zip(found.estimates, true, strict=True)])
+        wear = fit_wear_in(true[0] + true[1] * np.exp(-np.arange(count) / true[2]) + scatter)
+        if wear is not None:
+            held.append([one.includes(value) for one, value in zip(wear.estimates, true, strict=True)])
     assert len(held) > 0.9 * draws
     assert np.all(np.mean(held, axis=0) >= least)
 
 
 def test_the_map_shows_the_place_that_rubs_more() -> None:
-    found = friction_coefficients(strokes(patch=0.5), normal=LOAD)
-    both = np.nanmean((found.forward + found.back) / 2, axis=0)
-    inner = np.abs(found.position - STROKE / 2) < 0.35 * STROKE
-    assert found.position[inner][np.argmax(both[inner])] == pytest.approx(0.7 * STROKE, abs=0.06 * STROKE)
+    coefficients = friction_coefficients(strokes(patch=0.5), normal=LOAD)
+    both = np.nanmean((coefficients.forward + coefficients.back) / 2, axis=0)
+    inner = np.abs(coefficients.position - STROKE / 2) < 0.35 * STROKE
+    assert coefficients.position[inner][np.argmax(both[inner])] == pytest.approx(0.7 * STROKE, abs=0.06 * STROKE)
     assert both[inner].max() == pytest.approx(0.45, rel=0.02)
     assert np.median(both[inner]) == pytest.approx(0.3, rel=0.02)
 
@@ -159,10 +159,10 @@ def test_command(tmp_path, monkeypatch) -> None:
     run = CliRunner().invoke(main, ["tribometer", "0.csv", *channels])
     assert run.exit_code == 0, run.output
     assert "kinetic coefficient of friction" in run.output
-    told = json.loads((tmp_path / "0-tribometer/results.json").read_text())
-    values = {one["name"]: one["value"] for one in told["estimates"]}
+    data = json.loads((tmp_path / "0-tribometer/results.json").read_text())
+    values = {one["name"]: one["value"] for one in data["estimates"]}
     assert values["coefficient of friction, plateau"] == pytest.approx(0.3, rel=0.02)
-    assert len(told["map"]["forward"][0]) == len(told["map"]["position"])
+    assert len(data["map"]["forward"][0]) == len(data["map"]["position"])
     both = CliRunner().invoke(main, ["tribometer", "0.csv", "1.csv", "--json", *channels])
     assert both.exit_code == 0, both.output
     assert len(json.loads(both.stdout)["records"]) == 2

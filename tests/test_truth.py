@@ -173,9 +173,9 @@ def test_the_share_of_stick_and_the_phase_of_break_away(name: str, share: float,
     """DH-3: slip breaks away downwards at cos(phase) = x0 - F_s / P."""
     scenario = scenarios.get(name)
     steady = steady_state(scenario.system, start=scenario.start)
-    found = around(steady.orbit)
-    assert sum(p[2] for p in found if p[0] == "stick") / steady.period == pytest.approx(share, rel=1e-12)
-    phases = [p[1] / steady.period * 2 * math.pi for p in found if p[0] == "slip" and p[3] < 0]
+    orbit = around(steady.orbit)
+    assert sum(p[2] for p in orbit if p[0] == "stick") / steady.period == pytest.approx(share, rel=1e-12)
+    phases = [p[1] / steady.period * 2 * math.pi for p in orbit if p[0] == "slip" and p[3] < 0]
     assert phases == [pytest.approx(phase, rel=1e-12)]
 
 

@@ -35,9 +35,9 @@ YIELDS = stepped.Rig("compliant", 2.0, 800.0, 1.0, 4e-3, 2.4, kinetic=0.3 * PULL
 
 def test_what_a_search_sends_to_another_process_is_short() -> None:
     """200 starts took the whole record and its slopes with them: 3 GB for a minute of it."""
-    told = stepped.record(STOPS, np.random.default_rng(7), noise=1e-3, cycles=40)
-    told = ss.friction_force(told, **STOPS.stated)
-    whole = len(pickle.dumps(told))
+    record = stepped.record(STOPS, np.random.default_rng(7), noise=1e-3, cycles=40)
+    record = ss.friction_force(record, **STOPS.stated)
+    whole = len(pickle.dumps(record))
 
     def mapped(step: Any, begun: Any) -> list[Any]:
         sent = list(begun)
@@ -45,7 +45,7 @@ def test_what_a_search_sends_to_another_process_is_short() -> None:
             assert len(pickle.dumps(sent)) < 2 * whole
         return [step(one) for one in sent]
 
-    believe(told, mapped=mapped)
+    believe(record, mapped=mapped)
 
 
 @cache
@@ -57,7 +57,7 @@ def asked(rig: stepped.Rig) -> tuple[ss.answers.Findings, ss.answers.Findings]:
 
 
 def estimate(findings: ss.answers.Findings, name: str) -> ss.Estimate:
-    return next(each for each in findings.estimates if each.name == name)
+    return next(estimate for estimate in findings.estimates if estimate.name == name)
 
 
 def test_the_stepped_rigs_move_as_the_engine_does() -> None:
@@ -330,10 +330,10 @@ def test_what_is_taken_off_has_the_sign_that_is_said() -> None:
     _, tried = asked(STOPS)
     quick = asked(STOPS)[0].sticks.share
     share = tried.sticks.share
-    said = next(check for check in share.checks if check.startswith("corrected by"))
-    correction, bias = (float(number) for number in re.findall(r"[+-][\d.e-]*\d", said))
+    first = next(check for check in share.checks if check.startswith("corrected by"))
+    correction, bias = (float(number) for number in re.findall(r"[+-][\d.e-]*\d", first))
     assert correction == pytest.approx(share.value - quick.value, rel=0.01)
-    assert said == f"corrected by {correction:+.3g}: its mean error on the twins is {bias:+.3g}"
+    assert first == f"corrected by {correction:+.3g}: its mean error on the twins is {bias:+.3g}"
     assert bias == -correction
 
 
@@ -391,10 +391,10 @@ def command(folder: Path, *options: str) -> list[str]:
 def test_the_command_tries_and_tells(tmp_path: Path) -> None:
     result = CliRunner().invoke(main, command(tmp_path, "--json"))
     assert result.exit_code == 0, result.output
-    told = json.loads((tmp_path / "out" / "results.json").read_text("utf-8"))
-    assert told["twins"]["count"] == 8
+    data = json.loads((tmp_path / "out" / "results.json").read_text("utf-8"))
+    assert data["twins"]["count"] == 8
     assert (tmp_path / "out" / "figures" / "twin.png").exists()
-    assert any(note.startswith("Tried on 8 twins") for note in told["notes"])
+    assert any(note.startswith("Tried on 8 twins") for note in data["notes"])
 
 
 @pytest.mark.parametrize("output", [True, False])

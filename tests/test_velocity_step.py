@@ -24,9 +24,11 @@ def stepped(law: str, *, noise: float = 0.0, seed: int = 0, fs: float = 50.0, st
 
     t = np.arange(round(end * fs)) / fs
     after = t[t > step]
-    found = solve_ivp(rates, (step, end), [0.0, 0.0], args=(V2,), t_eval=after, method="Radau", rtol=1e-9, atol=1e-11)
+    solution = solve_ivp(
+        rates, (step, end), [0.0, 0.0], args=(V2,), t_eval=after, method="Radau", rtol=1e-9, atol=1e-11
+    )
     z, w = np.zeros((2, t.size))
-    z[t > step], w[t > step] = found.y
+    z[t > step], w[t > step] = solution.y
     x = V1 * t + (V2 - V1) * np.maximum(t - step, 0)
     friction = NORMAL * (MU + A * z + B * w)
     friction = friction + np.random.default_rng(seed).normal(0, noise * NORMAL, t.size)
@@ -35,23 +37,23 @@ def stepped(law: str, *, noise: float = 0.0, seed: int = 0, fs: float = 50.0, st
 
 @pytest.mark.parametrize("law", ["aging", "slip"])
 def test_the_law_comes_back(law: str) -> None:
-    found = fit_curve(stepped(law), curve=law, normal=NORMAL)
+    fit = fit_curve(stepped(law), curve=law, normal=NORMAL)
     truth = {"friction": MU, "direct": A, "evolution": B, "rate_dependence": A - B, "distance": DC, "stiffness": K}
     for name, value in truth.items():
-        assert found.parameters[name].value == pytest.approx(value, rel=1e-3)
-    assert isinstance(found.law, RateState)
-    assert found.law.law == law
-    assert found.law.steady(V2) / NORMAL == pytest.approx(MU + (A - B) * np.log(V2 / V1), rel=1e-4)
-    assert found.status == "ok"
+        assert fit.parameters[name].value == pytest.approx(value, rel=1e-3)
+    assert isinstance(fit.law, RateState)
+    assert fit.law.law == law
+    assert fit.law.steady(V2) / NORMAL == pytest.approx(MU + (A - B) * np.log(V2 / V1), rel=1e-4)
+    assert fit.status == "ok"
 
 
 def test_intervals_hold_the_truth() -> None:
     truth = {"direct": A, "evolution": B, "rate_dependence": A - B, "distance": DC}
     held = dict.fromkeys(truth, 0)
     for seed in range(12):
-        found = fit_curve(stepped("slip", noise=8e-4, seed=seed), curve="slip", normal=f"{NORMAL} N")
+        fit = fit_curve(stepped("slip", noise=8e-4, seed=seed), curve="slip", normal=f"{NORMAL} N")
         for name, value in truth.items():
-            held[name] += found.parameters[name].includes(value)
+            held[name] += fit.parameters[name].includes(value)
     assert all(count >= 10 for count in held.values()), held
 
 

@@ -46,8 +46,8 @@ def plain(values: np.ndarray, fs: float, scales: np.ndarray, normalisation: str)
 @pytest.mark.parametrize("size", [30011, 50021, 90107], ids=["plain", "interpolated", "in blocks"])
 def test_the_fast_transform_is_the_transform(normalisation: str, precision: str, right: float, size: int) -> None:
     values, scales = RNG.normal(size=size), CENTRE / (2 * np.pi * np.geomspace(1.0, 200.0, 57))
-    found = transform(values, 1000.0, scales, centre=CENTRE, normalisation=normalisation, precision=precision)
-    assert worst(found, plain(values, 1000.0, scales, normalisation)) < right
+    transformed = transform(values, 1000.0, scales, centre=CENTRE, normalisation=normalisation, precision=precision)
+    assert worst(transformed, plain(values, 1000.0, scales, normalisation)) < right
 
 
 @pytest.mark.parametrize("seed", [6, 11, 29])
@@ -55,30 +55,30 @@ def test_wavelets_that_half_the_rate_cuts_off_reach_further(seed: int) -> None:
     """A spectrum that ends at half the rate rings for long: the parts of a long record hold too little of that."""
     values = np.random.default_rng(seed).normal(size=90107)
     scales = CENTRE / (2 * np.pi * np.array([205.0, 215.0, 225.0]))
-    found = transform(values, 1000.0, scales, centre=CENTRE, normalisation="amplitude")
+    transformed = transform(values, 1000.0, scales, centre=CENTRE, normalisation="amplitude")
     inner = slice(20_000, -20_000)  # it rings round the ends of both transforms
-    assert worst(found[:, inner], plain(values, 1000.0, scales, "amplitude")[:, inner]) < 1e-9
+    assert worst(transformed[:, inner], plain(values, 1000.0, scales, "amplitude")[:, inner]) < 1e-9
 
 
 def test_a_tone_is_its_closed_form() -> None:
     """MO-1; the thesis's phase runs backwards, ours forwards."""
     fs, f0, phase = 2000.0, 47.0, 0.3
     t = np.arange(16000) / fs
-    found = ss.wavelet_map(of(np.cos(2 * np.pi * f0 * t + phase), fs), "a", frequencies=np.linspace(30, 80, 26))
-    a, turn = found.scale.values[:, None], 2 * np.pi * f0
+    wavelets = ss.wavelet_map(of(np.cos(2 * np.pi * f0 * t + phase), fs), "a", frequencies=np.linspace(30, 80, 26))
+    a, turn = wavelets.scale.values[:, None], 2 * np.pi * f0
     true = np.sqrt(a) * np.pi**-0.25 * np.sqrt(np.pi / 2) * (
         np.exp(1j * (turn * t + phase)) * np.exp(-((a * turn - CENTRE) ** 2) / 2)
         + np.exp(-1j * (turn * t + phase)) * np.exp(-((a * turn + CENTRE) ** 2) / 2)
     )  # fmt: skip
     inside = (t > 0.5) & (t < 7.5)
-    assert worst(found.values[:, inside], true[:, inside]) < 1e-9
+    assert worst(wavelets.values[:, inside], true[:, inside]) < 1e-9
 
 
 def test_the_modulus_at_the_thesis_scale() -> None:
     t = np.arange(8000) / 2000.0
     tone = of(np.sin(2 * np.pi * 47 * t), 2000.0)
-    found = ss.wavelet_map(tone, "a", frequencies=[46.0, 47.0, 48.0], corrected=False)
-    assert float(abs(found.sel(frequency=47.0, time=2.0))) == pytest.approx(0.11620902677532686, rel=1e-9)
+    wavelets = ss.wavelet_map(tone, "a", frequencies=[46.0, 47.0, 48.0], corrected=False)
+    assert float(abs(wavelets.sel(frequency=47.0, time=2.0))) == pytest.approx(0.11620902677532686, rel=1e-9)
 
 
 def test_an_impulse_is_its_closed_form() -> None:
@@ -87,10 +87,10 @@ def test_an_impulse_is_its_closed_form() -> None:
     impulse = np.zeros(n)
     impulse[at] = fs  # of area one
     t, scales = np.arange(n) / fs, CENTRE / (2 * np.pi * np.geomspace(10, 600, 20))
-    found = transform(impulse, fs, scales, centre=CENTRE, normalisation="energy")
+    transformed = transform(impulse, fs, scales, centre=CENTRE, normalisation="energy")
     a, apart = scales[:, None], t - at / fs
     true = a**-0.5 * np.pi**-0.25 * np.exp(1j * CENTRE * apart / a - (apart / a) ** 2 / 2)
-    assert worst(found, true) < 1e-9
+    assert worst(transformed, true) < 1e-9
 
 
 def test_a_decaying_sine_is_its_closed_form() -> None:
@@ -128,9 +128,9 @@ def test_a_chirp_is_right_to_1e_10() -> None:
     t = np.arange(8192) / fs
     chirp = np.cos(2 * np.pi * (20 * t + 20 * t**2)) * np.exp(-(((t - 2) / 0.8) ** 2))
     scales = CENTRE / (2 * np.pi * np.geomspace(10, 400, 60))
-    found = transform(chirp, fs, scales, centre=CENTRE, normalisation="energy")
+    transformed = transform(chirp, fs, scales, centre=CENTRE, normalisation="energy")
     true = plain(chirp, fs, scales, "energy")
-    assert np.abs(found - true).max() < 1e-10 * np.abs(true).max()
+    assert np.abs(transformed - true).max() < 1e-10 * np.abs(true).max()
 
 
 @pytest.mark.parametrize("centre", [4.5, 6.0, 20.0])
@@ -150,23 +150,23 @@ def test_a_tone_reads_its_own_frequency(centre: float, normalisation: str) -> No
 def test_without_the_correction_a_tone_reads_low() -> None:
     t = np.arange(40000) / 2000.0
     near = 47 * np.linspace(0.95, 1.02, 701)
-    found = abs(ss.wavelet_map(of(np.sin(2 * np.pi * 47 * t), 2000.0), "a", frequencies=near, corrected=False))
-    assert float(found.sel(time=10.0).idxmax()) / 47 == pytest.approx(0.97645754712735858, abs=2e-4)
+    size = abs(ss.wavelet_map(of(np.sin(2 * np.pi * 47 * t), 2000.0), "a", frequencies=near, corrected=False))
+    assert float(size.sel(time=10.0).idxmax()) / 47 == pytest.approx(0.97645754712735858, abs=2e-4)
 
 
 def test_the_stated_bandwidth_is_that_at_half_power() -> None:
     t = np.arange(40000) / 2000.0
     row = ss.wavelet_map(of(np.zeros(40000), 2000.0), "a", frequencies=[46.0, 47.0, 48.0], normalisation="amplitude")
     edge = 47 + float(row.bandwidth.sel(frequency=47.0)) / 2
-    found = ss.wavelet_map(of(np.sin(2 * np.pi * edge * t), 2000.0), "a", frequencies=[46.0, 47.0, 48.0],
+    wavelets = ss.wavelet_map(of(np.sin(2 * np.pi * edge * t), 2000.0), "a", frequencies=[46.0, 47.0, 48.0],
                            normalisation="amplitude")  # fmt: skip
-    assert float(abs(found.sel(frequency=47.0, time=10.0))) == pytest.approx(math.sqrt(0.5), rel=1e-6)
+    assert float(abs(wavelets.sel(frequency=47.0, time=10.0))) == pytest.approx(math.sqrt(0.5), rel=1e-6)
 
 
 def test_the_cone_is_where_a_jump_at_the_end_has_fallen_to_1_over_e() -> None:
     t = np.arange(4000) / 1000.0
-    found = ss.wavelet_map(of(np.sin(2 * np.pi * 30 * t)), "a", frequencies=(10, 100))
-    cone = ss.signals.cone_of_influence(found)
+    wavelets = ss.wavelet_map(of(np.sin(2 * np.pi * 30 * t)), "a", frequencies=(10, 100))
+    cone = ss.signals.cone_of_influence(wavelets)
     for frequency in (10.0, 50.0):
         row = cone.sel(frequency=frequency, method="nearest")
         assert (~row).sum() / 1000 == pytest.approx(4.0 - 2 * float(row.cone), abs=3e-3)
@@ -178,10 +178,10 @@ def test_the_inverse_gives_the_signal_back() -> None:
     t = np.arange(16384) / 1000.0
     burst = 3.0 + np.exp(-(((t - 8) / 1.5) ** 2)) * (np.cos(2 * np.pi * 40 * t) + 0.5 * np.sin(2 * np.pi * 90 * t))
     for normalisation in ("energy", "amplitude"):
-        found = ss.signals.inverse_wavelet(
+        inverse = ss.signals.inverse_wavelet(
             ss.wavelet_map(of(burst), "a", frequencies=(5, 250), normalisation=normalisation)
         )
-        assert np.abs(found - burst).max() < 1e-10
+        assert np.abs(inverse - burst).max() < 1e-10
 
 
 @pytest.mark.parametrize("normalisation", ["energy", "amplitude"])
@@ -307,9 +307,9 @@ def test_the_thesis_grid() -> None:
 
 def test_the_short_time_transform_reads_a_tone() -> None:
     record = of(0.3 * np.sin(2 * np.pi * 50 * np.arange(4000) / 1000) + 5)
-    found = abs(ss.signals.stft_map(record, "a", nperseg=200))
-    assert float(found.sel(frequency=50.0, time=2.0)) == pytest.approx(0.3, rel=1e-3)
-    assert float(found.sel(frequency=200.0, time=2.0)) < 1e-3
+    size = abs(ss.signals.stft_map(record, "a", nperseg=200))
+    assert float(size.sel(frequency=50.0, time=2.0)) == pytest.approx(0.3, rel=1e-3)
+    assert float(size.sel(frequency=200.0, time=2.0)) < 1e-3
 
 
 @pytest.mark.parametrize(
@@ -348,10 +348,10 @@ def test_a_constant_holds_no_frequency() -> None:
 
 def test_the_chalk_screech_rings_at_2950_hz(dataset: Callable[[str], Path]) -> None:
     record = ss.read_record(dataset("audio") / "chalk_screech_01.ogg", channels={"sound": "#1"})
-    found = abs(
+    size = abs(
         ss.wavelet_map(record, "sound", frequencies=(1000, 8000), wavelet_frequency=20, normalisation="amplitude")
     )
-    power = (found.sel(time=slice(0.30, 0.65)) ** 2).mean("time")
+    power = (size.sel(time=slice(0.30, 0.65)) ** 2).mean("time")
     assert float(power.idxmax()) == pytest.approx(2950, rel=0.03)
 
 

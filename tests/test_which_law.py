@@ -63,20 +63,20 @@ def test_a_search_begins_near_the_truth(name: str) -> None:
 
 def test_a_compliant_contact_is_told_from_a_rigid_one() -> None:
     shares: list[float] = []
-    found = ss.compare_laws(
+    comparison = ss.compare_laws(
         [record("compliant"), record("compliant", 11.1, 2e-3)], slider(), laws=["Coulomb", "compliant"],
         progress=shares.append,
     )  # fmt: skip
-    assert (found.law, found.family, found.kept) == ("compliant", "compliant", ("compliant",))
-    assert found.confidence > 0.95
-    assert found.status == "ok"
-    assert found.candidates[1].standing.misfit > 10
-    assert found.fit.parameters["law.stiffness"].value == pytest.approx(192000, rel=0.03)
-    assert "compliant contact" in found.verdict
+    assert (comparison.law, comparison.family, comparison.kept) == ("compliant", "compliant", ("compliant",))
+    assert comparison.confidence > 0.95
+    assert comparison.status == "ok"
+    assert comparison.candidates[1].standing.misfit > 10
+    assert comparison.fit.parameters["law.stiffness"].value == pytest.approx(192000, rel=0.03)
+    assert "compliant contact" in comparison.verdict
     assert shares == sorted(shares)
     assert shares[-1] == 1.0
-    assert json.loads(json.dumps(found.to_dict(), allow_nan=False))["law"] == "compliant"
-    assert [plate.name for plate in law_plates(found)] == ["laws", "fit-1", "fit-2"]
+    assert json.loads(json.dumps(comparison.to_dict(), allow_nan=False))["law"] == "compliant"
+    assert [plate.name for plate in law_plates(comparison)] == ["laws", "fit-1", "fit-2"]
 
 
 @pytest.mark.parametrize("name", ["state variable", "LuGre"])
@@ -85,10 +85,10 @@ def test_a_family_is_found_through_wrong_gains(name: str) -> None:
     told = record(name)
     off = {"x": 1.01, "load": 0.99, "z": 1.0}
     wrong = told.with_samples({key: off[key] * told[key] for key in told}, Step("calibrated badly"))
-    found = ss.compare_laws(wrong, slider(), laws=["Coulomb", name])
-    assert (found.law, found.family) == (name, name)
-    assert found.candidates[1].standing.misfit > 5
-    assert found.status == "ok"
+    comparison = ss.compare_laws(wrong, slider(), laws=["Coulomb", name])
+    assert (comparison.law, comparison.family) == (name, name)
+    assert comparison.candidates[1].standing.misfit > 5
+    assert comparison.status == "ok"
 
 
 def test_the_best_law_says_what_it_leaves() -> None:
@@ -99,12 +99,12 @@ def test_the_best_law_says_what_it_leaves() -> None:
     )  # fmt: skip
     rig = ss.Rig.perfect("x", "z").having("x", white=1e-6).having("z", white=1e-6)
     record = rig.measure(ss.simulate(lagging, duration=3.0), fs=500, rng=1, start=1.0)
-    found = ss.compare_laws(record, slider(), laws=["Coulomb"], nuisance=[])
-    share = found.best.left["x"] / float(np.std(found.fit.traces[0].measured["x"]))
+    comparison = ss.compare_laws(record, slider(), laws=["Coulomb"], nuisance=[])
+    share = comparison.best.left["x"] / float(np.std(comparison.fit.traces[0].measured["x"]))
     assert 0.05 < share < 0.3
-    assert found.best.standing.verdict == f"best of those tried, leaves {100 * share:.0f} % of x"
-    assert found.verdict.startswith(f"Coulomb, the only law tried, leaves {100 * share:.0f} % of x, ")
-    assert "Confidence" not in found.verdict
+    assert comparison.best.standing.verdict == f"best of those tried, leaves {100 * share:.0f} % of x"
+    assert comparison.verdict.startswith(f"Coulomb, the only law tried, leaves {100 * share:.0f} % of x, ")
+    assert "Confidence" not in comparison.verdict
 
 
 def test_a_damper_that_is_understated_makes_no_other_law() -> None:
@@ -113,11 +113,11 @@ def test_a_damper_that_is_understated_makes_no_other_law() -> None:
     damped = ss.Oscillator(law=TRUE["Coulomb"], drive=drive, **{**RIG, "damping": 6.0})
     rig = ss.Rig.perfect("x", "z").having("x", white=1e-6).having("z", white=1e-6)
     runs = [ss.simulate(damped.having(frequency=each), duration=2.0) for each in (4.0, 6.5)]
-    told = [rig.measure(run, fs=500, rng=seed, start=1.0) for seed, run in enumerate(runs)]
-    found = ss.compare_laws(told, slider().having(damping=0.6), laws=["Coulomb", "compliant"])
-    assert "Coulomb" in found.kept
-    assert found.fit.parameters["damping"].value == pytest.approx(6.0, rel=0.05)
-    assert "where 0.6 N s/m is stated" in found.verdict
+    records = [rig.measure(run, fs=500, rng=seed, start=1.0) for seed, run in enumerate(runs)]
+    comparison = ss.compare_laws(records, slider().having(damping=0.6), laws=["Coulomb", "compliant"])
+    assert "Coulomb" in comparison.kept
+    assert comparison.fit.parameters["damping"].value == pytest.approx(6.0, rel=0.05)
+    assert "where 0.6 N s/m is stated" in comparison.verdict
 
 
 def test_a_comparison_is_cancelled_by_its_progress() -> None:
@@ -155,8 +155,8 @@ def test_no_law_ends_above_one_that_it_contains(kind: str, seed: int) -> None:
     rig = stepped.drawn(kind, rng)
     told = stepped.record(rig, rng, noise=1e-3, cycles=10)
     known = ss.Oscillator(law=ss.laws.Coulomb(1.0), **rig.stated)
-    found = ss.compare_laws(told, known, laws=["Coulomb", "static", "Stribeck", "compliant", "LuGre"])
-    misfits = {law.name: law.standing.misfit for law in found.candidates}
+    comparison = ss.compare_laws(told, known, laws=["Coulomb", "static", "Stribeck", "compliant", "LuGre"])
+    misfits = {law.name: law.standing.misfit for law in comparison.candidates}
     assert misfits["LuGre"] < 1.05 * min(misfits["Stribeck"], misfits["compliant"])
     if kind != "Stribeck":  # there a contact at the stiffest that is searched leaves up to 1.7 times as much
         assert misfits["compliant"] < 1.1 * misfits["Coulomb"]
@@ -170,8 +170,8 @@ def test_a_law_begun_by_its_units_alone_begins_next_to_rigid_too(kind: str, seed
     rig = stepped.drawn(kind, rng)
     told = stepped.record(rig, rng, noise=1e-3, cycles=10)
     known = ss.Oscillator(law=ss.laws.Coulomb(1.0), **rig.stated)
-    found = ss.compare_laws(told, known, laws=["Coulomb", "Dahl"])
-    misfits = {law.name: law.standing.misfit for law in found.candidates}
+    comparison = ss.compare_laws(told, known, laws=["Coulomb", "Dahl"])
+    misfits = {law.name: law.standing.misfit for law in comparison.candidates}
     assert misfits["Dahl"] < 2 * misfits["Coulomb"]
 
 
@@ -187,15 +187,15 @@ def test_no_sudden_fall_is_told_without_a_load_cell() -> None:
     felt = Seen.of([told], slider()).rests.fall
     assert felt is not None
     assert felt.includes(0.2)
-    found = ss.compare_laws(alone, slider(), laws=["Coulomb", "static"])
-    assert "exceeds" not in found.verdict
+    comparison = ss.compare_laws(alone, slider(), laws=["Coulomb", "static"])
+    assert "exceeds" not in comparison.verdict
 
 
 def test_a_law_with_values_that_units_do_not_tell_is_fitted_as_it_is() -> None:
     """A second search asked its class where to begin, and refused it after the fit."""
     lagging = ss.laws.TimeDelay(ss.laws.LinearSlope(0.9, slope=0.1), lag=1e-3)
-    found = ss.fit_law(record("compliant"), slider().having(law=lagging), intervals=False)
-    assert type(found.law) is ss.laws.TimeDelay
+    fit = ss.fit_law(record("compliant"), slider().having(law=lagging), intervals=False)
+    assert type(fit.law) is ss.laws.TimeDelay
 
 
 def test_what_is_not_fitted_stays_as_it_was_given() -> None:
@@ -247,9 +247,9 @@ def test_a_law_that_is_searched_alone_finds_the_valley_of_a_simpler_one() -> Non
     begun = ss.laws.CompliantContact(
         0.8 * rig.kinetic, stiffness=20 * rig.stiffness, damping=0.1 * np.sqrt(rig.stiffness * rig.mass)
     )
-    found = ss.fit_law(told, ss.Oscillator(law=begun, **rig.stated), intervals=False)
-    assert found.misfit["x"] < 1.2
-    assert found.law.kinetic == pytest.approx(rig.kinetic, rel=0.02)
+    fit = ss.fit_law(told, ss.Oscillator(law=begun, **rig.stated), intervals=False)
+    assert fit.misfit["x"] < 1.2
+    assert fit.law.kinetic == pytest.approx(rig.kinetic, rel=0.02)
 
 
 # ---- the statistics
@@ -272,7 +272,7 @@ def test_a_family_is_rejected_by_the_stories_that_tell_against_it() -> None:
     assert kept(*pair)[0] == {"compliant"}
     assert kept(misfit("LuGre", 5, 1.05), misfit("compliant", 3, 1.0))[0] == {"LuGre", "compliant"}
     few = Evidence({("x", 0): 5.0, ("load", 0): 5.0}, EVIDENCE.noise)
-    assert all(each.kept for each in standings(pair, few)[0])
+    assert all(standing.kept for standing in standings(pair, few)[0])
 
 
 def test_a_rigid_law_may_leave_more_on_a_rough_surface() -> None:
@@ -363,9 +363,9 @@ def test_a_contacts_damping_is_searched_where_the_friction_of_two_records_shows_
         law=ss.laws.CompliantContact(**laws), drive=ss.drives.HarmonicBase(0.65e-3, frequency=2.5), **RIG
     )  # fmt: skip
     runs = [ss.simulate(system.having(frequency=each), duration=2).record(fs=2000) for each in (2.5, 8.7)]
-    found = ss.compare_laws(runs, system, laws=["compliant"])
+    comparison = ss.compare_laws(runs, system, laws=["compliant"])
     for name, true in laws.items():
-        assert getattr(found.fit.law, name) == pytest.approx(true, rel=1e-4)
+        assert getattr(comparison.fit.law, name) == pytest.approx(true, rel=1e-4)
 
 
 def test_a_contact_next_to_rigid_is_no_other_family() -> None:
@@ -391,10 +391,10 @@ def test_the_static_friction_of_a_stribeck_curve_lies_in_its_interval() -> None:
     rig = ss.Rig.air_track()
     truth = ss.Oscillator(law=TRUE["Stribeck"], drive=ss.drives.HarmonicBase(0.65e-3, frequency=2.5), **RIG)
     told = rig.stated(rig.measure(ss.simulate(truth, duration=2.8, rtol=1e-9), fs=FS, rng=5, start=2.0))
-    found = ss.compare_laws(told, slider(), laws=["Coulomb", "Stribeck"])
-    assert (found.law, found.status) == ("Stribeck", "ok")
-    assert found.fit.parameters["static"].includes(1.2)
-    assert found.fit.parameters["static"].value == pytest.approx(1.2, rel=2e-3)
+    comparison = ss.compare_laws(told, slider(), laws=["Coulomb", "Stribeck"])
+    assert (comparison.law, comparison.status) == ("Stribeck", "ok")
+    assert comparison.fit.parameters["static"].includes(1.2)
+    assert comparison.fit.parameters["static"].value == pytest.approx(1.2, rel=2e-3)
     assert set(ss.compare_laws(record("Stribeck"), slider(), laws=["Coulomb", "Stribeck"]).best.left) == {"x", "load"}
 
 
@@ -413,9 +413,9 @@ def test_a_curve_too_steep_to_be_seen_is_no_stribeck_curve() -> None:
     rng = np.random.default_rng([777, 2, len("static")])
     rig = stepped.drawn("static", rng)
     known = ss.Oscillator(law=ss.laws.Coulomb(1.0), **rig.stated)
-    found = ss.compare_laws(stepped.record(rig, rng, noise=1e-3, cycles=10), known, laws=["Coulomb", "Stribeck"])
-    assert found.fit.parameters["speed"].interval[0] == 0
-    assert "along a Stribeck curve" not in found.verdict
+    comparison = ss.compare_laws(stepped.record(rig, rng, noise=1e-3, cycles=10), known, laws=["Coulomb", "Stribeck"])
+    assert comparison.fit.parameters["speed"].interval[0] == 0
+    assert "along a Stribeck curve" not in comparison.verdict
 
 
 # ---- records that tell nothing
@@ -424,11 +424,11 @@ def test_a_curve_too_steep_to_be_seen_is_no_stribeck_curve() -> None:
 def test_wrong_units_are_named_and_nothing_is_concluded() -> None:
     told = record("Coulomb")
     wrong = told.with_samples({**told.samples, "x": 1.12 * told["x"]}, Step("wrong"))
-    found = ss.compare_laws(wrong, slider(), laws=["Coulomb"])
-    assert (found.law, found.family, found.confidence) == (None, None, 0.0)
-    assert "check mass=, stiffness= and the channels' units" in found.status
-    assert "None of the laws tried describes these records" in found.verdict
-    assert not any(each.status == "ok" for each in found.fit.parameters.values())
+    comparison = ss.compare_laws(wrong, slider(), laws=["Coulomb"])
+    assert (comparison.law, comparison.family, comparison.confidence) == (None, None, 0.0)
+    assert "check mass=, stiffness= and the channels' units" in comparison.status
+    assert "None of the laws tried describes these records" in comparison.verdict
+    assert not any(parameter.status == "ok" for parameter in comparison.fit.parameters.values())
 
 
 def test_a_sensor_that_nobody_stated_is_left_out() -> None:
@@ -436,13 +436,13 @@ def test_a_sensor_that_nobody_stated_is_left_out() -> None:
     clean = ss.Oscillator(law=TRUE["Coulomb"], drive=ss.drives.HarmonicBase(1.1e-3, frequency=8.7), **RIG)
     rig = ss.Rig.perfect("x", "z", "a").having("x", white=1e-6).having("z", white=1e-6)
     rig = rig.having("a", mount=ss.rig.Mount(60.0, 0.05))
-    found = ss.compare_laws(
+    comparison = ss.compare_laws(
         rig.measure(ss.simulate(clean, duration=2.5, rtol=1e-9), fs=FS, rng=3, start=2.0), slider(),
         laws=["Coulomb", "compliant"],
     )  # fmt: skip
-    assert "a is left out" in found.status
-    assert set(found.best.left) == {"x"}
-    assert found.fit.law.kinetic == pytest.approx(0.95, rel=0.02)
+    assert "a is left out" in comparison.status
+    assert set(comparison.best.left) == {"x"}
+    assert comparison.fit.law.kinetic == pytest.approx(0.95, rel=0.02)
 
 
 def test_a_base_that_was_not_recorded_is_asked_for() -> None:
@@ -457,8 +457,8 @@ def test_a_base_that_was_not_recorded_is_asked_for() -> None:
 
 def test_fewer_strokes_than_parameters_are_told() -> None:
     short = record("LuGre").rows(0, int(FS / 8.7))
-    found = ss.fit_law(short, slider().having(law=TRUE["LuGre"]), free=["kinetic", "static", "speed"], intervals=False)
-    assert "for 4 parameters: give a record of more cycles" in found.status  # the damper is one
+    fit = ss.fit_law(short, slider().having(law=TRUE["LuGre"]), free=["kinetic", "static", "speed"], intervals=False)
+    assert "for 4 parameters: give a record of more cycles" in fit.status  # the damper is one
 
 
 def test_forces_are_no_surer_than_the_bases_calibration() -> None:
@@ -466,18 +466,18 @@ def test_forces_are_no_surer_than_the_bases_calibration() -> None:
 
     A spring of 1 % more does so, too, and is told from the gain of x no better than both are stated.
     """
-    found = ss.compare_laws(record("Coulomb"), slider(), laws=["Coulomb"], calibration=0.02)
-    level = found.fit.parameters["kinetic"]
+    comparison = ss.compare_laws(record("Coulomb"), slider(), laws=["Coulomb"], calibration=0.02)
+    level = comparison.fit.parameters["kinetic"]
     assert 0.02 * level.value <= level.sd <= 0.02 * 2**0.5 * level.value
-    assert found.fit.parameters["x.gain"].sd < 0.02 / 2**0.5 * 1.1
+    assert comparison.fit.parameters["x.gain"].sd < 0.02 / 2**0.5 * 1.1
 
 
 def test_forces_are_no_surer_than_the_mass_where_no_cell_feels_them() -> None:
     """The spring follows the mass that is stated, by the frequency; its interval was a fiftieth of what that is off."""
     told = record("Coulomb", frequency=6.0)
     moved = ss.Record.of({name: told[name] for name in "xz"}, fs=FS)
-    found = ss.compare_laws(moved, slider().having(mass=0.985 * RIG["mass"]), laws=["Coulomb"], calibration=0.01)
-    spring, level = found.fit.parameters["stiffness"], found.fit.parameters["kinetic"]
+    comparison = ss.compare_laws(moved, slider().having(mass=0.985 * RIG["mass"]), laws=["Coulomb"], calibration=0.01)
+    spring, level = comparison.fit.parameters["stiffness"], comparison.fit.parameters["kinetic"]
     assert spring.value == pytest.approx(0.985 * RIG["stiffness"], rel=0.005)
     assert spring.includes(RIG["stiffness"])
     assert level.includes(0.95)
@@ -508,9 +508,9 @@ def test_the_command_fits_and_writes_a_page(tmp_path: Path) -> None:
     )  # fmt: skip
     assert answer.exit_code == 0, answer.output
     assert "compliant contact" in answer.output
-    told = json.loads((tmp_path / "out" / "results.json").read_text("utf-8"))
-    assert told["law"] == "compliant"
-    assert set(told["files"]) >= {"report.html", "results.json", "figures/fit-1.svg"}
+    data = json.loads((tmp_path / "out" / "results.json").read_text("utf-8"))
+    assert data["law"] == "compliant"
+    assert set(data["files"]) >= {"report.html", "results.json", "figures/fit-1.svg"}
     page = (tmp_path / "out" / "report.html").read_text("utf-8")
     assert "How the laws stand" in page
 
@@ -522,7 +522,7 @@ def test_the_command_fits_a_curve_where_no_motion_is_measured(tmp_path: Path) ->
     file = ss.write_record(told, tmp_path / "sweep.csv")
     answer = CliRunner().invoke(main, ["fit", str(file), "--json"])
     assert answer.exit_code == 0, answer.output
-    found = {each["name"]: each["value"] for each in json.loads(answer.output)["estimates"]}
+    found = {load["name"]: load["value"] for load in json.loads(answer.output)["estimates"]}
     assert found["sliding friction"] == pytest.approx(1.0, rel=0.02)
 
 

@@ -64,7 +64,9 @@ def asked(question: Callable[[], Any]) -> Any:
 
 
 def estimates(findings: Any) -> list[Any]:
-    return [[each.name, each.value, *each.interval, str(each.status)] for each in findings.estimates]
+    return [
+        [estimate.name, estimate.value, *estimate.interval, str(estimate.status)] for estimate in findings.estimates
+    ]
 
 
 def plain(value: Any) -> Any:
@@ -90,10 +92,10 @@ def same(one: Any, other: Any) -> bool:
 def of(checkout: Path) -> dict[str, Any]:
     """The results of a checkout, in a process of its own."""
     environment = {**os.environ, "PYTHONPATH": str(checkout / "src")}
-    told = subprocess.run(
+    run = subprocess.run(
         [sys.executable, "-W", "ignore", __file__], env=environment, stdout=subprocess.PIPE, check=True, text=True
     )
-    return dict(json.loads(line) for line in told.stdout.splitlines())
+    return dict(json.loads(line) for line in run.stdout.splitlines())
 
 
 def main() -> None:
