@@ -106,7 +106,7 @@ def test_the_tutorial_on_a_real_record(dataset: Callable[[str], Path]) -> None:
     (code,) = blocks(DOCS / "tutorial.md", "{code-block} python")
     names: dict[str, object] = {"ss": ss}
     exec(compile(code, "tutorial.md", "exec", dont_inherit=True), names)
-    levels = [name.level.value for name in names["found"].values()]  # type: ignore[attr-defined]
+    levels = [findings.level.value for findings in names["findings"].values()]  # type: ignore[attr-defined]
     assert levels == pytest.approx([0.69, 1.31], abs=0.02)
     assert "not the whole of it" in names["law"].status  # type: ignore[attr-defined]
 

@@ -279,8 +279,8 @@ def analyze_decay(
     >>> import stickslip as ss
     >>> slider = ss.Oscillator(mass=1.0, stiffness=10.0, damping=0.2, law=ss.laws.Coulomb(0.2))
     >>> run = ss.simulate(slider, duration=40.0, start={"x": 1.0})
-    >>> found = analyze_decay(run.record(fs=100), method="thesis", stiffness=10.0)
-    >>> round(found.decay.best.damping_ratio.value, 3), round(found.decay.dry_force.value, 2)
+    >>> findings = analyze_decay(run.record(fs=100), method="thesis", stiffness=10.0)
+    >>> round(findings.decay.best.damping_ratio.value, 3), round(findings.decay.dry_force.value, 2)
     (0.032, 0.2)
     """
     require_record(record)

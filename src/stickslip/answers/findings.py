@@ -121,8 +121,8 @@ class Findings(Answers):
     Examples
     --------
     >>> import stickslip as ss
-    >>> found = ss.analyze(ss.datasets.demo(), mass=2.42, stiffness=2310, damping=0.12)
-    >>> found.loops is found.results["loops"], found.pull is None
+    >>> findings = ss.analyze(ss.datasets.demo(), mass=2.42, stiffness=2310, damping=0.12)
+    >>> findings.loops is findings.results["loops"], findings.pull is None
     (True, True)
     """
 

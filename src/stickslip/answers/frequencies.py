@@ -154,8 +154,8 @@ def time_frequency(
     >>> import stickslip as ss
     >>> case = ss.scenarios.get("THESIS compliant 2.5Hz fk=1.1 Ky=192000 z.0174(k+Ky)")
     >>> record = ss.simulate(case.system, cycles=8).record(fs=4000).between(1.0, 3.2)
-    >>> found = time_frequency(record, mass=2.42, stiffness=2310)
-    >>> found.mechanism.name, found.microslips.kind
+    >>> maps = time_frequency(record, mass=2.42, stiffness=2310)
+    >>> maps.mechanism.name, maps.microslips.kind
     ('double stick-slip', 'double stick-slip')
     """
     checked_mass(mass, stiffness)

@@ -171,8 +171,8 @@ def compare_joints(
     ...     v, a = np.gradient(q, 1 / 200), np.gradient(np.gradient(q, 1 / 200), 1 / 200)
     ...     torque = 0.02 * a + 0.03 * v + 0.06 * np.sign(v) + np.random.default_rng(seed).normal(0, 0.01, t.size)
     ...     return Record.of({"theta": q, "force": torque}, fs=200, units={"force": "N m"})
-    >>> found = [analyze_joint(moved(seed, speed), gravity=False) for seed, speed in enumerate((0.2, 0.3))]
-    >>> compare_joints(found, gravity=False).forward.includes(0.06)
+    >>> joints = [analyze_joint(moved(seed, speed), gravity=False) for seed, speed in enumerate((0.2, 0.3))]
+    >>> compare_joints(joints, gravity=False).forward.includes(0.06)
     True
     """
     require_several(findings)

@@ -69,8 +69,9 @@ def analyze_squeaks(
     --------
     >>> import stickslip as ss
     >>> run = ss.simulate(ss.squeak.squeak_rig("wet", load=6.13), duration=0.8)
-    >>> found = analyze_squeaks(ss.squeak.squeak_record(run, snr=30, rng=1), normal=6.13)
-    >>> found.squeaks.kind, bool(475 < found.squeaks.frequency.value < 500), found.coefficient.includes(8 / 6.13)
+    >>> findings = analyze_squeaks(ss.squeak.squeak_record(run, snr=30, rng=1), normal=6.13)
+    >>> pitch = findings.squeaks.frequency.value
+    >>> findings.squeaks.kind, bool(475 < pitch < 500), findings.coefficient.includes(8 / 6.13)
     ('squeak', True, True)
     """
     require_record(record)

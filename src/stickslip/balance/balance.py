@@ -314,8 +314,8 @@ def pulled_slider(record: Record, *, channel: str = "load") -> Pull:
     --------
     >>> t = np.arange(4000) / 1000
     >>> force = 0.3 + 0.1 * (t % 0.5) + 1e-4 * np.random.default_rng(0).standard_normal(t.size)
-    >>> found = pulled_slider(Record.of({"load": force}, fs=1000))
-    >>> found.regime, round(found.loading_rate.value, 2)
+    >>> slider = pulled_slider(Record.of({"load": force}, fs=1000))
+    >>> slider.regime, round(slider.loading_rate.value, 2)
     ('stick-slip', 0.1)
     """
     from scipy.ndimage import median_filter

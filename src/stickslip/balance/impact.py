@@ -105,8 +105,8 @@ def impact_test(record: Record, *, mass: Constant | None = None) -> ImpactTest:
     >>> noise = np.random.default_rng(1).standard_normal((2, t.size))
     >>> a = ring(47.0, 0.02) + 0.5 * ring(125.0, 0.1) + 1e-3 * noise[0]
     >>> load = -2.42 * ring(47.0, 0.02) + 0.2 * ring(250.0, 0.05) + 1e-3 * noise[1]
-    >>> found = impact_test(Record.of({"a": a, "load": load}, fs=4000), mass=2.42)
-    >>> [(each.name, round(each.frequency.value)) for each in found.resonances]
+    >>> mount = impact_test(Record.of({"a": a, "load": load}, fs=4000), mass=2.42)
+    >>> [(each.name, round(each.frequency.value)) for each in mount.resonances]
     [('coupled contact', 47), ('mount of the accelerometer', 125), ('mount of the load cell', 250)]
     """
     channels = [name for name in SENSED if name in record]

@@ -121,8 +121,8 @@ def sensor_delay(
     >>> t, rng = np.arange(8000) / 2000, np.random.default_rng(1)
     >>> x = 1e-3 * np.sin(60 * (t - 1.26e-3)) + 1e-6 * rng.standard_normal(t.size)
     >>> a = -3.6 * np.sin(60 * t) + 0.04 * rng.standard_normal(t.size)
-    >>> found = sensor_delay(Record.of({"x": x, "a": a}, fs=2000.0))
-    >>> round(found.delay.value * 1e3, 2), round(found.gain.value, 2)
+    >>> lag = sensor_delay(Record.of({"x": x, "a": a}, fs=2000.0))
+    >>> round(lag.delay.value * 1e3, 2), round(lag.gain.value, 2)
     (-1.26, 1.0)
     """
     records = [record] if isinstance(record, Record) else list(record)

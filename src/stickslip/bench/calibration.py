@@ -99,8 +99,8 @@ def calibrate(
     >>> weights = np.array([0.0, 1.0, 2.0, 3.0, 0.0])
     >>> rng = np.random.default_rng(1)
     >>> read = np.repeat(0.1 + 1.02 * weights, 2000) + 0.002 * rng.standard_normal(10000)
-    >>> found = calibrate(Record.of({"load": read}, fs=1000), channel="load", reference=weights)
-    >>> found.gain.includes(1.02), found.zero.includes(0.1)
+    >>> calibration = calibrate(Record.of({"load": read}, fs=1000), channel="load", reference=weights)
+    >>> calibration.gain.includes(1.02), calibration.zero.includes(0.1)
     (True, True)
     """
     values = np.asarray(reference, dtype=float)

@@ -103,8 +103,9 @@ def free_vibration(
     >>> slider = ss.Oscillator(mass=2.42, stiffness=2310, damping=0.12, law=ss.laws.Coulomb(0.0))
     >>> run = ss.simulate(slider, duration=6.0, start={"x": 5e-3})
     >>> rig = ss.Rig().having("a", mount=None)
-    >>> found = free_vibration(rig.measure(run, fs=2000, rng=1))
-    >>> found.frequency.includes(math.sqrt(2310 / 2.42) / 2 / math.pi), found.delays["a"].includes(0.0389 / 30.91)
+    >>> vibration = free_vibration(rig.measure(run, fs=2000, rng=1))
+    >>> natural = math.sqrt(2310 / 2.42) / 2 / math.pi
+    >>> vibration.frequency.includes(natural), vibration.delays["a"].includes(0.0389 / 30.91)
     (True, True)
     """
     record.require_clean("x", question=QUESTION, samples=100)
@@ -248,8 +249,8 @@ def added_mass(bare: Estimate, loaded: Estimate, added: Constant) -> MassAndSpri
     Examples
     --------
     >>> bare, loaded = (Estimate.normal("f", f, sd=1e-5, unit="Hz", method="") for f in (4.917206, 4.476460))
-    >>> found = added_mass(bare, loaded, "0.5 ± 0.0005 kg")
-    >>> round(found.mass.value, 3), round(found.stiffness.value)
+    >>> spring = added_mass(bare, loaded, "0.5 ± 0.0005 kg")
+    >>> round(spring.mass.value, 3), round(spring.stiffness.value)
     (2.42, 2310)
     """
     weight = Estimate.stated("added mass", added, "kg")
@@ -398,8 +399,8 @@ def onto_stick(record: Record, *, mass: Constant, stiffness: Constant) -> OntoSt
     >>> slider = ss.Oscillator(mass=2.42, stiffness=2310, damping=0.12, law=contact)
     >>> run = ss.simulate(slider, duration=2.0, start={"x": 2.3e-3})
     >>> record = ss.Rig().having("a", white=0.004).measure(run, fs=4000, rng=1)
-    >>> found = onto_stick(record, mass=2.42, stiffness=2310)
-    >>> round(found.frequency.value), found.stiffness.includes(192000)
+    >>> coupled = onto_stick(record, mass=2.42, stiffness=2310)
+    >>> round(coupled.frequency.value), coupled.stiffness.includes(192000)
     (45, True)
     """
     weight, spring = Estimate.stated("mass", mass, "kg"), Estimate.stated("stiffness", stiffness, "N/m")

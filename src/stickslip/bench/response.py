@@ -105,8 +105,8 @@ def frequency_response(
     >>> rng = np.random.default_rng(1)
     >>> force = rng.standard_normal(20_000)
     >>> record = Record.of({"force": force, "x": 2 * force + 0.1 * rng.standard_normal(20_000)}, fs=100)
-    >>> found = frequency_response(record, channels=("force", "x"))
-    >>> bool(np.abs(np.abs(found.h1) - 2).max() < 0.2), bool(found.coherence.min() > 0.98)
+    >>> response = frequency_response(record, channels=("force", "x"))
+    >>> bool(np.abs(np.abs(response.h1) - 2).max() < 0.2), bool(response.coherence.min() > 0.98)
     (True, True)
     """
     record.require_clean(*channels, question=QUESTION, samples=16 * SEGMENTS)
@@ -266,8 +266,8 @@ def modal_fit(
     >>> drive = ss.drives.Recorded(np.random.default_rng(1).standard_normal(800).cumsum(), 20.0, on="force")
     >>> slider = ss.Oscillator(mass=2.42, stiffness=2310, damping=3.0, law=ss.laws.Coulomb(0.0), drive=drive)
     >>> record = ss.Rig.perfect("x", "force").measure(ss.simulate(slider, duration=39.0), fs=500)
-    >>> found = modal_fit(record, channels=("force", "x"))
-    >>> round(found.mass.value, 2), round(found.stiffness.value), round(found.damping.value, 1)
+    >>> modes = modal_fit(record, channels=("force", "x"))
+    >>> round(modes.mass.value, 2), round(modes.stiffness.value), round(modes.damping.value, 1)
     (2.42, 2310, 3.0)
     """
     if channels[0] not in INPUTS or damper not in ("ground", "base"):

@@ -113,8 +113,8 @@ def at_rest(record: Record) -> AtRest:
     --------
     >>> noise = np.random.default_rng(1).standard_normal((2, 20000))
     >>> readings = np.round((3e-6 + 1e-6 * noise[0]) / 2.5e-6) * 2.5e-6
-    >>> found = at_rest(Record.of({"x": readings, "a": 0.2 + 0.04 * noise[1]}, fs=2000)).sensors
-    >>> found["x"].zero.includes(3e-6), found["x"].noise.includes(1e-6), found["a"].noise.includes(0.04)
+    >>> sensors = at_rest(Record.of({"x": readings, "a": 0.2 + 0.04 * noise[1]}, fs=2000)).sensors
+    >>> sensors["x"].zero.includes(3e-6), sensors["x"].noise.includes(1e-6), sensors["a"].noise.includes(0.04)
     (True, True, True)
     """
     record.require_clean(*record, question=QUESTION, samples=LEAST)

@@ -130,8 +130,8 @@ def transition(
     >>> import stickslip as ss
     >>> case = ss.scenarios.get("THESIS compliant 2.5Hz fk=1.1 Ky=192000 z.0174(k+Ky)")
     >>> record = ss.simulate(case.system, cycles=8).record(fs=4000).between(1.0, 3.2)
-    >>> found = transition(record, mass=2.42, stiffness=2310)
-    >>> round(found.frequency.value, 1), round(found.damping.value, 3), round(found.stiffness.value / 1000)
+    >>> change = transition(record, mass=2.42, stiffness=2310)
+    >>> round(change.frequency.value, 1), round(change.damping.value, 3), round(change.stiffness.value / 1000)
     (45.1, 0.017, 192)
     """
     ringing = find_ringing(record, channel, question=QUESTION, mass=mass, stiffness=stiffness)

@@ -122,8 +122,8 @@ def find_microslips(
     >>> import stickslip as ss
     >>> case = ss.scenarios.get("THESIS compliant 2.5Hz fk=1.1 Ky=192000 z.0174(k+Ky)")
     >>> record = ss.simulate(case.system, cycles=8).record(fs=4000).between(1.0, 3.2)
-    >>> found = find_microslips(record)
-    >>> found.kind, round(found.per_stick.value)
+    >>> slips = find_microslips(record)
+    >>> slips.kind, round(slips.per_stick.value)
     ('double stick-slip', 2)
     """
     return microslips_of(find_ringing(record, channel, question=QUESTION, mass=mass, stiffness=stiffness))

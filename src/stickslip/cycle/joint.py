@@ -165,8 +165,8 @@ def regress_joint(
     >>> v, a = np.gradient(q, 1 / 200), np.gradient(np.gradient(q, 1 / 200), 1 / 200)
     >>> torque = 0.02 * a + 0.03 * v + 0.5 * np.sin(q) + (0.06 + 0.1 * abs(0.5 * np.sin(q))) * np.sign(v)
     >>> torque += np.random.default_rng(0).normal(0, 0.01, t.size)
-    >>> found = regress_joint(Record.of({"theta": q, "force": torque}, fs=200, units={"force": "N m"}))
-    >>> found.forward.includes(0.06), found.load.includes(0.1), round(found.inertia.value, 3)
+    >>> regression = regress_joint(Record.of({"theta": q, "force": torque}, fs=200, units={"force": "N m"}))
+    >>> regression.forward.includes(0.06), regression.load.includes(0.1), round(regression.inertia.value, 3)
     (True, True, 0.02)
     """
     record, data = joint_data(record, gravity, inertia=inertia, kp=kp, kd=kd, torque_constant=torque_constant)

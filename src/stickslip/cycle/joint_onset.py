@@ -110,8 +110,8 @@ def joint_backlash(record: Record, *, joint: JointFriction) -> JointBacklash:
     >>> torque = 0.002 * a + 0.06 * np.sign(v) + 0.03 * v + np.random.default_rng(0).normal(0, 0.003, t.size)
     >>> turned = np.round((100 * (q + 0.002 * np.sign(v))) / 0.01) * 0.01
     >>> log = Record.of({"theta": q, "motor": turned, "force": torque}, fs=400, units={"motor": "rad", "force": "N m"})
-    >>> found = joint_backlash(log, joint=regress_joint(log, gravity=False))
-    >>> found.claimed, found.backlash.includes(0.004), round(found.ratio, 1)
+    >>> backlash = joint_backlash(log, joint=regress_joint(log, gravity=False))
+    >>> backlash.claimed, backlash.backlash.includes(0.004), round(backlash.ratio, 1)
     (True, True, 100.0)
     """
     require_record(record)
@@ -213,8 +213,8 @@ def joint_breakaway(record: Record, *, joint: JointFriction) -> JointBreakaway:
     >>> torque = np.where(moving, 3.0 * way + 0.01 * np.gradient(v, t), way * 1.4 * (t % 4))
     >>> torque += np.random.default_rng(0).normal(0, 0.02, t.size)
     >>> log = Record.of({"theta": q, "force": torque}, fs=1000, units={"force": "N m"})
-    >>> found = joint_breakaway(log, joint=regress_joint(log, gravity=False))
-    >>> 1.35 < found.ratio.value < 1.45
+    >>> breakaway = joint_breakaway(log, joint=regress_joint(log, gravity=False))
+    >>> 1.35 < breakaway.ratio.value < 1.45
     True
     """
     require_record(record)

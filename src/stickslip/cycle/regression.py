@@ -128,8 +128,8 @@ def regress_friction(
     >>> v, a = np.gradient(x, 1e-3), np.gradient(np.gradient(x, 1e-3), 1e-3)
     >>> noise = np.random.default_rng(0).normal(0, 0.3, t.size)
     >>> force = 3.0 * a + 5.0 * v + 2.0 * np.sign(v) + 0.5 + noise
-    >>> found = regress_friction(Record.of({"x": x, "force": force}, fs=1000))
-    >>> round(found.inertia.value, 1), round(found.coulomb.value, 1), found.offset.includes(0.5)
+    >>> regression = regress_friction(Record.of({"x": x, "force": force}, fs=1000))
+    >>> round(regression.inertia.value, 1), round(regression.coulomb.value, 1), regression.offset.includes(0.5)
     (3.0, 2.0, True)
     """
     question = "the regression of a force"

@@ -131,8 +131,8 @@ def slip_ringing(record: Record, *, contact: str | None = None) -> SlipRinging:
     >>> since, way = np.mod(time + 0.5, 1.0), np.sign(np.cos(np.pi * time))
     >>> ring = np.where(way > 0, np.cos(2 * np.pi * 47 * since), np.cos(2 * np.pi * 54 * since))
     >>> friction = way * (2 + 0.6 * np.exp(-since / 0.1) * ring)
-    >>> found = slip_ringing(ss.Record.of({"x": np.sin(np.pi * time) / np.pi, "friction": friction}, fs=1000))
-    >>> round(found.forward.value, 1), round(found.back.value, 1), found.verdict
+    >>> ringing = slip_ringing(ss.Record.of({"x": np.sin(np.pi * time) / np.pi, "friction": friction}, fs=1000))
+    >>> round(ringing.forward.value, 1), round(ringing.back.value, 1), ringing.verdict
     (47.0, 54.0, 'higher back')
     """
     record.require("friction", question=QUESTION)

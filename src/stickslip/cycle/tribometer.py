@@ -152,8 +152,8 @@ def friction_coefficients(
     >>> v = 2e-3 * np.pi * 2 * np.cos(2 * np.pi * 2 * t)
     >>> friction = 3.0 * np.sign(v) + np.random.default_rng(0).normal(0, 0.02, t.size)
     >>> stroke = Record.of({"x": 2e-3 * np.sin(2 * np.pi * 2 * t), "friction": friction}, fs=1000)
-    >>> found = friction_coefficients(stroke, normal="10 N")
-    >>> found.plateau.includes(0.3), found.wear_in is None
+    >>> coefficients = friction_coefficients(stroke, normal="10 N")
+    >>> coefficients.plateau.includes(0.3), coefficients.wear_in is None
     (True, True)
     """
     require_record(record)

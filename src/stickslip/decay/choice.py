@@ -305,8 +305,8 @@ def choose(
     >>> from stickslip.decay.motions import free_decay
     >>> t, rng = np.arange(480) / 40, np.random.default_rng(1)
     >>> x, _, _ = free_decay(t, [6.28, 0.02, 0.02, 0, 1, 0.3, 0, 0, 0, 0, 0.5, 0])
-    >>> found = choose(t, x + 1e-3 * rng.standard_normal(480), fs=40, start=[6.2, 0.02, 0.02, 0, 1, 0.3])
-    >>> found.model
+    >>> choice = choose(t, x + 1e-3 * rng.standard_normal(480), fs=40, start=[6.2, 0.02, 0.02, 0, 1, 0.3])
+    >>> choice.model
     'both'
     """
     unknown = [name for name in candidates if name not in MOTIONS]

@@ -299,8 +299,8 @@ def log_decrement(record: Record, *, channel: str | None = None) -> EnvelopeDeca
     Examples
     --------
     >>> t = np.arange(4000) / 200
-    >>> found = log_decrement(Record.of({"x": np.exp(-0.1 * t) * np.cos(2 * np.pi * t)}, fs=200))
-    >>> round(found.damping_ratio.value * 2 * np.pi, 3)
+    >>> decay = log_decrement(Record.of({"x": np.exp(-0.1 * t) * np.cos(2 * np.pi * t)}, fs=200))
+    >>> round(decay.damping_ratio.value * 2 * np.pi, 3)
     0.1
     """
     ring_down, sizes, numbers = _extremes(record, channel)
@@ -346,8 +346,8 @@ def linear_decrement(record: Record, *, channel: str | None = None) -> EnvelopeD
     >>> t = np.arange(2000) / 200
     >>> half = np.minimum(np.floor(2 * t), 9)
     >>> x = (0.1 - 0.01 * half - 0.005) * np.cos(2 * np.pi * t) + 0.005 * (-1) ** half
-    >>> found = linear_decrement(Record.of({"x": np.where(t < 4.5, x, 0.0)}, fs=200))
-    >>> round(found.dry_displacement.value, 4)
+    >>> decay = linear_decrement(Record.of({"x": np.where(t < 4.5, x, 0.0)}, fs=200))
+    >>> round(decay.dry_displacement.value, 4)
     0.005
     """
     ring_down, sizes, numbers = _extremes(record, channel)
@@ -397,8 +397,8 @@ def extreme_decay(
     >>> t = np.arange(2000) / 200
     >>> half = np.minimum(np.floor(2 * t), 9)
     >>> x = (0.1 - 0.01 * half - 0.005) * np.cos(2 * np.pi * t) + 0.005 * (-1) ** half
-    >>> found = extreme_decay(Record.of({"x": np.where(t < 4.5, x, 0.0)}, fs=200))
-    >>> round(found.dry_displacement.value, 4), abs(found.damping_ratio.value) < 1e-4
+    >>> decay = extreme_decay(Record.of({"x": np.where(t < 4.5, x, 0.0)}, fs=200))
+    >>> round(decay.dry_displacement.value, 4), abs(decay.damping_ratio.value) < 1e-4
     (0.005, True)
     """
     ring_down, sizes, numbers = _extremes(record, channel)
@@ -452,8 +452,8 @@ def hilbert_decay(record: Record, *, channel: str | None = None) -> EnvelopeDeca
     Examples
     --------
     >>> t = np.arange(8000) / 200
-    >>> found = hilbert_decay(Record.of({"x": np.exp(-0.1 * t) * np.cos(2 * np.pi * t)}, fs=200))
-    >>> round(found.damping_ratio.value * 2 * np.pi, 2)
+    >>> decay = hilbert_decay(Record.of({"x": np.exp(-0.1 * t) * np.cos(2 * np.pi * t)}, fs=200))
+    >>> round(decay.damping_ratio.value * 2 * np.pi, 2)
     0.1
     """
     from scipy.signal import hilbert

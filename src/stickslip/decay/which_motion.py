@@ -116,8 +116,8 @@ def choose_motion(
     >>> from stickslip.decay.motions import free_decay
     >>> t, rng = np.arange(600) / 50, np.random.default_rng(1)
     >>> x, _, _ = free_decay(t, [6.28, 0.02, 0.02, 0, 1, 0.3, 0, 0, 0, 0, 0.5, 0])
-    >>> found = choose_motion(Record.of({"x": x + 1e-3 * rng.standard_normal(t.size)}, fs=50))
-    >>> found.model, found.dry_displacement.includes(0.02), found.dry_displacement_any.includes(0.02)
+    >>> choice = choose_motion(Record.of({"x": x + 1e-3 * rng.standard_normal(t.size)}, fs=50))
+    >>> choice.model, choice.dry_displacement.includes(0.02), choice.dry_displacement_any.includes(0.02)
     ('both', True, True)
     """
     releases = find_releases(record, channel=channel)

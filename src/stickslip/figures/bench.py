@@ -40,8 +40,8 @@ def plot_calibrations(calibrations: Mapping[str, Calibration]) -> Figure:
     --------
     >>> from stickslip import Record, bench
     >>> read = np.repeat([0.0, 1.0, 2.0, 3.0], 500) + 0.01 * np.random.default_rng(1).standard_normal(2000)
-    >>> found = bench.calibrate(Record.of({"load": read}, fs=500), channel="load", reference=[0, 1, 2, 3])
-    >>> len(plot_calibrations({"load": found}).axes)
+    >>> calibration = bench.calibrate(Record.of({"load": read}, fs=500), channel="load", reference=[0, 1, 2, 3])
+    >>> len(plot_calibrations({"load": calibration}).axes)
     1
     """
     figure, ax = new_figure(height=3.0)

@@ -145,8 +145,8 @@ def plot_stability(stability: xr.Dataset, *, labels: tuple[str, str] | None = No
     >>> from stickslip.laws import LinearSlope
     >>> from stickslip.squeak import stability_map
     >>> block = Oscillator(1.0, 100.0, LinearSlope(1.0, slope=-0.1), Belt(0.2), damping=0.3)
-    >>> found = stability_map(block, grid={"slope": [-0.5, -0.1, 0.1], "stiffness": [50.0, 100.0]})
-    >>> plot_stability(found).axes[0].get_xlabel()
+    >>> chart = stability_map(block, grid={"slope": [-0.5, -0.1, 0.1], "stiffness": [50.0, 100.0]})
+    >>> plot_stability(chart).axes[0].get_xlabel()
     'stiffness'
     """
     from matplotlib.colors import ListedColormap
@@ -197,8 +197,8 @@ def plot_bifurcation(diagram: Bifurcation) -> Figure:
     Examples
     --------
     >>> import stickslip as ss
-    >>> found = ss.bifurcation(ss.scenarios.forced(0.8, 0.5), "kinetic", values=[0.5, 0.7, 0.9])
-    >>> len(plot_bifurcation(found).axes)
+    >>> diagram = ss.bifurcation(ss.scenarios.forced(0.8, 0.5), "kinetic", values=[0.5, 0.7, 0.9])
+    >>> len(plot_bifurcation(diagram).axes)
     2
     """
     figure, (top, bottom) = new_figure(2, height=4.6, heights=(3, 1))
@@ -296,8 +296,8 @@ def plot_basins(basins: Basins, *, ax: Axes | None = None) -> Axes:
     --------
     >>> import stickslip as ss
     >>> slider = ss.scenarios.forced(0.8, 0.7, static_ratio=1.5)
-    >>> found = ss.basins(slider, grid={"x": [-1.0, 0.0, 1.0], "v": [-1.0, 0.0, 1.0]})
-    >>> plot_basins(found).get_xlabel()
+    >>> basins = ss.basins(slider, grid={"x": [-1.0, 0.0, 1.0], "v": [-1.0, 0.0, 1.0]})
+    >>> plot_basins(basins).get_xlabel()
     'x [m]'
     """
     from matplotlib.colors import ListedColormap
@@ -352,8 +352,8 @@ def plot_boundary(boundary: Boundary, *, ax: Axes | None = None) -> Axes:
     >>> import stickslip as ss
     >>> slider = ss.scenarios.forced(0.8, 0.5)
     >>> along = {"frequency": [0.1, 0.2]}
-    >>> found = ss.maps.boundary(slider, "kinetic", between=(0.05, 0.99), along=along, precision=1e-3)
-    >>> plot_boundary(found).get_lines()[1].get_label()
+    >>> border = ss.maps.boundary(slider, "kinetic", between=(0.05, 0.99), along=along, precision=1e-3)
+    >>> plot_boundary(border).get_lines()[1].get_label()
     'Den Hartog (1931)'
     """
     ax = axes_of(ax)

@@ -350,8 +350,8 @@ def minimise(
     Examples
     --------
     >>> x = np.linspace(0, 3, 50)
-    >>> found = minimise(lambda b: b[0] * np.exp(-b[1] * x), 2 * np.exp(-0.7 * x), [1.0, 1.0])
-    >>> found.parameters.round(9).tolist()
+    >>> minimum = minimise(lambda b: b[0] * np.exp(-b[1] * x), 2 * np.exp(-0.7 * x), [1.0, 1.0])
+    >>> minimum.parameters.round(9).tolist()
     [2.0, 0.7]
     """
     data, place = np.asarray(data, dtype=float), np.array(start, dtype=float)

@@ -195,8 +195,8 @@ def fit_curve(
     >>> t = np.arange(20000) / 2000
     >>> v = 0.1 * np.sin(2 * np.pi * t)
     >>> f = np.sign(v) * (1.0 + 0.4 * np.exp(-np.abs(v) / 0.02)) + np.random.default_rng(0).normal(0, 0.02, t.size)
-    >>> found = fit_curve(Record.of({"v": v, "friction": f}, fs=2000), curve="stribeck")
-    >>> round(found.parameters["kinetic"].value, 2), found.parameters["exponent"].includes(1.0)
+    >>> fit = fit_curve(Record.of({"v": v, "friction": f}, fs=2000), curve="stribeck")
+    >>> round(fit.parameters["kinetic"].value, 2), fit.parameters["exponent"].includes(1.0)
     (1.0, True)
     """
     if curve not in CURVES:

@@ -142,8 +142,8 @@ def friction_memory(
     ...     t = np.arange(16000) / 4000
     ...     late = np.sign(np.cos(2 * np.pi * hz * (t - 8e-3)))
     ...     records.append(Record.of({"x": np.sin(2 * np.pi * hz * t), "friction": late}, fs=4000))
-    >>> found = friction_memory(records)
-    >>> found.memory, found.rotation, found.delay.includes(8e-3)
+    >>> memory = friction_memory(records)
+    >>> memory.memory, memory.rotation, memory.delay.includes(8e-3)
     ('time delay', 'anticlockwise', True)
     """
     given = [records] if isinstance(records, Record) else list(records)

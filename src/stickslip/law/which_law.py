@@ -156,8 +156,8 @@ def fit_law(
     ... )
     >>> rig = ss.Rig.perfect("x", "z").having("x", white=1e-6)
     >>> record = rig.measure(ss.simulate(slider, cycles=20), fs=2000, rng=1)
-    >>> found = fit_law(record.rows(2000, len(record)), slider.having(kinetic=1.0))
-    >>> bool(abs(found.law.kinetic / 1.1 - 1) < 0.01)
+    >>> fit = fit_law(record.rows(2000, len(record)), slider.having(kinetic=1.0))
+    >>> bool(abs(fit.law.kinetic / 1.1 - 1) < 0.01)
     True
     """
     require_record(record)

@@ -190,12 +190,12 @@ def bifurcation(
     Examples
     --------
     >>> from stickslip.scenarios import forced
-    >>> found = bifurcation(forced(0.8, 1.0, static_ratio=1.5), "amplitude", values=[1.2, 1.3, 1.4, 1.45, 1.6])
-    >>> for change in found.changes:
+    >>> diagram = bifurcation(forced(0.8, 1.0, static_ratio=1.5), "amplitude", values=[1.2, 1.3, 1.4, 1.45, 1.6])
+    >>> for change in diagram.changes:
     ...     print(change.direction, round(change.value, 5), change.before, "->", change.after)
     up 1.5 held -> no stops
     down 1.37556 no stops -> 2 + 0 stops
-    >>> found.coexisting
+    >>> diagram.coexisting
     array([1.2 , 1.3 , 1.4 , 1.45])
     """
     find(system, parameter)

@@ -168,8 +168,8 @@ def boundary(
     Examples
     --------
     >>> from stickslip.scenarios import forced
-    >>> found = boundary(forced(0.8, 0.5), "kinetic", between=(0.5, 0.95))
-    >>> round(found.value, 8), found.kinds[0], found.multipliers.round(3)
+    >>> border = boundary(forced(0.8, 0.5), "kinetic", between=(0.5, 0.95))
+    >>> round(border.value, 8), border.kinds[0], border.multipliers.round(3)
     (0.81740639, ('no stops', 'stops'), array([[0.5, 0.5]]))
     """
     find(system, parameter)
@@ -296,9 +296,9 @@ def refine(
     --------
     >>> from stickslip import scenarios
     >>> slider = scenarios.forced(0.8, 0.5)
-    >>> found = refine(slider, {"kinetic": [0.5, 0.7, 0.9]}, halvings=6, settle=60, cycles=10)
-    >>> border = found.kinetic[found.normal_stops > 0][0]  # Den Hartog: 0.8174
-    >>> bool(0.8174 <= border <= 0.8174 + 0.2 / 2**6), int(found.run.sum()), found.run.size
+    >>> refined = refine(slider, {"kinetic": [0.5, 0.7, 0.9]}, halvings=6, settle=60, cycles=10)
+    >>> border = refined.kinetic[refined.normal_stops > 0][0]  # Den Hartog: 0.8174
+    >>> bool(0.8174 <= border <= 0.8174 + 0.2 / 2**6), int(refined.run.sum()), refined.run.size
     (True, 9, 129)
     """
     _require_borders(system, grid, measure, halvings)

@@ -173,8 +173,8 @@ def dither(
     --------
     >>> from stickslip.laws.coulomb import Coulomb
     >>> slider = Oscillator(mass=1, stiffness=1, law=Coulomb(1.0, static=1.5), drive=Belt(0.5), damping=0.02)
-    >>> found = dither(slider, frequency=5.0)
-    >>> print(found.amplitude, found.sticks[1] < 1 / 5.0)
+    >>> dithered = dither(slider, frequency=5.0)
+    >>> print(dithered.amplitude, dithered.sticks[1] < 1 / 5.0)
     dither amplitude 0.000391 m (95 %: 0.000368 to 0.000391) True
     """
     _require(system, on, cycles, precision)

@@ -177,8 +177,8 @@ def local_maxima(wavelets: xr.DataArray, *, prominence: float = 3.0, span: float
     --------
     >>> t = np.arange(4000) / 1000
     >>> bursts = sum(np.exp(-(((t - at) / 0.1) ** 2)) * np.sin(2 * np.pi * f * t) for at, f in ((1, 40), (3, 90)))
-    >>> found = local_maxima(wavelet_map(Record.of({"a": bursts}, fs=1000), "a", frequencies=(10, 200)))
-    >>> [(round(peak.time, 1), round(peak.frequency, -1)) for peak in found]
+    >>> maxima = local_maxima(wavelet_map(Record.of({"a": bursts}, fs=1000), "a", frequencies=(10, 200)))
+    >>> [(round(peak.time, 1), round(peak.frequency, -1)) for peak in maxima]
     [(1.0, 40.0), (3.0, 90.0)]
     """
     from scipy.ndimage import label, maximum_filter
@@ -371,8 +371,8 @@ def stft_map(record: Record, channel: str, *, nperseg: int | None = None, window
     --------
     >>> import numpy as np
     >>> record = Record.of({"a": 0.3 * np.sin(2 * np.pi * 50 * np.arange(4000) / 1000)}, fs=1000)
-    >>> found = abs(stft_map(record, "a", nperseg=200))
-    >>> round(float(found.sel(frequency=50.0, time=2.0)), 3)
+    >>> magnitudes = abs(stft_map(record, "a", nperseg=200))
+    >>> round(float(magnitudes.sel(frequency=50.0, time=2.0)), 3)
     0.3
     """
     from scipy.signal import ShortTimeFFT

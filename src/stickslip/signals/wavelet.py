@@ -225,8 +225,8 @@ def wavelet_map(
     --------
     >>> t = np.arange(4000) / 1000
     >>> record = Record.of({"a": 0.3 * np.sin(2 * np.pi * 47 * t)}, fs=1000)
-    >>> found = abs(wavelet_map(record, "a", frequencies=(20, 100), voices=64, normalisation="amplitude"))
-    >>> ridge = found.sel(time=2.0, method="nearest")
+    >>> magnitudes = abs(wavelet_map(record, "a", frequencies=(20, 100), voices=64, normalisation="amplitude"))
+    >>> ridge = magnitudes.sel(time=2.0, method="nearest")
     >>> round(float(ridge.idxmax()), 0), round(float(ridge.max()), 3)
     (47.0, 0.3)
     """
@@ -509,8 +509,8 @@ def inverse_wavelet(wavelets: xr.DataArray) -> Array:
     --------
     >>> t = np.arange(4000) / 1000
     >>> burst = np.exp(-(((t - 2) / 0.2) ** 2)) * np.cos(2 * np.pi * 50 * t)
-    >>> found = inverse_wavelet(wavelet_map(Record.of({"a": burst}, fs=1000), "a", frequencies=(10, 200)))
-    >>> bool(np.abs(found - burst).max() < 1e-10)
+    >>> inverse = inverse_wavelet(wavelet_map(Record.of({"a": burst}, fs=1000), "a", frequencies=(10, 200)))
+    >>> bool(np.abs(inverse - burst).max() < 1e-10)
     True
     """
     from scipy.fft import irfft, rfft

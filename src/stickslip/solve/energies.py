@@ -93,8 +93,8 @@ def energy_flow(run: Trajectory) -> EnergyFlow:
     >>> from stickslip import Oscillator, simulate
     >>> from stickslip.laws import Coulomb
     >>> decay = simulate(Oscillator(mass=1, stiffness=4, law=Coulomb(1.0)), duration=10, start={"x": 1.25})
-    >>> found = energy_flow(decay)
-    >>> round(float(found.friction[0]), 12), round(float(found.springs[0]), 12)
+    >>> flow = energy_flow(decay)
+    >>> round(float(flow.friction[0]), 12), round(float(flow.springs[0]), 12)
     (-3.0, 3.0)
     """
     system = run.system

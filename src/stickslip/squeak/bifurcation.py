@@ -141,8 +141,8 @@ def limit_cycles(
 
     >>> from stickslip.laws import Coulomb
     >>> block = Oscillator(1.0, 1.0, Coulomb(1.0, static=1.5), Belt(0.5), damping=0.1)
-    >>> found = limit_cycles(block, "drive.speed", values=[0.3, 0.4, 0.5, 0.6])
-    >>> {one.status for one in found.up}, [one.status for one in found.down], found.both
+    >>> cycles = limit_cycles(block, "drive.speed", values=[0.3, 0.4, 0.5, 0.6])
+    >>> {one.status for one in cycles.up}, [one.status for one in cycles.down], cycles.both
     ({'steady sliding'}, ['periodic', 'periodic', 'periodic', 'steady sliding'], (0.3, 0.5))
     """
     places = numbers("values", values)
@@ -362,8 +362,8 @@ def stability_map(
     >>> from stickslip.drives import Belt
     >>> from stickslip.laws import LinearSlope
     >>> block = Oscillator(1.0, 100.0, LinearSlope(1.0, slope=-0.1), Belt(0.2), damping=0.3)
-    >>> found = stability_map(block, grid={"slope": [-0.5, -0.1], "stiffness": [50.0, 100.0]})
-    >>> found.mechanism.values.tolist()
+    >>> chart = stability_map(block, grid={"slope": [-0.5, -0.1], "stiffness": [50.0, 100.0]})
+    >>> chart.mechanism.values.tolist()
     [['falling friction', 'falling friction'], ['stable', 'stable']]
     """
     import xarray

@@ -192,8 +192,8 @@ def coupling(record: Record, *, squeaks: Squeaks | None = None, lever: float | s
     >>> from stickslip.squeak.sound import squeak_record
     >>> from stickslip.squeak.sound import squeak_rig
     >>> record = squeak_record(simulate(squeak_rig(), duration=1.2), snr=30, rng=1)
-    >>> found = coupling(record)
-    >>> found.of("normal_acceleration", "torsion_velocity").coupled
+    >>> coupled = coupling(record)
+    >>> coupled.of("normal_acceleration", "torsion_velocity").coupled
     True
     """
     squeaks = find_squeaks(record) if squeaks is None else squeaks

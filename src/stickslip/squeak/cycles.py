@@ -139,8 +139,8 @@ def limit_cycle(
     >>> from stickslip.drives import Belt
 
     >>> from stickslip.laws import LinearSlope
-    >>> found = limit_cycle(Oscillator(1.0, 1.0, LinearSlope(1.0, slope=-0.1), Belt(0.5)))
-    >>> found.status, found.stick_share[0] > 0, round(found.growth / found.sliding.growth, 6)
+    >>> cycle = limit_cycle(Oscillator(1.0, 1.0, LinearSlope(1.0, slope=-0.1), Belt(0.5)))
+    >>> cycle.status, cycle.stick_share[0] > 0, round(cycle.growth / cycle.sliding.growth, 6)
     ('periodic', True, 1.0)
     """
     sliding = stability(system, speed=speed)

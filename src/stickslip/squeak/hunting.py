@@ -108,8 +108,8 @@ def servo_hunting(law: Law, *, inertia: float, kp: float, ki: float, kd: float) 
     Examples
     --------
     >>> from stickslip.laws import Coulomb
-    >>> found = servo_hunting(Coulomb(0.06, static=0.08), inertia=0.02, kp=18.0, ki=40.0, kd=0.1)
-    >>> found.lasts, round(1e3 * found.amplitude, 2), round(found.frequency, 3)
+    >>> hunting = servo_hunting(Coulomb(0.06, static=0.08), inertia=0.02, kp=18.0, ki=40.0, kd=0.1)
+    >>> hunting.lasts, round(1e3 * hunting.amplitude, 2), round(hunting.frequency, 3)
     (True, 1.03, 0.163)
     >>> servo_hunting(Coulomb(0.06), inertia=0.02, kp=18.0, ki=40.0, kd=0.1).lasts
     False

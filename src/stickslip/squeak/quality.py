@@ -190,8 +190,8 @@ def impulsiveness(record: Record, *, channel: str | None = None) -> Impulsivenes
     Examples
     --------
     >>> t = np.arange(10_000) / 10_000
-    >>> found = impulsiveness(Record.of({"sound": np.sin(2 * np.pi * 500 * t)}, fs=10_000))
-    >>> round(found.crest_factor, 2), round(found.kurtosis, 2), found.rate
+    >>> peaks = impulsiveness(Record.of({"sound": np.sin(2 * np.pi * 500 * t)}, fs=10_000))
+    >>> round(peaks.crest_factor, 2), round(peaks.kurtosis, 2), peaks.rate
     (1.41, 1.5, 0.0)
     """
     from scipy.signal import find_peaks

@@ -116,9 +116,10 @@ def burst_spectra(record: Record, *, squeaks: Squeaks | None = None) -> BurstSpe
     >>> tone = np.sin(2 * np.pi * 500 * t) * (np.abs(t - 1) < 0.5)
     >>> noise = np.random.default_rng(0).standard_normal((2, t.size))
     >>> record = Record.of({"sound": tone + 0.01 * noise[0], "a": 3 * tone + 0.1 * noise[1]}, fs=10_000)
-    >>> found = burst_spectra(record)
-    >>> peak = int(np.argmax(found.inside["sound"]))
-    >>> bool(abs(found.frequency[peak] - 500) < found.resolution), bool(found.coherence["a", "sound"][peak] > 0.99)
+    >>> spectra = burst_spectra(record)
+    >>> peak = int(np.argmax(spectra.inside["sound"]))
+    >>> off, coherence = abs(spectra.frequency[peak] - 500), spectra.coherence["a", "sound"][peak]
+    >>> bool(off < spectra.resolution), bool(coherence > 0.99)
     (True, True)
     """
     squeaks = find_squeaks(record) if squeaks is None else squeaks
