@@ -10,7 +10,7 @@ import pytest
 import sound_strangers
 import stickslip as ss
 from scripts import loaded
-from sound_sources import FS, KINDS, RUBS, background
+from sound_sources import FS, KINDS, RUBS, background, draw
 
 ELSE = sorted(set(KINDS) - set(RUBS))
 
@@ -86,6 +86,14 @@ def test_three_faint_squeaks_above_every_instrument_squeak_three_times() -> None
     squeaks = heard(sum(shapes) * wave + noise)
     assert squeaks.answer == "squeaks"
     assert [burst.start for burst in squeaks.of("squeak")] == pytest.approx([0.3, 0.94, 1.5], abs=0.02)
+
+
+def test_what_sound_alone_makes_likely_is_said_to_be_likely() -> None:
+    sound = draw("squeaks", 78_011)
+    record = ss.Record.of({"sound": sound.values}, fs=sound.fs, units={"sound": "1"})
+    findings = ss.analyze_squeaks(record)
+    assert {burst.friction for burst in findings.squeaks.of("squeak", "squeal")} == {"likely"}
+    assert ss.summary(findings).headline[0].startswith(f"It likely {findings.squeaks.answer}")
 
 
 def test_two_partials_that_beat_are_no_creak() -> None:

@@ -10,9 +10,9 @@ import stickslip as ss
 
 record = ss.datasets.demo()
 truth = record.truth
-found = ss.analyze(record, mass=truth["mass"], stiffness=truth["stiffness"], damping=truth["damping"])
-print(found.level)
+findings = ss.analyze(record, mass=truth["mass"], stiffness=truth["stiffness"], damping=truth["damping"])
+print(findings.level)
 print("true:", truth["sliding friction"], "N")
 
-drawn = {plate.name: plate.figure for plate in ss.summary(found).plates}
+drawn = {plate.name: plate.figure for plate in ss.summary(findings).plates}
 displacement, velocity = drawn["friction-displacement"], drawn["friction-velocity"]

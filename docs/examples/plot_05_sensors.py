@@ -19,8 +19,8 @@ record = rig.stated(rig.measure(run, fs=4000, rng=1, start=3.0))
 figure, axes = plt.subplots(3, figsize=(7, 6), sharex=True, sharey=True, layout="constrained")
 words = {"F": "balance of what is read", "F1": "averaged over five points", "fusion": "all sensors together"}
 for ax, (method, label) in zip(axes, words.items(), strict=True):
-    found = ss.friction_force(record, mass=2.42, stiffness=2310, method=method)
-    time, friction = found.time[:2000], found["friction"][:2000]
+    balanced = ss.friction_force(record, mass=2.42, stiffness=2310, method=method)
+    time, friction = balanced.time[:2000], balanced["friction"][:2000]
     true = run.sample(3.0 + time, ("friction",))[0][0]
     ax.plot(time, friction, color="tab:orange", linewidth=0.9, label=label)
     ax.plot(time, true, color="black", linewidth=0.7, label="true")

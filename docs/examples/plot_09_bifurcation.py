@@ -11,6 +11,6 @@ import numpy as np
 import stickslip as ss
 
 slider = ss.scenarios.forced(0.8, 1.0, static_ratio=1.5)
-found = ss.bifurcation(slider, "amplitude", values=np.linspace(1.05, 1.8, 16))
-print(found)
-ax = ss.plot(found)
+diagram = ss.bifurcation(slider, "amplitude", values=np.linspace(1.05, 1.8, 16))
+print(diagram)
+ax = ss.plot(diagram)

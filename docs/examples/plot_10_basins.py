@@ -10,6 +10,6 @@ import numpy as np
 import stickslip as ss
 
 slider = ss.scenarios.forced(0.8, 1.0, static_ratio=1.5).having(amplitude=1.25)
-found = ss.basins(slider, grid={"x": np.linspace(-4, 4, 41), "v": np.linspace(-4, 4, 41)})
-print(found)
-ax = ss.plot(found)
+basins = ss.basins(slider, grid={"x": np.linspace(-4, 4, 41), "v": np.linspace(-4, 4, 41)})
+print(basins)
+ax = ss.plot(basins)

@@ -9,6 +9,6 @@ import stickslip as ss
 
 run = ss.simulate(ss.squeak.squeak_rig("wet", load=6.13), duration=0.8)
 record = ss.squeak.squeak_record(run, snr=30, rng=1)
-found = ss.analyze_squeaks(record, name="wet, 6.13 N")
-print(found.squeaks)
-spectrogram = next(plate.figure for plate in ss.summary(found).plates if plate.name == "spectrogram")
+findings = ss.analyze_squeaks(record, name="wet, 6.13 N")
+print(findings.squeaks)
+spectrogram = next(plate.figure for plate in ss.summary(findings).plates if plate.name == "spectrogram")

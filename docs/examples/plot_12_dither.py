@@ -11,6 +11,6 @@ import stickslip as ss
 creeping = ss.Oscillator(
     mass=1, stiffness=1, law=ss.laws.Coulomb(1.0, static=1.5), drive=ss.drives.Belt(0.1), damping=0.02
 )
-found = ss.dither(creeping, frequency=5.0)
-print(found)
-ax = ss.plot(found)
+dithered = ss.dither(creeping, frequency=5.0)
+print(dithered)
+ax = ss.plot(dithered)

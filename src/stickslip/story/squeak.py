@@ -85,7 +85,7 @@ def _headline(findings: Findings) -> Iterator[str]:
         return
     creaks = [f"{burst.rate:.3g}" for burst in squeaks.of("creak")]
     if not heard and creaks:
-        yield f"It creaks{where}: stick-slip pulses, {' and '.join(creaks)} in a second."
+        yield f"It {_likely(squeaks)}creaks{where}: stick-slip pulses, {' and '.join(creaks)} in a second."
     elif squeaks.answer == "can not be told":
         yield f"Whether it squeaks{where} can not be told: {_untold(squeaks)}."
         yield from _power(squeaks)
@@ -96,7 +96,7 @@ def _headline(findings: Findings) -> Iterator[str]:
     else:
         many = f"{len(heard)} times in {record.duration:.3g} s" if len(heard) > 1 else "once"
         tone = squeaks.frequency.value
-        yield f"It {squeaks.answer}{where} {many}, at {number(tone, tone / 500, 'Hz')}."
+        yield f"It {_likely(squeaks)}{squeaks.answer}{where} {many}, at {number(tone, tone / 500, 'Hz')}."
     loudest = squeaks.loudest
     if loudest is not None:
         yield _of_one(loudest, squeaks)
@@ -163,6 +163,12 @@ def _untold(squeaks: Squeaks) -> str:
         return f"each of {every} {kind} bursts may be friction's, or not"
     rest = "the other one is not" if every - undecided == 1 else f"the other {every - undecided} are not"
     return f"of {every} {kind} bursts {undecided} may be friction's, or not; {rest}"
+
+
+def _likely(squeaks: Squeaks) -> str:
+    """A word before the verb where nothing but the sound or the motion speaks for friction."""
+    shown = any(burst.friction == "shown" for burst in squeaks.of("squeak", "squeal", "creak"))
+    return "" if shown else "likely "
 
 
 def _power(squeaks: Squeaks) -> Iterator[str]:
