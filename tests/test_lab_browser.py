@@ -445,6 +445,27 @@ def test_constants_of_the_rig_stay_and_a_stretch_is_taken_by_dragging(page: Page
     expect(page.get_by_label("Mass [kg]")).to_have_value("0.25")
 
 
+def test_a_rig_is_watched_live_and_no_other_tab_speaks_into_it(page: Page) -> None:
+    page.locator(KINETIC).focus()
+    page.keyboard.press("ArrowRight")  # what Play says of it must not stand on the next tab
+    page.get_by_role("tab", name="Live").click()
+    said = "(id) => document.getElementById(id).textContent"
+    heard = page.evaluate_handle(
+        """() => { const heard = [], status = document.getElementById("status");
+          new MutationObserver(() => heard.push(status.textContent)).observe(status, { childList: true });
+          return heard; }"""
+    )
+    page.get_by_role("button", name="Open").click()
+    expect(page.locator("#live-rows tr")).to_have_count(3)
+    level, _, share = page.locator("#live-rows tr").all_text_contents()
+    assert re.match(r"sliding friction1\.[01]\d*\s?N", level), level
+    assert re.match(r"stuck share of the time\d+ %", share), share
+    assert page.evaluate(said, "live-unit") == "amplitude [m]"
+    assert {words for words in heard.json_value() if words} == {"Opening sim …"}
+    page.get_by_role("button", name="Close").click()
+    expect(page.locator("#live-rows tr")).to_have_count(0)
+
+
 def test_nothing_that_axe_knows_keeps_anybody_out_and_it_fits_a_phone(page: Page, rubbing: Path) -> None:
     open_data(page)
     drop(page, rubbing)

@@ -75,8 +75,9 @@ def test_twenty_watch_and_one_records(client: TestClient, tmp_path: Path) -> Non
         send(pages[5], "mark", text="the <b>third</b> cycle")
         assert until(pages[0], "cycle")[1]["friction"].size > 100
         rows = until(pages[0], "numbers")[0]["rows"]
-        assert rows[0][0] == "friction level"
-        assert 1.0 < rows[0][1] < 1.2  # N: the virtual rig's is 1.1
+        assert rows[0][0] == "sliding friction"
+        assert rows[0][1].endswith(" N")
+        assert 1.0 < float(rows[0][1][:-2]) < 1.2  # the virtual rig's is 1.1
         send(pages[9], "drive", output="base", amplitude=1.0, frequency=float("1e9"))
         send(pages[2], "drive", output="table", amplitude=1.0, frequency=1.0)
         send(pages[0], "stop")

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import importlib
 import inspect
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 import stickslip as ss
+from stickslip.estimate import Doubt, Status
 from stickslip.story.story import TELLERS, Story
 
 LEVEL = ss.Estimate.normal("sliding friction", 1.318, sd=0.004, unit="N", method="by hand")
@@ -38,3 +40,11 @@ def test_results_json_of_a_record_keeps_its_keys() -> None:
         "truth", "notes", "history",
     }  # fmt: skip
     assert set(ss.summary([LEVEL]).data()) == {"estimates"}
+
+
+def test_the_marks_of_the_leading_rows_are_counted_from_one() -> None:
+    """What few cycles leave crude was numbered last, so that a table began at 3."""
+    crude = LEVEL.doubted(Status(Doubt.few(5, "cycle")))
+    later = [replace(LEVEL, name=f"quantity {j}", status="ok" if j < 8 else "by eye") for j in range(9)]
+    story = ss.summary([crude, *later])
+    assert [story.marks(line) for line in story.lines] == ["1", *[""] * 8, "2"]

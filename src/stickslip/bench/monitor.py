@@ -409,33 +409,18 @@ def _loop(channels: Mapping[str, Array], constants: Mapping[str, float], fs: flo
     means = {name: np.add.reduceat(v, edges) / np.diff(np.append(edges, count)) for name, v in channels.items()}
     step = count / points / fs
     x = means.get("x", np.empty(0))
-    v = means["v"] if "v" in means else _slope(x, step) if len(x) else x
+    v = means["v"] if "v" in means else np.gradient(x, step) if len(x) else x
     measured = next((name for name in ("load", "friction") if name in means), None)
     if measured is not None:
         return x, v, means[measured]
     if not len(x) or not {"mass", "stiffness"} <= set(constants):
         return x, v, np.empty(0)
-    a = means["a"] if "a" in means else _slope(v, step)
+    a = means["a"] if "a" in means else np.gradient(v, step)
     spring = constants["stiffness"] * (x - means.get("z", np.zeros(points)))
     return x, v, -constants["mass"] * a - constants.get("damping", 0.0) * v - spring
 
 
-def _slope(values: Array, step: float) -> Array:
-    """Derivative of something that repeats."""
-    return (np.roll(values, -1) - np.roll(values, 1)) / (2 * step)
-
-
-class Row(NamedTuple):
-    """A number of the last cycles: name, value, 95 % interval, unit; NaN where no interval is known."""
-
-    name: str
-    value: float
-    low: float
-    high: float
-    unit: str
-
-
-def answers(record: Record, constants: Mapping[str, float]) -> tuple[list[Row], list[str]]:
+def answers(record: Record, constants: Mapping[str, float]) -> tuple[list[Estimate], list[str]]:
     """What do a few cycles tell, by the questions that any record is asked?
 
     Parameters
@@ -447,36 +432,32 @@ def answers(record: Record, constants: Mapping[str, float]) -> tuple[list[Row], 
 
     Returns
     -------
-    rows : list of Row
-        Friction level, stops per cycle, stuck share, and the pitch of the loudest squeak.
+    estimates : list of Estimate
+        Sliding friction, stops per cycle, stuck share, and the pitch of the loudest squeak.
     untold : list of str
         A sentence for each question that could not be answered.
     """
-    rows: list[Row] = []
+    estimates: list[Estimate] = []
     untold: list[str] = []
     stated = {"mass", "stiffness"} <= set(constants) and "x" in record
-    questions: list[Callable[[], list[Row]]] = [partial(_squeaks, record, name) for name in SOUNDS if name in record]
+    asked = [partial(_squeaks, record, name) for name in SOUNDS if name in record]
+    questions: list[Callable[[], list[Estimate]]] = [*asked]
     if stated or "load" in record or "friction" in record:
         questions.insert(0, partial(_friction, record, constants))
     elif "x" in record:
         untold.append("Friction needs mass and stiffness in rig.toml, or a load cell.")
     for question in questions:
         try:
-            rows += question()
+            estimates += question()
         except StickslipError as error:
             untold.append(str(error))
-    return rows, untold
+    return estimates, untold
 
 
-def _friction(record: Record, constants: Mapping[str, float]) -> list[Row]:
+def _friction(record: Record, constants: Mapping[str, float]) -> list[Estimate]:
     forced = _forced(record, constants)
-    rows = [_row("friction level", friction_loops(forced).level)]
-    sticks = find_sticks(forced)
-    return [*rows, _row("stops per cycle", sticks.per_cycle), _row("stuck share", sticks.share)]
-
-
-def _row(name: str, estimate: Estimate) -> Row:
-    return Row(name, estimate.value, *estimate.interval, estimate.unit)
+    level, sticks = friction_loops(forced).level, find_sticks(forced)
+    return [level, sticks.per_cycle, sticks.share]
 
 
 def _forced(record: Record, constants: Mapping[str, float]) -> Record:
@@ -488,9 +469,10 @@ def _forced(record: Record, constants: Mapping[str, float]) -> Record:
     return record.with_channel("friction", record["load"], unit="N", source="load")
 
 
-def _squeaks(record: Record, channel: str) -> list[Row]:
+def _squeaks(record: Record, channel: str) -> list[Estimate]:
     bursts = [burst for burst in find_squeaks(record, channel=channel).bursts if burst.kind != "noise"]
     if not bursts:
         return []
     loudest = max(bursts, key=lambda burst: burst.level)
-    return [Row(f"pitch in {channel} ({loudest.kind})", loudest.frequency, math.nan, math.nan, "Hz")]
+    name, unknown = f"pitch in {channel} ({loudest.kind})", (math.nan, math.nan)
+    return [Estimate(name, loudest.frequency, unknown, math.nan, "Hz", "frequency of the loudest burst")]

@@ -26,6 +26,7 @@ import stickslip as ss
 import stickslip.bench as bench
 from stickslip.lab.play import conversation, readable
 from stickslip.lab.workers import frame
+from stickslip.story.words import interval_of, value_of
 from stickslip.workers import pool
 
 WANTED = ("open", "close", "record", "stop", "mark", "drive")
@@ -280,10 +281,10 @@ class Session:
         if not numbers.cancelled() and not isinstance(numbers.exception(), BrokenProcessPool):
             self._show(*numbers.result())
 
-    def _show(self, rows: Iterable[Iterable[Any]], untold: list[str]) -> None:
+    def _show(self, estimates: Iterable[ss.Estimate], untold: list[str]) -> None:
         """Numbers on every page, and why some are not there."""
-        plain = [[value if isinstance(value, str) or math.isfinite(value) else None for value in row] for row in rows]
-        self.tell(frame({"kind": "numbers", "rows": plain, "untold": untold}))
+        rows = [(one.name, value_of(one), interval_of(one)) for one in estimates]
+        self.tell(frame({"kind": "numbers", "rows": rows, "untold": untold}))
 
 
 def _cycle(cycle: bench.Cycle, fs: float) -> bytes:

@@ -201,12 +201,10 @@ class Story:
     @functools.cached_property
     def notices(self) -> list[Caution]:
         """The cautions, each reason once: those of rows in the rows' order, which numbers them, then the others."""
-        said = " ".join(self.headline).casefold()
-        rows = [
-            flag
-            for flag in flags((line.name, line.status) for line in self.lines)
-            if flag.reason.casefold() not in said
-        ]
+        said, order = " ".join(self.headline).casefold(), [line.name for line in self.lines]
+        flagged = flags((line.name, line.status) for line in self.lines)
+        rows = [flag for flag in flagged if flag.reason.casefold() not in said]
+        rows.sort(key=lambda flag: min(map(order.index, flag.names)))
         reasons, kinds = {row.reason for row in rows}, {row.kind for row in rows} - {""}
         plain = [caution if isinstance(caution, Caution) else Caution(caution) for caution in self.cautions]
         others = [

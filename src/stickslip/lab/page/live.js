@@ -2,7 +2,7 @@
 import { Conversation } from "./socket.js";
 import { axes, line, prefixed, range, shortly } from "./canvas.js";
 
-const SPAN = 4, LOOPS = 12, FORGOTTEN = 3; // s of traces, loops that stay, cycles for which a flaw stays on the page
+const SPAN = 4, LOOPS = 12, FORGOTTEN = 3, ROOM = 0.06; // s of traces, loops that stay, cycles that a flaw stays; share of a strip left free above and below
 let lab, conversation, state = {}, traces = new Map(), loops = [], flaws = new Map(), cycle = 0, number = 0, drawing = false, turned = true, oldest = 0;
 const $ = (id) => document.getElementById(id);
 const ask = (want, more = {}) => conversation.send({ id: ++number, want, ...more });
@@ -11,7 +11,10 @@ export function start(root, given) {
   lab = given;
   root.innerHTML = form();
   conversation = new Conversation("live", heard, () => lab.say("The lab does not answer; it is asked again.", true));
-  $("live-open").addEventListener("click", () => ask(state.open ? "close" : "open", { device: $("live-device").value }));
+  $("live-open").addEventListener("click", () => {
+    lab.busy(state.open ? "Closing …" : `Opening ${$("live-device").value} …`, performance.now());
+    ask(state.open ? "close" : "open", { device: $("live-device").value });
+  });
   $("live-record").addEventListener("click", () => ask(recorded === null ? "record" : "stop"));
   $("live-mark").addEventListener("click", () => { ask("mark", { text: $("live-text").value }); });
   $("live-drive").addEventListener("submit", (event) => {
@@ -38,7 +41,7 @@ function form() {
           <button type="button" id="live-mark" disabled>Mark</button></div></fieldset>
       <form id="live-drive" autocomplete="off"><fieldset id="live-outputs" hidden><legend>Move</legend>
         <div class="field"><label for="live-output">Output</label><select id="live-output"></select></div>
-        <div class="knob"><label for="live-amplitude">amplitude</label><input type="text" id="live-amplitude" value="0.65e-3">
+        <div class="knob"><label for="live-amplitude" id="live-unit">amplitude</label><input type="text" id="live-amplitude" value="0.65e-3">
           <label for="live-frequency">frequency [Hz]</label><input type="text" id="live-frequency" value="2.5"></div>
         <div class="row"><button type="submit">Move</button><button type="button" id="live-rest">Rest</button></div></fieldset></form>
       <p class="note" id="live-said" role="status"></p>
@@ -49,7 +52,7 @@ function form() {
       <div id="live-views">
         <figure class="card"><figcaption>Friction over displacement</figcaption><canvas id="live-loop-x" role="img" aria-label="Friction against displacement, cycle by cycle"></canvas></figure>
         <figure class="card"><figcaption>Friction over velocity</figcaption><canvas id="live-loop-v" role="img" aria-label="Friction against velocity, cycle by cycle"></canvas></figure>
-        <div class="card"><h2>Of the last cycles</h2><table><tbody id="live-rows"></tbody></table><p class="note" id="live-untold"></p></div>
+        <div class="card"><h2>Of the last cycles</h2><table><thead><tr><th></th><th>Value</th><th>95 % interval</th></tr></thead><tbody id="live-rows"></tbody></table><p class="note" id="live-untold"></p></div>
       </div>
     </div></div>`;
 }
@@ -74,11 +77,13 @@ function begin(answer) {
   $("live-open").textContent = answer.open ? "Close" : "Open";
   for (const id of ["live-record", "live-mark"]) $(id).disabled = !answer.open;
   $("live-outputs").hidden = !(answer.outputs ?? []).length;
-  $("live-output").replaceChildren(...(answer.outputs ?? []).map((one) => new Option(`${one.name} [${one.unit}]`, one.name)));
+  $("live-output").replaceChildren(...(answer.outputs ?? []).map((one) => new Option(one.name, one.name)));
+  $("live-output").onchange = () => { $("live-unit").textContent = `amplitude [${answer.outputs[$("live-output").selectedIndex].unit}]`; };
+  if (answer.outputs?.length) $("live-output").onchange();
   $("live-rows").replaceChildren();
   $("live-untold").textContent = "";
   $("live-traces").style.height = `${Math.max(1, traces.size) * 92 + 30}px`;
-  if (answer.failed) lab.say(answer.failed, true);
+  lab.say(answer.failed ?? "", Boolean(answer.failed));
   checkup();
   afresh();
 }
@@ -119,11 +124,9 @@ function checkup() {
 }
 
 function numbers(answer) {
-  $("live-rows").replaceChildren(...answer.rows.map(([name, value, low, high, unit]) => {
-    const row = document.createElement("tr"), [factor, said] = prefixed(Math.abs(value), unit);
-    const number = (each) => (each === null ? "?" : shortly(each * factor));
-    const interval = low === null ? "" : ` (${number(low)} to ${number(high)})`;
-    for (const text of [name, `${number(value)}${interval} ${said}`]) row.append(Object.assign(document.createElement("td"), { textContent: text }));
+  $("live-rows").replaceChildren(...answer.rows.map((cells) => {
+    const row = document.createElement("tr");
+    for (const text of cells) row.append(Object.assign(document.createElement("td"), { textContent: text }));
     return row;
   }));
   $("live-untold").textContent = answer.untold.join(" ");
@@ -168,15 +171,15 @@ function strips(canvas, palette) {
     place += 1;
     pen.strokeStyle = palette.line;
     pen.strokeRect(left + 0.5, Math.round(top) + 0.5, right - left, Math.round(bottom - top));
-    const [low, topmost] = [range(trace.low)[0], range(trace.high)[1]], [factor, unit] = prefixed(Math.max(Math.abs(low), Math.abs(topmost)), trace.unit);
+    const [low, topmost] = range([...trace.low, ...trace.high], ROOM), edge = (topmost - low) * ROOM / (1 + 2 * ROOM), [factor, unit] = prefixed(Math.max(Math.abs(low), Math.abs(topmost)), trace.unit);
     pen.fillStyle = ink;
     pen.textAlign = "left"; pen.textBaseline = "middle";
     pen.fillText(`${trace.name} [${unit}]`, 0, (top + bottom) / 2);
     if (!trace.low.length) continue;
     pen.fillStyle = palette.soft;
     pen.textAlign = "right";
-    pen.fillText(shortly(Number((topmost * factor).toPrecision(3))), left - 5, top + 7);
-    pen.fillText(shortly(Number((low * factor).toPrecision(3))), left - 5, bottom - 7);
+    pen.fillText(shortly(Number(((topmost - edge) * factor).toPrecision(3))), left - 5, top + 7);
+    pen.fillText(shortly(Number(((low + edge) * factor).toPrecision(3))), left - 5, bottom - 7);
     const y = (value) => bottom - ((value - low) / (topmost - low || 1)) * (bottom - top), most = Math.round(SPAN / trace.step), offset = most - trace.low.length;
     const x = (k) => left + ((k + offset) / most) * (right - left);
     pen.strokeStyle = ink;
@@ -189,13 +192,14 @@ function strips(canvas, palette) {
   if (!first?.low.length) return;
   pen.fillStyle = palette.soft;
   pen.textAlign = "center"; pen.textBaseline = "top";
-  for (let s = Math.ceil(first.end - SPAN); s <= first.end; s++) pen.fillText(`${s} s`, left + ((s - first.end + SPAN) / SPAN) * (right - left), height - 22);
+  for (let s = Math.max(0, Math.ceil(first.end - SPAN)); s <= first.end; s++) pen.fillText(`${s} s`, left + ((s - first.end + SPAN) / SPAN) * (right - left), height - 22);
 }
 
 function loop(canvas, across, axis, palette) {
   const known = loops.filter((each) => each[across].length);
+  if (!known.length) { canvas.width = 0; return; } // nothing was seen: no axes
   const limits = (name) => known.map((each) => range(each[name], 0.08)).reduce(([a, b], [c, d]) => [Math.min(a, c), Math.max(b, d)], [Infinity, -Infinity]);
-  const [[xl, xh], [yl, yh]] = known.length ? [limits(across), limits("friction")] : [[-1, 1], [-1, 1]];
+  const [[xl, xh], [yl, yh]] = [limits(across), limits("friction")];
   const plan = axes(canvas, { low: xl, high: xh, ...axis }, { low: yl, high: yh, label: "friction", unit: "N" }, palette);
   known.forEach((each, j) => line(plan, each[across], each.friction, { colour: j === known.length - 1 ? palette.orange : palette.faint, width: j === known.length - 1 ? 1.8 : 0.8 }));
 }

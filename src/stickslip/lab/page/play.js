@@ -5,6 +5,7 @@ import { Stage } from "./stage.js";
 import { axes, line, prefixed, range, shortly, tick } from "./canvas.js";
 
 const $ = (id) => document.getElementById(id);
+const say = (words, wrong) => { if (!$("play").hidden) lab.say(words, wrong); }; // another tab says its own
 const PANELS = [["x", "displacement"], ["x", "angle", true], ["v", "velocity"], ["v", "angular velocity", true],
   ["a", "acceleration"], ["friction", "friction"]];
 const INKS = { x: "blue", v: "green", a: "purple", friction: "orange" };
@@ -25,14 +26,14 @@ export async function start(given) {
   lab = given;
   lab.openInPlay = (opened) => { own(); use(opened); lab.show("play"); };
   stage = new Stage($("stage"), moved);
-  const lost = () => lab.say("The lab does not answer; is 'stickslip lab' still running?", true);
+  const lost = () => say("The lab does not answer; is 'stickslip lab' still running?", true);
   conversation = new Conversation("play", heard, lost);
   conversation.again = () => { if (state) ask(performance.now(), true); };
   for (const [words, pace] of PACES) $("pace").add(new Option(words, pace ?? ""));
   buttons();
   const shared = fromLink();
-  const slow = setTimeout(() => lab.say("The lab is starting …"), 700);
-  const catalog = await lab.ask("catalog").catch((error) => lab.say(error.message, true));
+  const slow = setTimeout(() => say("The lab is starting …"), 700);
+  const catalog = await lab.ask("catalog").catch((error) => say(error.message, true));
   clearTimeout(slow);
   if (!catalog) return;
   lab.catalog = catalog;
@@ -119,7 +120,7 @@ function presets({ name: chosen = "", about = "A system of your own, or from a l
   $("preset").addEventListener("change", async () => {
     const name = /\((.*)\)$/.exec($("preset").value)?.[1] ?? $("preset").value;
     if ((await (listed ??= list())).has(name)) begin(name);
-    else if (name) lab.say(`No scenario is called “${name}”; choose one of the list.`, true);
+    else if (name) say(`No scenario is called “${name}”; choose one of the list.`, true);
   });
 }
 function picture(path) {
@@ -157,7 +158,7 @@ function tries() {
   if (able) $("tries").prepend("Try: ");
 }
 
-const failed = (error) => lab.say(error.message, true);
+const failed = (error) => say(error.message, true);
 
 // A scenario's code in words: what its letters stand for, and what its group is about where it has none.
 const SIGNS = [
@@ -195,7 +196,7 @@ function waiting(words) {
   if (flying === null) return;
   clearTimeout(patience);
   stale(true);
-  lab.busy(words, flying.sent, cancel);
+  if (!$("play").hidden) lab.busy(words, flying.sent, cancel);
 }
 // What is under way is given up, and what waits.
 function cancel() {
@@ -203,7 +204,7 @@ function cancel() {
   clearTimeout(patience);
   Object.assign(newest, { run: null, tell: null, wavelet: null });
   flying = next = null;
-  lab.say("Cancelled: what is shown is the motion before. Change anything to compute again.");
+  say("Cancelled: what is shown is the motion before. Change anything to compute again.");
 }
 
 function more(want) {
@@ -225,10 +226,10 @@ function arrived(answer) {
   if (answer.kind === "error") {
     controls.fault(changedLast, answer.error);
     if (answer.want === "run") stale(true);
-    lab.say(changedLast ? "" : answer.error, true);
+    say(changedLast ? "" : answer.error, true);
   } else if (answer.kind === "run") {
     controls.fault(null);
-    lab.say("");
+    say("");
     stale(false);
     shown(answer, flying.since);
   }
@@ -608,7 +609,7 @@ function fromLink(hash = location.hash) {
     const text = atob(hash.slice(1).replaceAll("-", "+").replaceAll("_", "/"));
     return JSON.parse(new TextDecoder().decode(Uint8Array.from(text, (sign) => sign.charCodeAt(0))));
   } catch {
-    lab.say("The link holds no system; the page begins with its first one.", true);
+    say("The link holds no system; the page begins with its first one.", true);
     return null;
   }
 }
@@ -620,7 +621,7 @@ async function sounded({ fs, words, arrays }) {
   silenced = played(arrays.sound, fs);
   $("hear").textContent = "Silence";
   $("hear").setAttribute("aria-pressed", true);
-  lab.say(`You hear ${words}.`);
+  say(`You hear ${words}.`);
 }
 function silence() {
   silenced?.();
