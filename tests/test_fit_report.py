@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import math
 from pathlib import Path
 
 import numpy as np
@@ -166,6 +167,21 @@ def test_what_is_asked_wrongly_is_said_before_it_is_read() -> None:
         result = fit(*arguments)
         assert result.exit_code == 2, result.output
         assert word in result.stderr
+
+
+def test_nothing_that_the_mass_makes_is_surer_than_it_was_weighed() -> None:
+    """A mass off by two of its deviations takes the spring with it, which said a tenth of that."""
+    rig = {"stiffness": 2310, "damping": 0.12}
+    exact, weighed = (
+        ss.answers.fit_records(
+            [ss.datasets.demo()], rig=ss.rig.rig_settings({**rig, "mass": mass}), laws=["compliant"]
+        )[0].fit  # type: ignore[union-attr]
+        for mass in ("2.42 kg", "2.42 ± 0.05 kg")
+    )
+    for name, one in weighed.parameters.items():
+        known = exact.parameters[name]
+        share = 0.05 / 2.42 * abs(one.value) if one.unit in ("N", "N/m", "N s/m") else 0.0
+        assert one.sd == pytest.approx(math.hypot(known.sd, share), rel=1e-6), name
 
 
 def test_a_range_of_frequencies_is_read_with_its_units_or_refused() -> None:

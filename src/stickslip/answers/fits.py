@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +18,7 @@ from stickslip.law.fit_curve import CurveFit, fit_curve
 from stickslip.law.law import LawFit
 from stickslip.law.start import CALIBRATION
 from stickslip.law.verdict import LawComparison
-from stickslip.law.which_law import compare_laws, fit_law
+from stickslip.law.which_law import compare_laws, fit_law, widened
 from stickslip.laws.coulomb import Coulomb
 from stickslip.oscillator import Oscillator
 from stickslip.record.record import RIG_UNITS, Record
@@ -26,6 +26,7 @@ from stickslip.rig.settings import RigSettings
 from stickslip.settings import read_toml
 from stickslip.statistics import follows
 from stickslip.systems.file import read_system
+from stickslip.units import dimensions
 
 FRICTION = {"friction", "coefficient"}
 BASE = HarmonicBase(0.0, frequency=1.0, contact="base")  # its motion is in the record
@@ -95,7 +96,17 @@ def fit_records(
         friction = _with_friction(records[0], rig)
         return fit_curve(friction, curve=curve, contact=rig.contact, normal=_load(friction, rig)), [friction]
     comparison = compare_laws(records, _oscillator(rig, system), laws=laws, calibration=calibration, progress=progress)
-    return comparison, list(records)
+    return _weighed(comparison, rig), list(records)
+
+
+def _weighed(comparison: LawComparison, rig: RigSettings) -> LawComparison:
+    """Forces, spring and damper no surer than the mass is stated, by whose inertia all of them are found."""
+    share = rig.mass.sd / rig.mass.value if isinstance(rig.mass, Estimate) else 0.0
+    if not share:
+        return comparison
+    found = comparison.fit.parameters
+    weighed = {name: widened(one, share) if "mass" in dimensions(one.unit) else one for name, one in found.items()}
+    return replace(comparison, fit=replace(comparison.fit, parameters=weighed))
 
 
 def _only_curve(record: Record, *, has_law: bool) -> str | None:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from stickslip.errors import ModelError
 from stickslip.estimate import Estimate, Result, Status
 from stickslip.law.search import (
+    OF_MOUNTS,
     OF_SENSORS,
     SHARE,
     Knob,
@@ -76,8 +77,8 @@ class LawFit(Result):
     oscillator : Oscillator
         The oscillator with the fitted values.
     parameters : mapping of str to Estimate
-        What was fitted, by the names of :meth:`Oscillator.having`; of a sensor ``x.gain`` and ``x.delay``, of several
-        records ``x.gain.1``, ``x.gain.2`` ...
+        What was fitted, by the names of :meth:`Oscillator.having`; of a sensor ``x.gain`` and ``x.delay``, of its
+        mount ``a.frequency`` and ``a.damping`` over those stated, of several records ``x.gain.1``, ``x.gain.2`` ...
     correlations : ndarray (p, p)
         Between the parameters, in their order; of a rough surface without its sliding friction.
     noise : mapping of str to float
@@ -158,8 +159,8 @@ def answered(problem: Problem, point: Point, sure: Surety | None, shown: Sequenc
     """What a search has found, as it is told."""
     system = replace(problem, profile=None).system(point.u)
     traces, sums, counts, noise = [], dict[str, float](), dict[str, int](), dict[str, float]()
-    for j, stretch in enumerate(problem.stretches):
-        time, measured, fitted = {}, {}, {}
+    for j in range(len(problem.stretches)):
+        stretch, time, measured, fitted = problem.mounted(point.u, j), {}, {}, {}
         gains = problem.sensor_knobs(point.u, "gain", j)
         for sensor, raw in zip(stretch.sensors, point.raw[j], strict=True):
             name = sensor.channel.name
@@ -215,7 +216,8 @@ def _parameters(problem: Problem, point: Point, sure: Surety | None, system: Osc
         if turned.kind == "profile":
             continue
         values = [_value(turned, u, system) for u in ((point.u[k], *sure.ends[k]) if sure else (point.u[k],) * 3)]
-        unit = {"gain": "1", "delay": "s"}.get(turned.kind) or unit_of(system, turned.name)
+        of_sensor = turned.kind in OF_SENSORS
+        unit = ("s" if turned.kind == "delay" else "1") if of_sensor else unit_of(system, turned.name)
         sd = abs(_value(turned, point.u[k] + 1e-6, system) - values[0]) / 1e-6 * float(sure.sd[k]) if sure else math.nan
         interval = (values[1], values[2]) if sure else (math.nan, math.nan)
         word = _label_of(turned, system)
@@ -230,7 +232,8 @@ def _label_of(knob: Knob, system: Oscillator) -> str:
     """What a parameter is called."""
     if knob.kind not in OF_SENSORS:
         return named(system, knob.name).name or knob.name
-    return f"{knob.kind} of {knob.channel}" + (f" in record {knob.stretch + 1}" if knob.stretch is not None else "")
+    kind = f"{knob.kind} over stated of the mount" if knob.kind in OF_MOUNTS else knob.kind
+    return f"{kind} of {knob.channel}" + (f" in record {knob.stretch + 1}" if knob.stretch is not None else "")
 
 
 def _value(knob: Knob, u: float, system: Oscillator) -> float:

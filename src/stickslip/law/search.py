@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stickslip.errors import ModelError
-from stickslip.law.stretch import Sampled, Sensor, Stretch, attempted, remembered
+from stickslip.law.stretch import DRIVES, Motion, Sampled, Sensor, Stretch, attempted, remembered
 from stickslip.laws.rough import RoughSurface
 from stickslip.oscillator import Oscillator
 from stickslip.solve.sensitivity import sensitivity
@@ -29,7 +29,8 @@ SHARE = 1e-6
 KEPT = 0.5  # of what a step was to lower: by less the derivatives are found anew
 BOLDEST, FURTHEST = 0.7, 7.0  # of a logarithm, in one step and in all
 BOLDER = 2.0  # of static friction's tenths, in one step
-OF_SENSORS = ("gain", "delay")
+OF_MOUNTS = ("frequency", "damping")  # over those stated
+OF_SENSORS = ("gain", "delay", *OF_MOUNTS)
 ABOVE = 0.1  # static friction counts by its excess over the kinetic, in tenths of that
 
 
@@ -37,7 +38,7 @@ class Knob(NamedTuple):
     """A parameter that is turned: its name, how a coordinate makes its value, and from where."""
 
     name: str
-    kind: str  # "log", "linear", "positive", "above" (the kinetic level), a sensor's "gain" or "delay", or "profile"
+    kind: str  # "log", "linear", "positive", "above" (the kinetic level), one OF_SENSORS, or "profile"
     origin: float
     scale: float = 1.0
     most: float = math.inf  # of a coordinate
@@ -46,14 +47,14 @@ class Knob(NamedTuple):
 
     def value(self, u: float) -> float:
         """The parameter at a coordinate; of an "above" the excess over the kinetic level, as a share of it."""
-        if self.kind == "log":
-            return self.origin * math.exp(max(-200.0, min(200.0, u)))
+        if self.kind in ("log", *OF_MOUNTS):
+            return self.origin * math.exp(max(-200.0, min(200.0, self.scale * u)))
         moved = self.origin + self.scale * u
         return max(0.0, moved) if self.kind in ("above", "positive") else moved
 
     @property
     def channel(self) -> str:
-        """Of a gain or delay, whose."""
+        """Of what is a sensor's, whose."""
         return self.name.partition(".")[0]
 
     @property
@@ -165,6 +166,22 @@ class Problem:
             if knob.kind == kind and knob.stretch in (None, j)
         }
 
+    def delays(self, u: Array, j: int) -> dict[str, float]:
+        """By how much each sensor of stretch j comes later than stated, after the drive: one that is late is others
+        that are early, as no start is stated."""
+        late = self.sensor_knobs(u, "delay", j)
+        names = [sensor.channel.name for sensor in self.stretches[j].sensors]
+        return {name: late.get(name, 0.0) - sum(late.get(drive, 0.0) for drive in DRIVES) for name in names}
+
+    def mounted(self, u: Array, j: int) -> Stretch:
+        """Stretch j, its sensors on mounts as the knobs have them."""
+        by_kind = [self.sensor_knobs(u, kind, j) for kind in OF_MOUNTS]
+        if not any(by_kind):
+            return self.stretches[j]
+        sensors = self.stretches[j].sensors
+        turned = tuple(s.remounted(*(knobs.get(s.channel.name, 1.0) for knobs in by_kind)) for s in sensors)
+        return replace(self.stretches[j], sensors=turned)
+
     def begin(self, u: Array) -> Point:
         """The point with the starts as estimated, the drive as measured."""
         return self.at(u, self.own(self.begin_states()))
@@ -191,8 +208,8 @@ class Problem:
             system = self.system(u)
         except ModelError:
             return Point(u, starts, (), (), (), (), math.inf)
-        for j, stretch in enumerate(self.stretches):
-            delays, gains = (self.sensor_knobs(u, kind, j) for kind in OF_SENSORS[::-1])
+        for j in range(len(self.stretches)):
+            stretch, delays, gains = self.mounted(u, j), self.delays(u, j), self.sensor_knobs(u, "gain", j)
             off = starts[j][len(self.scales[j]) :]
             run = attempted(stretch, system, self.start(j, starts[j]), off)
             if run is None:
@@ -226,7 +243,8 @@ class Problem:
         """Derivatives by the knobs and by each stretch's own start; None where the engine refuses a neighbour."""
         moving = [k for k, knob in enumerate(self.knobs) if knob.kind not in OF_SENSORS]
         system, tangents = self.system(point.u), []
-        for j, stretch in enumerate(self.stretches):
+        for j in range(len(self.stretches)):
+            stretch = self.mounted(point.u, j)
             changed = self._changed(point, j, moving, system)
             if changed is None:
                 return None
@@ -234,21 +252,35 @@ class Problem:
             size, rows = len(point.starts[j]), rows_of(stretch.sensors)
             count = rows[-1].stop + len(stretch.drive.unsure)
             shared, own = np.zeros((count, len(self.knobs))), np.zeros((count, size))
+            motion = stretch.motion(point.runs[j])
             for s, (sensor, part) in enumerate(zip(stretch.sensors, rows, strict=True)):
                 gain = gains.get(sensor.channel.name, 1.0)
                 columns = sensor.freed(gain * changed[s])
                 shared[part, moving], own[part] = columns[:, : len(moving)], columns[:, len(moving) :]
                 for k, knob in enumerate(self.knobs):
-                    if knob.kind in OF_SENSORS and knob.channel == sensor.channel.name and knob.stretch in (None, j):
-                        raw, piece = point.raw[j][s], point.pieces[j][s]
-                        slope = raw if knob.kind == "gain" else -gain * _rate(raw, piece, sensor.time)
-                        shared[part, k] = sensor.freed(knob.scale * slope)
+                    whose = (sensor.channel.name, *DRIVES)
+                    if knob.kind in OF_SENSORS and knob.channel in whose and knob.stretch in (None, j):
+                        shared[part, k] = self._sensed(point, (j, s, k), motion, sensor, gain)
             own[rows[-1].stop :, len(self.scales[j]) :] = np.diag(1 / np.array(stretch.drive.unsure))
             tangents.append(Slopes(shared, own))
         trust = self._trust()
         shared, own = tangents[0]
         tangents[0] = Slopes(np.vstack([shared, trust]), np.vstack([own, np.zeros((len(trust), own.shape[1]))]))
         return tangents
+
+    def _sensed(self, point: Point, at: tuple[int, int, int], motion: Motion, sensor: Sensor, gain: float) -> Array:
+        """Derivative of what sensor s of stretch j would read by knob k, which is its own."""
+        j, s, k = at
+        knob, raw = self.knobs[k], point.raw[j][s]
+        if knob.kind == "gain":
+            return sensor.freed(knob.scale * raw)
+        if knob.kind == "delay":
+            scale = knob.scale if knob.channel in DRIVES else -knob.scale
+            return sensor.freed(scale * gain * _rate(raw, point.pieces[j][s], sensor.time))
+        near = self.mounted(point.u + STEP * np.eye(len(self.knobs))[k], j).sensors[s]
+        read, _ = near.predicted(motion, self.delays(point.u, j)[sensor.channel.name])
+        left, beside = sensor.freed(sensor.readings - gain * raw), near.freed(sensor.readings - gain * read)
+        return np.asarray((left - beside) / STEP)
 
     def _changed(self, point: Point, j: int, moving: Sequence[int], system: Oscillator) -> list[Array] | None:
         """Derivatives of what the sensors of stretch j would read: by the knobs that move the mass, and its start."""
@@ -262,7 +294,7 @@ class Problem:
                 return None
         if hasattr(system.law, "rates"):
             return self._differences(point, j, nearby, system)
-        stretch, size = self.stretches[j], len(self.scales[j])
+        stretch, size = self.mounted(point.u, j), len(self.scales[j])
         off = point.starts[j][size:]
         neighbours, scaled = [stretch.driven(neighbour, off) for neighbour in nearby], []
         if isinstance(stretch.drive, Sampled):
@@ -276,18 +308,18 @@ class Problem:
         )
         begin, end = len(nearby), len(nearby) + len(off)
         order = [*range(begin), *range(end, len(motion.flow)), *range(begin, end)]
-        delays = self.sensor_knobs(point.u, "delay", j)
+        delays = self.delays(point.u, j)
         return [sensor.changed(motion, delays.get(sensor.channel.name, 0.0))[:, order] for sensor in stretch.sensors]
 
     def _differences(
         self, point: Point, j: int, nearby: Sequence[Oscillator], system: Oscillator
     ) -> list[Array] | None:
         """As `_changed`, of a curved law: forward differences of its motion."""
-        stretch, start, size = self.stretches[j], point.starts[j], len(self.scales[j])
+        stretch, start, size = self.mounted(point.u, j), point.starts[j], len(self.scales[j])
         beside = [(neighbour, start) for neighbour in nearby] + [
             (system, start + STEP * unit) for unit in np.eye(len(start))
         ]
-        delays, columns = self.sensor_knobs(point.u, "delay", j), []
+        delays, columns = self.delays(point.u, j), []
         for moved, begun in beside:
             run = attempted(stretch, moved, self.start(j, begun), begun[size:])
             if run is None:

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stickslip.errors import UNNAMED, EstimateError, ModelError, RecordError
-from stickslip.law.search import ABOVE, Knob, Point, Problem, Profile, descend
-from stickslip.law.stretch import DriveFrom, Sensor, Stretch, as_driven, measured_drive
+from stickslip.law.search import ABOVE, OF_MOUNTS, OF_SENSORS, Knob, Point, Problem, Profile, descend
+from stickslip.law.stretch import DriveFrom, Sensor, Stretch, as_driven, driving, measured_drive
 from stickslip.oscillator import Oscillator
 from stickslip.parameters import find
 from stickslip.record.record import Record
@@ -31,6 +31,7 @@ FINEST = 1e-5  # of a channel's range: noise below it is not asked for
 AUDIBLE = 2.0  # times its noise that a motion must stray
 CALIBRATION = 0.005  # by which gains and springs are wrong, if nothing is known
 DELAYED = 5e-5  # s by which a stated delay is wrong
+MOUNTED = {"frequency": 0.01, "damping": 0.1}  # parts by which what is stated of a mount is wrong: it is hard to tap
 VISCOUS = {"viscous", "slope"}  # parameters of laws that a viscous damper can not be told from
 GRID = {"stiffness": (0.25, 1.0, 4.0, 64.0), "rate": (0.4, 1.0, 2.5), "steepness": (1.0,), "lag": (0.3, 1.0, 3.0)}
 EXCESS = (0.04, 0.15, 0.25, 0.4)  # of static over kinetic friction
@@ -243,7 +244,7 @@ def require_apart(
     for name in (*names, *nuisance):
         head, _, tail = name.rpartition(".")
         sensor = _of_sensor(name)
-        if sensor and head not in channels:
+        if sensor and head not in (*channels, *(_delayed(shown) if tail == "delay" else [])):
             raise ModelError(
                 f"the {tail} of '{head}'",
                 f"the channels that are fitted are {', '.join(channels)}",
@@ -264,9 +265,9 @@ def require_apart(
 
 
 def _of_sensor(name: str) -> bool:
-    """Whether a name is a sensor's gain or delay."""
+    """Whether a name is a sensor's gain or delay, or its mount's frequency or damping."""
     head, _, tail = name.rpartition(".")
-    return head not in ("", "law", "drive") and tail in ("gain", "delay")
+    return head not in ("", "law", "drive") and "." not in head and tail in OF_SENSORS
 
 
 def value_of(oscillator: Oscillator, name: str) -> float:
@@ -288,9 +289,24 @@ def usual_nuisance(oscillator: Oscillator, names: Sequence[str], shown: Sequence
         *(["damping"] if not viscous else []),
         *(["stiffness"] if oscillator.stiffness > 0 else []),
         *(f"{name}.gain" for name in channels),
-        *(["x.delay"] if "x" in channels and len(channels) > 1 else []),
+        *(f"{name}.delay" for name in _delayed(shown) if len(channels) > 1),
+        *(f"{name}.{kind}" for name in channels if _mounted(shown, name) for kind in OF_MOUNTS),
     ]
     return tuple(name for name in usual if name not in names)
+
+
+def _delayed(shown: Sequence[Shown]) -> list[str]:
+    """The channels whose delay is found beside a law: the mass's displacement, and the motion or force that drives it.
+
+    Of all channels one is not late after the others.
+    """
+    driven = [name for motion in shown if (name := driving(motion.record))]
+    return list(dict.fromkeys([*("x" for motion in shown if "x" in motion.channels), *driven]))
+
+
+def _mounted(shown: Sequence[Shown], name: str) -> bool:
+    """Whether a mount of a channel's sensor is stated."""
+    return any(name in motion.channels and motion.record.channels[name].mount for motion in shown)
 
 
 def nuisance_knob(
@@ -298,6 +314,8 @@ def nuisance_knob(
 ) -> Knob:
     """How what is not known well is turned: a damper anywhere from zero on, all else near what is stated."""
     tail = name.rpartition(".")[2]
+    if _of_sensor(name) and tail in MOUNTED:
+        return Knob(name, tail, 1.0, MOUNTED[tail], prior=1.0)
     if _of_sensor(name):
         calibrated = Knob(name, tail, 1.0, 0.01, prior=max(calibration, 1e-9) / 0.01)
         return calibrated if tail == "gain" else Knob(name, tail, 0.0, 1e-4, prior=DELAYED / 1e-4)
@@ -393,8 +411,7 @@ def thinned(stretch: Stretch) -> Stretch:
     sensors = []
     for sensor in stretch.sensors:
         rows = slice(None, None, max(1, int(len(sensor.time) / THIN)))
-        known, _ = np.linalg.qr(sensor.known[rows])
-        sensors.append(replace(sensor, time=sensor.time[rows], readings=sensor.readings[rows], known=known))
+        sensors.append(replace(sensor, time=sensor.time[rows], readings=sensor.readings[rows]))
     drive = replace(stretch.drive, unsure=())  # type: ignore[type-var]
     return replace(stretch, sensors=tuple(sensors), drive=drive)
 

@@ -287,8 +287,6 @@ class Sensor:
         What was read.
     noise : float
         Its standard deviation.
-    known : ndarray (n, q)
-        Orthonormal columns of what is free in any reading: an offset, and what the mount still rings with.
     """
 
     channel: Channel
@@ -296,7 +294,6 @@ class Sensor:
     time: Array
     readings: Array
     noise: float
-    known: Array
 
     @classmethod
     def of(cls, record: Record, name: str, span: tuple[float, float], noise: float) -> Sensor:
@@ -305,16 +302,26 @@ class Sensor:
         first = max(0, math.ceil((span[0] + channel.delay) * record.fs - 1e-9))
         last = min(len(record), math.floor((span[1] + channel.delay) * record.fs + 1e-9) + 1)
         time = np.arange(first, last) / record.fs - channel.delay - span[0]
-        columns = [np.ones(len(time))]
-        for pole in _response(channel).poles:
+        return cls(channel, slice(first, last), time, record[name][first:last], noise)
+
+    def remounted(self, frequency: float, damping: float) -> Sensor:
+        """The sensor, its mount's resonance and damping ratio so many times those stated."""
+        if (frequency, damping) == (1.0, 1.0) or self.channel.mount is None:
+            return self
+        stated = self.channel.mount
+        return replace(self, channel=replace(self.channel, mount=(frequency * stated[0], damping * stated[1])))
+
+    @cached_property
+    def known(self) -> Array:
+        """Orthonormal columns (n, q) of what is free in any reading: an offset, and what the mount still rings with."""
+        columns = [np.ones(len(self.time))]
+        for pole in self.response.poles:
             if pole.imag >= 0:
-                ringing = np.exp(pole * time)
+                ringing = np.exp(pole * self.time)
                 columns += [ringing.real, ringing.imag] if pole.imag > 0 else [ringing.real]
         known, triangle = np.linalg.qr(np.column_stack(columns))
         sizes = np.abs(np.diag(triangle))
-        return cls(
-            channel, slice(first, last), time, record[name][first:last], noise, known[:, sizes > 1e-6 * sizes[0]]
-        )
+        return np.asarray(known[:, sizes > 1e-6 * sizes[0]])
 
     def predicted(self, run: Motion, late: float) -> tuple[Array, NDArray[np.int64] | None]:
         """What it would read of a run, but for its gain and what is `known`; `late` [s] beyond the stated delay.

@@ -16,7 +16,7 @@ from stickslip.errors import EstimateError
 from stickslip.law.data import FAST, Rests
 from stickslip.law.search import Knob, Point, Problem, descend, rows_of
 from stickslip.law.start import Shown, bounded, free_names, knob, nuisance_knobs, thinned
-from stickslip.law.stretch import Motion, Sampled, Sensor, Stretch, as_driven, attempted, face_of
+from stickslip.law.stretch import Sampled, Sensor, Stretch, as_driven, face_of
 from stickslip.law.verdict import Evidence, Key, independent
 from stickslip.laws.guessing import LEAST_EXCESS, STIFF, STIFFEST, Hypothesis, Observed
 from stickslip.oscillator import Oscillator
@@ -33,7 +33,6 @@ CONTENDING = 100.0  # times the least misfit of the others: a law beyond is not 
 NO_WORSE = 1.01  # times a law's misfit, that one which contains it may end with: a descent settles within that
 PASSES, LAST_PASSES = 12, 3  # of a descent: of a law, and of one that stands near its end
 TURNS = 24  # of the motion, after which a record tells laws apart no better
-DETUNED = (0.01, 0.0025)  # steps in which a mount is tried, against what is stated
 SILENT = 0.2  # of a channel's size, left by the best law: nothing is known of such a sensor
 COARSE = 0.3  # of the calibration's error, by which a base's motion may be missed where laws are compared
 SLOW = 0.05  # of the largest speed, below which the contact may hold
@@ -333,56 +332,6 @@ def unexplained(trial: Trial, shown: Sequence[Shown]) -> dict[str, float]:
         if name not in "xv" and not stated and share > math.hypot(SILENT, noise):
             silent[name] = max(share, silent.get(name, 0.0))
     return silent
-
-
-def tuned(shown: Sequence[Shown], trial: Trial, stretch: Callable[[Shown, int], Stretch], tell: Tell) -> list[Shown]:
-    """The records with each mount's resonance where a law leaves least, within what a calibration is off."""
-    named = ((name, motion.record.channels[name].mount) for motion in shown for name in motion.channels)
-    mounts = {name: mount for name, mount in named if mount}
-    best, motions = list(shown), _motions(trial)
-    for name, mount in mounts.items():
-        assert mount is not None
-        tried: dict[float, tuple[float, list[Shown]]] = {}
-        for step in DETUNED:
-            middle = min(tried, key=lambda share: tried[share][0]) if tried else 1.0
-            for share in {middle + turns * step for turns in (-2, -1, 0, 1, 2)} - set(tried):
-                tell()
-                moved = [_remounted(motion, name, (share * mount[0], mount[1])) for motion in best]
-                left = [_unread(trial, motions, stretch(motion, j), j, name) for j, motion in enumerate(moved)]
-                tried[share] = math.fsum(left), moved
-        best = min(tried.items(), key=lambda item: (item[1][0], item[0]))[1][1]
-    return best
-
-
-def _motions(trial: Trial) -> list[Motion | None]:
-    """What happens in each stretch at the end of a search."""
-    motions = []
-    for j, stretch in enumerate(trial.problem.stretches):
-        start = trial.point.starts[j]
-        off = start[len(trial.problem.scales[j]) :]
-        run = attempted(stretch, trial.system, trial.problem.start(j, start), off)
-        motions.append(None if run is None else stretch.motion(run))
-    return motions
-
-
-def _unread(trial: Trial, motions: Sequence[Motion | None], stretch: Stretch, j: int, name: str) -> float:
-    """Mean square of what a motion leaves of a sensor's readings, its gain whatever it may be."""
-    motion = motions[j]
-    sensors = [sensor for sensor in stretch.sensors if sensor.channel.name == name]
-    if motion is None or not sensors:
-        return 0.0
-    late = trial.problem.sensor_knobs(trial.point.u, "delay", j).get(name, 0.0)
-    fitted, read = (sensors[0].freed(values) for values in (sensors[0].predicted(motion, late)[0], sensors[0].readings))
-    return float(
-        sensors[0].noise ** 2
-        * np.mean((read - fitted * (float(fitted @ read) / max(float(fitted @ fitted), 1e-300))) ** 2)
-    )
-
-
-def _remounted(shown: Shown, name: str, mount: tuple[float, float]) -> Shown:
-    if name not in shown.record:
-        return shown
-    return replace(shown, record=shown.record.with_details(name, mount=mount))
 
 
 # ---- what records say of sliding and friction before any law is tried on them

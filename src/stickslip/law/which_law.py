@@ -39,10 +39,8 @@ from stickslip.law.trials import (
     Trial,
     evidence_of,
     like,
-    resumed,
     seen_by,
     squares,
-    tuned,
     unexplained,
     weighed,
     with_static,
@@ -52,7 +50,6 @@ from stickslip.law.verdict import (
     LEFT,
     SUPPORTED,
     Candidate,
-    Evidence,
     LawComparison,
     Misfit,
     Remainder,
@@ -77,7 +74,6 @@ UNEVEN = 0.1  # of its mean, that a surface strays
 WORK = 24.0  # calls of progress after which most of a fit is taken to be done
 CALLS = 40.0  # of progress that the trial of a law is taken for
 LOOK = 2  # passes of a descent after which it is seen how the sensors' mounts swing
-RETUNED = 8  # times that mounts and law are found in turn
 # times as wide as chance, by unit: so 95 % of intervals held on the first 39 rigs of `benchmarks/servo_laws.py --first
 # 6000`, of a contact's damping on the first 59
 STRAY, STRAYS = 1.25, {"N s/m": 2.5, "m/s": 4.0, "s/m": 4.0}
@@ -118,9 +114,10 @@ def fit_law(
         Parameters to fit, as :meth:`Oscillator.having` names them; all the law's that are not zero where left out.
         Empty: only the starts are fitted, to predict another record.
     nuisance : sequence of str, optional
-        What else is not known well: "mass", "stiffness", "damping", a sensor's "x.gain" or "x.delay". Where left out:
-        the damper, which may be anything from zero on, the spring and all gains, which are trusted to 0.5 %, and the
-        delay of x, to 50 us; with nothing free, nothing. Empty: all is as stated.
+        What else is not known well: "mass", "stiffness", "damping", a sensor's "x.gain" or "x.delay", its
+        mount's "a.frequency" or "a.damping". Where left out: the damper, which may be anything from zero on, the spring
+        and all gains, which are trusted to 0.5 %, the delays of x and z, to 50 us, and the mounts that are stated, to
+        1 % of their frequency and 10 % of their damping ratio; with nothing free, nothing. Empty: all is as stated.
     channels : sequence of str, optional
         Channels to explain; all that were measured where left out.
     law : str, type or law, optional
@@ -363,8 +360,8 @@ def compare_laws(
     ranking, confidence = standings(
         misfits, evidence, likely=rests.probabilities(calibration, CALIBRATIONS * calibration)
     )
-    best, final = search.settled(trials[ranking[0].name], looked, evidence, rests.fall)
-    fit = search.fitted(best, final, rests.fall)
+    best = trials[ranking[0].name]
+    fit = search.fitted(best, looked.shown, rests.fall)
     supported = evidence.supported if Remainder.of_fit(fit).explained else SUPPORTED
     doubt, confidence = doubt_of(fit, oscillator, calibration), min(confidence, supported)
     if doubt:
@@ -378,17 +375,16 @@ def compare_laws(
     if not doubt:
         candidates = tuple(one.worded(fit, first=one is candidates[0]) for one in candidates)
     worries: list[Doubt | str] = [*looked.worries]
-    worries += filter(None, [too_few(final, best.count), unexplained_part(fit)])
+    worries += filter(None, [too_few(looked.shown, best.count), unexplained_part(fit)])
     answer = concluded(candidates, confidence, fit, rigid, calibration, records, doubt, worries)
     damper = () if doubt else damper_found(fit, oscillator.damping)
     return replace(answer, verdict=" ".join([answer.verdict, *damper]))
 
 
 class _Looked(NamedTuple):
-    """The records after a first look: as they are compared, and before their mounts were moved."""
+    """The records after a first look, as they are compared."""
 
     shown: Sequence[Shown]
-    stated: Sequence[Shown] | None  # None where no law could be looked at
     worries: tuple[str, ...]
 
 
@@ -396,18 +392,18 @@ class _Search(Search):
     """Laws searched, the likeliest looked at more closely and fitted."""
 
     def trials(self, shown: Sequence[Shown]) -> tuple[dict[str, Trial], _Looked]:
-        """Every law at the end of its search; a first look tells which channels count, how much, and their mounts."""
-        rough, looked, evidence = self.tried(shown, None, LOOK, {}), _Looked(shown, None, ()), None
+        """Every law at the end of its search; a first look tells which channels count, and how much."""
+        rough, looked, evidence = self.tried(shown, None, LOOK, {}), _Looked(shown, ()), None
         if rough:
             nearest = min(rough.values(), key=lambda trial: trial.point.chi2)
             silent = unexplained(nearest, shown)
-            stated = [replace(one, channels=tuple(n for n in one.channels if n not in silent)) for one in shown]
+            counted = [replace(one, channels=tuple(n for n in one.channels if n not in silent)) for one in shown]
             worries = tuple(
                 f"{name} is left out: the best law leaves {100 * share:.0f} % of it, and no mount or delay of its "
                 "sensor is stated"
                 for name, share in silent.items()
             )
-            looked = _Looked(tuned(stated, nearest, self.stretch(None), self.tell), stated, worries)
+            looked = _Looked(counted, worries)
             evidence = evidence_of(nearest, looked.shown)
         trials = self.tried(looked.shown, evidence, PASSES, {} if looked.worries else rough)
         if not trials:
@@ -418,23 +414,9 @@ class _Search(Search):
             )
         return trials, looked
 
-    def settled(
-        self, best: Trial, looked: _Looked, evidence: Evidence, rigid: Estimate | None
-    ) -> tuple[Trial, Sequence[Shown]]:
-        """The best law, with the records' mounts by the law that was found, not by the first look."""
-        if best.name == "static" and rigid is not None:
-            best = with_static(best, rigid.value)
-        shown, stretch = looked.shown, self.stretch(evidence)
-        for _ in range(0 if looked.stated is None else RETUNED):
-            before, shown = shown, tuned(looked.stated or (), best, stretch, self.tell)
-            if [motion.record.channels for motion in before] == [motion.record.channels for motion in shown]:
-                break
-            stretches = [stretch(motion, number) for number, motion in enumerate(shown)]
-            best = resumed(best, stretches, math.inf, PASSES, self.tell) or best
-        return best, shown
-
     def fitted(self, best: Trial, shown: Sequence[Shown], rigid: Estimate | None) -> LawFit:
         """The best law's fit to all readings, with the static friction that the releases tell."""
+        best = best if best.name != "static" or rigid is None else with_static(best, rigid.value)
         whole = [weighed(motion, number, self.calibration, whole=True) for number, motion in enumerate(shown)]
         fit = _fit(best, shown, whole, self.tell)
         return fit if best.name != "static" or rigid is None else _with_static(fit, rigid)
@@ -513,11 +495,11 @@ def _calibrated(fit: LawFit, records: Sequence[Record], calibration: float) -> L
         moved, weighed = (part in dimensions(one.unit) for part in ("length", "mass"))
         if moved or weighed:
             unsure = math.hypot(driven and moved, not felt and weighed)
-            parameters[key] = _widened(one, unsure * calibration, 1.0 if felt else STRAYS.get(one.unit, STRAY))
+            parameters[key] = widened(one, unsure * calibration, 1.0 if felt else STRAYS.get(one.unit, STRAY))
     return replace(fit, parameters=parameters)
 
 
-def _widened(estimate: Estimate, share: float, times: float) -> Estimate:
+def widened(estimate: Estimate, share: float, times: float = 1.0) -> Estimate:
     """The estimate, unsure by a share of its value besides, and so many times as unsure."""
     more, (low, high) = share * abs(estimate.value), estimate.interval
     ends = (estimate.value - low, high - estimate.value)
