@@ -26,7 +26,6 @@ import stickslip as ss
 import stickslip.bench as bench
 from stickslip.lab.play import conversation, readable
 from stickslip.lab.workers import frame
-from stickslip.story.words import interval_of, value_of
 from stickslip.workers import pool
 
 WANTED = ("open", "close", "record", "stop", "mark", "drive")
@@ -283,7 +282,7 @@ class Session:
 
     def _show(self, estimates: Iterable[ss.Estimate], untold: list[str]) -> None:
         """Numbers on every page, and why some are not there."""
-        rows = [(one.name, value_of(one), interval_of(one)) for one in estimates]
+        rows = [(line.name, line.value, line.interval) for line in map(ss.story.Line.of, estimates)]
         self.tell(frame({"kind": "numbers", "rows": rows, "untold": untold}))
 
 
