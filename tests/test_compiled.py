@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import shutil
 import subprocess
@@ -88,6 +89,18 @@ def test_a_folder_named_by_the_user_goes_first(copy: Path, tmp_path: Path) -> No
 
 
 SQUARE = "from stickslip.compiled import compiled\n\n@compiled()\ndef square(x):\n    return x * x\n"
+
+
+FOURTH = f"{SQUARE}\n@compiled()\ndef fourth(x):\n    return square(square(x))\n"
+
+
+def test_what_compiled_code_calls_answers_python_as_well(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(compiled, "_root", lambda: tmp_path)
+    for _ in range(2):  # compiled, and found on disk: what is kept for compiled callers has no entrance for Python
+        module = compiled.generated(FOURTH)
+        assert (module.fourth(2.0), module.square(3.0)) == (16.0, 9.0)
+        assert gc.isenabled()
+    assert sum(module.square.stats.cache_hits.values()) == 1
 
 
 def test_who_watches_is_told_that_it_compiles_and_for_how_long(
