@@ -31,10 +31,6 @@ from stickslip.statistics import mean_of_cycles
 
 # A joint has no twins: swept through its turns without a rest it was told to stand still 1.0 to 2.3 % of the time.
 TURNS = Doubt("a joint that never rests may seem to stand still as well where it turns", UNTRIED)
-# Of 259 joints whose teeth have up to 1.5 degrees of it, intervals of the load part held 83 %, of others 87 to 94 %.
-PLAY = Doubt(
-    "where the teeth part the torque is not that of the link: intervals are a little narrow", "play", lesser=True
-)
 # What a column holds, by how ROS and ros2_control, LeRobot, MuJoCo, Dynamixel and drives of machines call it.
 NAMES = {
     "theta": (
@@ -126,7 +122,6 @@ def analyze_joint(
     play = partial(joint_backlash, whole, joint=joint)
     backlash = inquiry.ask("Backlash", play, aside=True) if "motor" in whole else None
     sticks = inquiry.ask("Sticks and slips", partial(find_sticks, whole, method="speed"), aside=True)
-    joint = with_doubt(joint, PLAY) if backlash is not None and backlash.claimed else joint
     results = {"joint": joint, "breakaway": breakaway, "backlash": backlash}
     results["sticks"] = with_doubt(sticks, TURNS)
     assumed = {key: channel.unit for key, channel in log.channels.items() if channel.assumed and key != "motor"}

@@ -129,13 +129,16 @@ def regress_joint(
     The balance is weighed by windows that lie within a stroke, so that sticking, and friction that differs near rest,
     do not enter, and is solved by least squares; where the log has the reference, its columns are the instruments
     (Gautier, Janot and Vandanjon 2013), so that the noise of the encoder pulls nothing towards zero.
-    Intervals hold for correlated residuals, and hold the stated constants' uncertainty.
+    Intervals hold for correlated residuals, and hold the stated constants' uncertainty. Where the motor has an encoder
+    of its own, inertia and viscous friction go with the mean of both motions, :math:`(q_m/N + q)/2`, which part where
+    teeth with play change sides; that nobody knows which share of them is the motor's is in the intervals.
 
     Parameters
     ----------
     record : Record
         With ``theta`` [rad] (or ``x`` [m], of an axis that moves straight: its force is then in N) and one of
-        ``force``, ``current`` [A] or ``reference``. Delays stated for them are taken out first.
+        ``force``, ``current`` [A] or ``reference``; with ``motor``, the angle before the gear in any unit, it is that
+        of the link. Delays stated for them are taken out first.
     inertia : float, str, tuple or Estimate, optional
         Moment of inertia [kg m^2]; regressed where it is not stated.
     kp, kd : float, str, tuple or Estimate, optional
@@ -192,7 +195,7 @@ def _answer(
     if "uneven" in terms:
         ways = [tell.sum({"viscous": 1, "uneven": by}, f"viscous friction {way}") for by, way in WAYS]
     inertia = replace(data.stated["inertia"], name="inertia") if "inertia" in data.stated else known["inertia"]
-    speed, acceleration = (window.apply(data.logs[0].position, order)[rows] for order in (1, 2))
+    speed, acceleration = (window.apply(data.logs[0].turned, order)[rows] for order in (1, 2))
     weight = pull[0] * window.apply(np.sin(data.logs[0].position))[rows]
     weight += pull[1] * window.apply(np.cos(data.logs[0].position))[rows]
     damped = known["damping"].value * _error_rate(data) if "damping" in known else np.zeros(len(data.raw))
@@ -246,8 +249,8 @@ def _worries(data: JointData, fit: LeastSquares, terms: tuple[str, ...], record:
         worries.append(f"only {fit.independent:.0f} independent samples for {len(terms)} coefficients")
     if data.logs[0].reference is None and "inertia" in terms:
         window, rows = data.logs[0].sliding.window, data.logs[0].sliding.rows
-        column = window.apply(data.logs[0].position, 2)[rows]
-        noise = noise_level(data.logs[0].position, record.fs) * window.noise_of_acceleration
+        column = window.apply(data.logs[0].turned, 2)[rows]
+        noise = noise_level(data.logs[0].turned, record.fs) * window.noise_of_acceleration
         noisy = float(noise**2 / np.mean(column**2))
         if noisy > BIASED:
             doubt = f"noise in the acceleration lowers the inertia by about {100 * noisy:.2g} %: log the reference too"

@@ -17,7 +17,7 @@ from stickslip.cycle.regression import TURNING, UNITS
 from stickslip.errors import EstimateError, ModelError, RecordError
 from stickslip.estimate import NORMAL_95, Constant, Doubt, Estimate, Status
 from stickslip.record.record import Record, Step, require_record
-from stickslip.signals.derivatives import differentiate, five_point_difference
+from stickslip.signals.derivatives import differentiate, five_point_difference, smooth
 from stickslip.signals.interpolate import without_delays
 from stickslip.signals.noise import quantisation_step
 from stickslip.statistics import LeastSquares, least_squares
@@ -38,6 +38,7 @@ ROUNDS = 25  # of the regression about a load part: six are enough where the log
 SETTLED = 1e-6  # of the load part between two rounds
 STARTS = (0.0, 0.3)  # of the load part: from none alone one joint in a hundred ended where gravity has the wrong sign
 SURELY = 4.0  # deviations, by which the viscous friction of both directions differs: chance gives that once in 15000
+TOGETHER = 0.995  # correlation of motor and link: an encoder that wraps, or the motor of another joint, has less
 BARELY = 0.5  # of a value: an interval that is wider on either side hardly tells it
 CONFOUNDED = "confounded"  # a kind of doubt
 WORDS = {
@@ -157,16 +158,24 @@ class Log:
     Attributes
     ----------
     position : ndarray, shape (n,)
-        Of the joint.
+        Of the joint, behind its gear.
     reference : ndarray or None
         What its controller was told, which knows nothing of the encoder's noise.
     sliding : Sliding
         When it slides.
+    lead : ndarray
+        By how much the motor is ahead of the link; zeros where one encoder tells of both.
     """
 
     position: Array
     reference: Array | None
     sliding: Sliding
+    lead: Array
+
+    @property
+    def turned(self) -> Array:
+        """The motion of motor and link, half of each."""
+        return np.asarray(self.position + self.lead / 2)
 
     def columns(
         self, terms: tuple[str, ...], load: float, pull: tuple[float, float], *, steered: bool = False
@@ -187,14 +196,16 @@ class Log:
         steered : bool
             From the reference in place of the position: the instruments.
         """
-        position = self.reference if steered and self.reference is not None else self.position
+        position, turned = self.position, self.turned
+        if steered and self.reference is not None:
+            position = turned = self.reference
         side, window = self.sliding.side, self.sliding.window
         carried = pull[0] * np.sin(position) + pull[1] * np.cos(position)
         stronger = 1 + load * side * np.sign(carried)
         made = {
-            "inertia": lambda: window.apply(position, 2),
-            "viscous": lambda: window.apply(position, 1),
-            "uneven": lambda: window.apply(side * five_point_difference(position, 1) * window.fs),
+            "inertia": lambda: window.apply(turned, 2),
+            "viscous": lambda: window.apply(turned, 1),
+            "uneven": lambda: window.apply(side * five_point_difference(turned, 1) * window.fs),
             "forward": lambda: window.apply(np.maximum(side, 0.0)),
             "back": lambda: window.apply(np.minimum(side, 0.0)),
             "coulomb": lambda: window.apply(side),
@@ -213,6 +224,30 @@ class Log:
         if steered:
             return window.apply(five_point_difference(self.reference, 1) * fs, 2)
         return window.apply(self.position - self.reference, 1)
+
+    def quiet(self) -> Log:
+        """With the motion freed of its noise, beyond a stroke: that would bend a fit, but less than noise a prediction.
+
+        Within a short window the counts of an encoder are accelerations: of 95 joints they were what the worst tenth of
+        predictions missed, 17 % of the torque; without them that is 8 %.
+        """
+        fs = self.sliding.window.fs
+        link, motor = (smooth(motion, fs).values for motion in (self.position, self.position + self.lead))
+        return replace(self, position=link, lead=motor - link)
+
+    def unshared(self, inertia: float, viscous: float) -> tuple[Array, Array]:
+        """Standard deviations of the torque at the rows, as nobody knows what of these is the motor's, none to all."""
+        apart = self.lead / math.sqrt(12)  # of half of it, an evenly spread share leaves that
+        accelerated, moved = (self.sliding.window.apply(apart, order)[self.sliding.rows] for order in (2, 1))
+        return inertia * accelerated, viscous * moved
+
+
+def motor_lead(link: Array, motor: Array) -> Array | None:
+    """By how much a motor is ahead of its link, the gear's ratio found beside; None where they do not turn together."""
+    if np.ptp(link) == 0 or np.ptp(motor) == 0 or abs(np.corrcoef(link, motor)[0, 1]) < TOGETHER:
+        return None
+    ratio, offset = np.polyfit(link, motor, 1)
+    return np.asarray((motor - offset) / ratio - link)
 
 
 # ---- what is regressed
@@ -244,10 +279,20 @@ class JointData:
 
     def model(self, fit: LeastSquares, terms: tuple[str, ...], pull: tuple[float, float]) -> Array:
         """What a fit, of these logs or of others, makes of the torque."""
-        share = float(fit.coefficients[terms.index("load")]) if "load" in terms else 0.0
+        share = coefficient(fit, terms, "load")
         bare = tuple(term for term in terms if term != "load")
-        columns = self.columns(bare, share, pull)
+        columns = np.concatenate([log.quiet().columns(bare, share, pull) for log in self.logs])
         return np.asarray(self.known + columns @ fit.coefficients[[terms.index(term) for term in bare]])
+
+    def unshared(self, inertia: float, viscous: float) -> tuple[Array, Array]:
+        """As :meth:`Log.unshared`, of all logs."""
+        accelerated, moved = zip(*(log.unshared(inertia, viscous) for log in self.logs), strict=True)
+        return np.concatenate(accelerated), np.concatenate(moved)
+
+
+def coefficient(fit: LeastSquares, terms: Sequence[str], term: str) -> float:
+    """Of one term, 0 where the regression has it not."""
+    return float(fit.coefficients[terms.index(term)]) if term in terms else 0.0
 
 
 def pooled(data: Sequence[JointData]) -> JointData:
@@ -288,7 +333,7 @@ def _constants(record: Record, **given: Constant | None) -> dict[str, Estimate]:
 def _torqued(record: Record, constants: dict[str, Estimate]) -> Record:
     """The record with a torque, from a current where it has none; delays taken out."""
     position = "theta" if turning(record) else "x"
-    used = [name for name in (position, "reference", "force", "current") if name in record]
+    used = [name for name in (position, "motor", "reference", "force", "current") if name in record]
     record.require_clean(position, *used, question=QUESTION, samples=LEAST)
     record = without_delays(record, *used, question=QUESTION, samples=LEAST)
     if "force" not in record and "current" in record and "torque_constant" in constants:
@@ -319,12 +364,13 @@ def _data_of(record: Record, constants: dict[str, Estimate], gravity: bool) -> J
         raise EstimateError("the position never changes", f"{QUESTION} needs motion", "check the column")
     slides = sliding(position, record.fs)
     _refuse_still(slides, record)
-    log = Log(position, reference, slides)
+    lead = motor_lead(position, record["motor"]) if "motor" in record else None
+    log = Log(position, reference, slides, np.zeros(len(position)) if lead is None else lead)
     window, rows = slides.window, slides.rows
     terms = ["viscous", "forward", "back", *(("sine", "cosine", "load") if gravity else ())]
     known, unsure = np.zeros(len(rows)), []
     if "inertia" in constants:
-        column = window.apply(position, 2)[rows]
+        column = window.apply(log.turned, 2)[rows]
         known, unsure = known + constants["inertia"].value * column, [constants["inertia"].sd * column]
     else:
         terms.insert(0, "inertia")
@@ -431,9 +477,7 @@ def _solved(data: JointData, terms: tuple[str, ...], share: float, pull: tuple[f
 
 
 def _pull(fit: LeastSquares, terms: Sequence[str]) -> tuple[float, float]:
-    if "sine" not in terms:
-        return 0.0, 0.0
-    return float(fit.coefficients[terms.index("sine")]), float(fit.coefficients[terms.index("cosine")])
+    return coefficient(fit, terms, "sine"), coefficient(fit, terms, "cosine")
 
 
 def _inseparable(data: JointData, terms: tuple[str, ...]) -> EstimateError:
@@ -462,6 +506,13 @@ class Telling:
     turning: bool
     status: str
 
+    @cached_property
+    def unsure(self) -> tuple[Array, ...]:
+        """What the torque is unsure by beside its residuals: by what was stated, and by what nobody stated."""
+        stated = self.data.stated.get("inertia")
+        inertia = stated.value if stated else coefficient(self.fit, self.terms, "inertia")
+        return *self.data.unsure, *self.data.unshared(inertia, coefficient(self.fit, self.terms, "viscous"))
+
     def one(self, term: str) -> Estimate:
         """A coefficient, with a doubt where its interval hardly tells it."""
         estimate = self.sum({term: 1.0}, WORDS[term])
@@ -475,7 +526,7 @@ class Telling:
     def sum(self, weights: dict[str, float], name: str) -> Estimate:
         """A sum of coefficients."""
         row = np.array([weights.get(term, 0.0) for term in self.terms])
-        beside = math.hypot(*(float(row @ self.fit.projection @ column) for column in self.data.unsure), 0.0)
+        beside = math.hypot(*(float(row @ self.fit.projection @ column) for column in self.unsure), 0.0)
         units = {**(TURNING if self.turning else UNITS), "load": "1"}
         kind = {"forward": "coulomb", "back": "coulomb", "sine": "coulomb", "cosine": "coulomb", "damping": "viscous"}
         unit = units[kind.get(next(iter(weights)), next(iter(weights)))]

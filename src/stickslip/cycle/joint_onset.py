@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from stickslip.balance.motion import away_from, stretches
 from stickslip.cycle.joint import JointFriction
-from stickslip.cycle.joint_fit import sliding, turning
+from stickslip.cycle.joint_fit import motor_lead, sliding, turning
 from stickslip.errors import EstimateError
 from stickslip.estimate import NORMAL_95, Estimate, Result
 from stickslip.parameters import finite
@@ -119,9 +119,14 @@ def joint_backlash(record: Record, *, joint: JointFriction) -> JointBacklash:
     record.require_clean(name, "motor", question=PLAY_QUESTION, samples=LEAST_SIDE)
     record = without_delays(record, name, "motor", question=PLAY_QUESTION)
     link, motor = record[name], record["motor"]
-    if np.ptp(motor) == 0 or np.ptp(link) == 0:
-        raise EstimateError("an encoder never changes", f"{PLAY_QUESTION} needs motion of both", "check their columns")
-    ahead = motor / np.polyfit(link, motor, 1)[0]  # the motor's motion knows nothing of the link's counts
+    lead = motor_lead(link, motor)
+    if lead is None:
+        raise EstimateError(
+            "motor and link do not turn together, or one encoder never changes",
+            f"{PLAY_QUESTION} needs the motion of both, without jumps at each turn",
+            "check their columns",
+        )
+    ahead = link + lead  # the motor's motion knows nothing of the link's counts
     velocity, acceleration = (differentiate(ahead, record.fs, order=order).values for order in (1, 2))
     rubbing = joint.level.value * np.sign(velocity) + joint.viscous.value * velocity
     torque, side = _carried(joint, link, rubbing, joint.inertia.value * acceleration)
