@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import gc
+import math
 import os
 import shutil
 import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import stickslip
@@ -101,6 +103,37 @@ def test_what_compiled_code_calls_answers_python_as_well(tmp_path: Path, monkeyp
         assert (module.fourth(2.0), module.square(3.0)) == (16.0, 9.0)
         assert gc.isenabled()
     assert sum(module.square.stats.cache_hits.values()) == 1
+
+
+LINES = """
+a = y[0] * q[1] + h
+b = exp(-2.0 * fabs(a)) / (1.0 + tanh(y[1]))
+c = log(a) if a > 0.0 else (0.5 if a < -1.0 else nan)
+s[0] = b - asinh(c)
+s[1] = power(y[1], q[0]) if y[1] < 2.0 else 0.1
+"""
+FILLED = f"""
+from stickslip.compiled import compiled, straight
+
+lines = straight('''{LINES}''')
+
+@compiled()
+def filled(q, y, h, s):
+    lines(q, y, h, s)
+"""
+
+
+@pytest.mark.parametrize("first", [-3.0, -0.5, 0.7])
+@pytest.mark.parametrize("second", [0.4, 3.0])
+def test_straight_lines_give_what_python_makes_of_them(
+    first: float, second: float, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(compiled, "_root", lambda: tmp_path)
+    q, y, h, s, plain = np.array([1.7, 2.3]), np.array([first, second]), 0.3, np.zeros(2), np.zeros(2)
+    compiled.generated(FILLED).filled(q, y, h, s)
+    known = {name: getattr(math, name) for name in ("exp", "fabs", "tanh", "log", "asinh", "nan")}
+    exec(LINES, {**known, "power": math.pow, "q": q, "y": y, "h": h, "s": plain})
+    np.testing.assert_allclose(s, plain, rtol=1e-15)
 
 
 def test_who_watches_is_told_that_it_compiles_and_for_how_long(

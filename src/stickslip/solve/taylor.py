@@ -14,7 +14,6 @@ from __future__ import annotations
 
 import itertools
 import math
-import re
 from collections.abc import Callable, Iterable
 from functools import cache
 from typing import Any, NamedTuple
@@ -26,7 +25,6 @@ from numba.extending import intrinsic
 from numpy.typing import NDArray
 
 from stickslip.compiled import compiled, generated
-from stickslip.errors import ModelError
 from stickslip.solve.roots import NOISE, NONE, UNSURE, first_rise
 
 Array = NDArray[np.float64]
@@ -43,21 +41,15 @@ STILL = 1e-10  # a power's base below this is zero: there the power is not analy
 ROW = types.float64[::1]
 CODE = types.void(ROW, types.int64, ROW, types.float64, ROW)  # what fills in coefficients, see `expansion`
 Number = tuple[int, ...]
-VARIABLE = re.compile(r"\b[dexqr]\d+\b|\b[dexqr]\d+(?=_)")  # that a :class:`_Writer` names
 HEAD = '''"""Taylor coefficients of one kind of system; written by `stickslip.solve.taylor`."""
 
-from stickslip.compiled import pointer
-from stickslip.solve.taylor import CODE, STILL, value
+from stickslip.compiled import pointer, straight
+from stickslip.solve.taylor import CODE
 
-
-@pointer(CODE, error_model="numpy", fastmath={"contract"})
-def series(q, mode, y, h, s):
 '''
-
-
-# Curved nodes of all modes, each some 0.7 s of compiling at the highest order; of the package's own laws rate and state
-# with a slip law, which has a mode that creeps, has the most, 29.
-MOST = 44
+SHELL = """
+@pointer(CODE, error_model="numpy")
+def series(q, mode, y, h, s):"""
 
 
 @intrinsic
@@ -120,23 +112,6 @@ class Step(NamedTuple):
 def room(nodes: int, order: int) -> Step:
     """Room for the series of so many nodes."""
     return Step(np.zeros(nodes * (order + 1)), np.zeros(order + 1), np.zeros(order + 1), order)
-
-
-@compiled(**OPTIONS)
-def value(kind, at, power):
-    """A function's value: the coefficient of order 0."""
-    if kind == EXP:
-        return math.exp(at)
-    if kind == TANH:
-        return math.tanh(at)
-    if kind == SLOPE:  # of tanh: 1 - tanh^2 without its cancellation
-        fall = math.exp(-2.0 * abs(at))
-        return 4.0 * fall / (1.0 + fall) ** 2
-    if kind == LOG:
-        return math.log(at) if at > 0.0 else math.nan
-    if kind == ASINH:
-        return math.asinh(at)
-    return at**power if at > STILL else (0.0 if power > 0.0 else math.nan)
 
 
 @compiled(**EXACT)
@@ -357,17 +332,9 @@ class Structure(NamedTuple):
 def expansion(nodes: Nodes, kept: tuple[Number, ...], order: int) -> tuple[int, NDArray[np.float64]]:
     """Address of compiled code that fills a work array with coefficients 0 .. `order`, and its numbers.
 
-    Raises a ModelError where the law has so many curved nodes that compiling would not end soon.
-
     It takes the numbers, the mode, the state, the unit of time and the work array; coefficient k of node j stands at
     j (order + 1) + k. The state's are complete, other nodes lack the last (but have that of order 0).
     """
-    if (count := curved_nodes(nodes)) > MOST:
-        raise ModelError(
-            f"a law of {count} different products, quotients and functions in all its modes",
-            f"each is compiled as a series; more than {MOST} would take minutes",
-            "write the curve with fewer, or as a table of points (Tabulated)",
-        )
     low = nodes.low
     parts = [
         np.concatenate([nodes.weights[low[a] : low[b]], nodes.constant[a:b], nodes.power[a:b], nodes.factor[mode]])
@@ -382,11 +349,6 @@ def expansion(nodes: Nodes, kept: tuple[Number, ...], order: int) -> tuple[int, 
     return _compiled(structure, order, numbers.shape[1]), numbers.ravel()
 
 
-def curved_nodes(nodes: Nodes) -> int:
-    """How many nodes of a tape are more than a weighted sum."""
-    return int(np.count_nonzero(nodes.kinds != LINEAR))
-
-
 @cache
 def _compiled(structure: Structure, order: int, stride: int) -> int:
     return int(generated(source(structure, order, stride)).series.address)
@@ -397,13 +359,12 @@ def source(structure: Structure, order: int, stride: int) -> str:
     modes: dict[tuple[str, ...], list[int]] = {}
     for mode in range(len(structure.rate)):
         modes.setdefault(tuple(_Writer(structure, mode, order).lines()), []).append(mode)
-    text = [f"    b = {stride} * mode"]
+    text, choice = [HEAD], []
     for lines, having in modes.items():
-        text.append(f"    if {' or '.join(f'mode == {mode}' for mode in having)}:")
-        # Names of its own: numba goes through all code again for each variable that two branches assign,
-        # which took as long as all the rest of compiling.
-        text.extend("        " + VARIABLE.sub(rf"\g<0>of{having[0]}", line) for line in lines)
-    return HEAD + "\n".join(text) + "\n"
+        text.append('mode_{} = straight("""\n{}\n""")\n'.format(having[0], "\n".join(lines)))
+        choice.append(f"    if {' or '.join(f'mode == {mode}' for mode in having)}:")
+        choice.append(f"        mode_{having[0]}(q[{stride} * mode :], y, h, s)")
+    return "\n".join([*text, SHELL, *choice, ""])
 
 
 class _Writer:
@@ -449,10 +410,10 @@ class _Writer:
         return self.loaded(self.weights + column * (self.end - self.begin) + j)
 
     def loaded(self, place: int) -> str:
-        """A number of the mode, read once: each reading would take the compiler as long as an operation."""
+        """A number of the mode, read once."""
         if place not in self.read:
             self.read.add(place)
-            self.text.append(f"q{place} = q[b + {place}]")
+            self.text.append(f"q{place} = q[{place}]")
         return f"q{place}"
 
     def name(self, j: int, k: int, text: str | None) -> None:
@@ -501,29 +462,29 @@ class _Writer:
         return _times(_difference(self.at(a, k), rest), f"r{j}")
 
     def exp(self, j: int, k: int, a: int, b: int) -> str | None:
-        return self.integral(EXP, j, k, a, j)
+        return self.integral("exp", j, k, a, j)
 
     def tanh(self, j: int, k: int, a: int, b: int) -> str | None:
-        return self.integral(TANH, j, k, a, b)
+        return self.integral("tanh", j, k, a, b)
 
-    def integral(self, kind: int, j: int, k: int, a: int, b: int) -> str | None:
+    def integral(self, function: str, j: int, k: int, a: int, b: int) -> str | None:
         """A function whose derivative is b a'."""
         if k == 0:
-            return f"value({kind}, {self.at(a, 0)}, 0.0)"
+            return f"{function}({self.at(a, 0)})"
         terms = [_times(self.multiple(a, i), self.at(b, k - i)) for i in _inward(1, k)]
         return _times(_sum(terms), repr(1 / k))
 
     def slope(self, j: int, k: int, a: int, b: int) -> str | None:
         if k == 0:  # 1 - tanh^2 where it loses nothing: it is cheaper
-            square = self.at(b, 0)
-            return f"1.0 - {square} if {square} < 0.5 else value({SLOPE}, {self.at(a, 0)}, 0.0)"
+            square, fall = self.at(b, 0), f"exp(-2.0 * fabs({self.at(a, 0)}))"
+            return f"1.0 - {square} if {square} < 0.5 else 4.0 * {fall} / ((1.0 + {fall}) * (1.0 + {fall}))"
         return _times("-1.0", self.at(b, k))
 
     def power(self, j: int, k: int, a: int, b: int) -> str | None:
         exponent, base = self.number(1, j), self.at(a, 0)
         if k == 0:
-            self.inverse(j, f"1.0 / {base} if {base} > STILL else 0.0")
-            return f"value({POWER}, {base}, {exponent})"
+            self.inverse(j, f"1.0 / {base} if {base} > {STILL} else 0.0")
+            return f"power({base}, {exponent}) if {base} > {STILL} else (0.0 if {exponent} > 0.0 else nan)"
         rising = _sum(_times(self.multiple(a, k - i), self.at(j, i)) for i in _inward(0, k - 1))
         own = _sum(_times(self.at(a, k - i), self.multiple(j, i)) for i in _inward(1, k - 1))
         return _times(_difference(_times(exponent, rising), own), f"(r{j} * {1 / k!r})")
@@ -532,7 +493,8 @@ class _Writer:
         """The logarithm and the inverse hyperbolic sine: functions whose derivative is a' / b."""
         if k == 0:
             self.inverse(j, f"1.0 / {self.at(b, 0)}")
-            return f"value({self.tape.kinds[self.begin + j]}, {self.at(a, 0)}, 0.0)"
+            at = self.at(a, 0)
+            return f"asinh({at})" if self.tape.kinds[self.begin + j] == ASINH else f"log({at}) if {at} > 0.0 else nan"
         rest = _sum(_times(self.multiple(j, i), self.at(b, k - i)) for i in _inward(1, k - 1))
         return _times(_difference(self.at(a, k), _times(rest, repr(1 / k))), f"r{j}")
 
