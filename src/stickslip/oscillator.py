@@ -18,7 +18,7 @@ from stickslip.errors import ModelError
 from stickslip.laws.base import Exit, Law, Mode, Row
 from stickslip.laws.coulomb import LinearSlope
 from stickslip.laws.curved import Creeping, CurvedLaw, CurvedMode, lifted
-from stickslip.laws.filippov import with_sliding_modes
+from stickslip.laws.filippov import curved_modes, with_sliding_modes
 from stickslip.laws.guessing import registered
 from stickslip.laws.stribeck import Tabulated
 from stickslip.laws.time_delay import TimeDelay
@@ -139,7 +139,7 @@ class Contact:
         """
         own: Any = self.law
         if isinstance(own, CurvedLaw):
-            return self.closing(with_sliding_modes(own.rates()), own.entry)
+            return self.closing(curved_modes(own), own.entry)
         return self.closing(tuple(map(self._pressed, with_sliding_modes(own.modes()))), own.entry)
 
     def closing(self, law: tuple[Any, ...], entry: tuple[str, str, str]) -> tuple[Any, ...]:

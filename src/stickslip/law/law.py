@@ -215,17 +215,21 @@ def _parameters(problem: Problem, point: Point, sure: Surety | None, system: Osc
     for k, turned in enumerate(problem.knobs):
         if turned.kind == "profile":
             continue
-        values = [_value(turned, u, system) for u in ((point.u[k], *sure.ends[k]) if sure else (point.u[k],) * 3)]
+        values = [valued(turned, u, system) for u in ((point.u[k], *sure.ends[k]) if sure else (point.u[k],) * 3)]
         of_sensor = turned.kind in OF_SENSORS
         unit = ("s" if turned.kind == "delay" else "1") if of_sensor else unit_of(system, turned.name)
-        sd = abs(_value(turned, point.u[k] + 1e-6, system) - values[0]) / 1e-6 * float(sure.sd[k]) if sure else math.nan
+        sd = abs(valued(turned, point.u[k] + 1e-6, system) - values[0]) / 1e-6 * float(sure.sd[k]) if sure else math.nan
         interval = (values[1], values[2]) if sure else (math.nan, math.nan)
         word = _label_of(turned, system)
-        key = turned.name if turned.stretch is None else f"{turned.name}.{turned.stretch + 1}"
-        parameters[key] = Estimate(
+        parameters[keyed(turned)] = Estimate(
             word, values[0], interval, sd, unit, METHOD, _status_of(turned, word, values, unit, sure)
         )
     return parameters
+
+
+def keyed(knob: Knob) -> str:
+    """The name of a parameter in a fit."""
+    return knob.name if knob.stretch is None else f"{knob.name}.{knob.stretch + 1}"
 
 
 def _label_of(knob: Knob, system: Oscillator) -> str:
@@ -236,7 +240,8 @@ def _label_of(knob: Knob, system: Oscillator) -> str:
     return f"{kind} of {knob.channel}" + (f" in record {knob.stretch + 1}" if knob.stretch is not None else "")
 
 
-def _value(knob: Knob, u: float, system: Oscillator) -> float:
+def valued(knob: Knob, u: float, system: Oscillator) -> float:
+    """The parameter at a coordinate, also where that is infinite; of an "above" the level itself."""
     if knob.kind == "log" and math.isinf(u):
         return math.inf if u > 0 else 0.0
     value = knob.value(u)

@@ -32,6 +32,7 @@ ENOUGH = 1e-3  # of the misfit: what a step lowers it less by tells no law from 
 CONTENDING = 100.0  # times the least misfit of the others: a law beyond is not followed to its end
 NO_WORSE = 1.01  # times a law's misfit, that one which contains it may end with: a descent settles within that
 PASSES, LAST_PASSES = 12, 3  # of a descent: of a law, and of one that stands near its end
+LOOK = 2  # passes of a descent after which it is seen how the sensors' mounts swing
 TURNS = 24  # of the motion, after which a record tells laws apart no better
 SILENT = 0.2  # of a channel's size, left by the best law: nothing is known of such a sensor
 COARSE = 0.3  # of the calibration's error, by which a base's motion may be missed where laws are compared
@@ -229,21 +230,24 @@ class Search:
                 begun = [replace(one, law=law) for one, seen in self.seen for law in given or kind.guesses(seen)]
                 begun += self._continued(kind, given, trials)
                 trial = searched(name, begun, stretches, self.known, self.calibration, least, passes, self.tell)
-            trial = self._no_worse(kind, given, trial, trials, passes)
+            if passes > LOOK:
+                trial = self.no_worse(kind, given, trial, trials, passes)
             if trial is not None:
                 trials[name] = trial
         return trials
 
-    def _no_worse(
+    def no_worse(
         self, kind: Hypothesis, given: list[Any], trial: Trial | None, before: Mapping[str, Trial], passes: int
     ) -> Trial | None:
         """The trial, or where it is above a law that it contains, one that begins where that one ends."""
-        inner = min((before[name] for name in kind.contains if name in before), key=_misfit, default=None)
-        if inner is None or (trial is not None and trial.point.chi2 <= NO_WORSE * inner.point.chi2):
-            return trial
-        begun = self._simpler(kind, given, before)
-        ends = [extended(kind.name, inner, law, self.known, passes, self.tell) for law in begun]
-        return min((one for one in (trial, *ends) if one is not None), key=_misfit, default=None)
+        inner = sorted((before[name] for name in kind.contains if name in before), key=_misfit)
+        for simpler in inner:
+            if trial is not None and trial.point.chi2 <= NO_WORSE * inner[0].point.chi2:
+                break
+            begun = self._simpler(given, {simpler.name: simpler}, kind.next_to or kind.continued)
+            ends = [extended(kind.name, simpler, law, self.known, passes, self.tell) for law in begun]
+            trial = min((one for one in (trial, *ends) if one is not None), key=_misfit, default=None)
+        return trial
 
     def _continued(self, kind: Hypothesis, given: list[Any], before: Mapping[str, Trial]) -> list[Oscillator]:
         """Where else a search begins: where those of simpler laws end, with the damper of the one that left least."""
@@ -251,11 +255,13 @@ class Search:
             return []
         nearest = min(before.values(), key=_misfit)
         stated = nearest.problem.oscillator.having(damping=nearest.system.damping)
-        return [replace(stated, law=law) for law in self._simpler(kind, given, before)]
+        return [replace(stated, law=law) for law in self._simpler(given, before, kind.continued)]
 
-    def _simpler(self, kind: Hypothesis, given: list[Any], before: Mapping[str, Trial]) -> list[Any]:
+    def _simpler(
+        self, given: list[Any], before: Mapping[str, Trial], starts: Callable[[Mapping[str, Trial]], list[Any]]
+    ) -> list[Any]:
         """The law next to simpler ones where their searches end; of one with values such as it is."""
-        begun = kind.continued(before)
+        begun = starts(before)
         if not given:
             return begun
         asked = replace(self.seen[0][0], law=given[0])
@@ -290,8 +296,13 @@ def extended(name: str, simpler: Trial, law: Any, known: Sequence[str], passes: 
     for start, scale, now in zip(simpler.point.starts, before.scales, problem.begin_states(), strict=True):
         starts.append(np.concatenate([start[:2], now[2:], start[len(scale) :]]))
     point = problem.at(np.append(np.zeros(len(own)), simpler.point.u[kept]), tuple(starts))
-    point = descend(problem, point, passes=passes, share=ENOUGH, tell=tell)
-    return Trial(name, problem, point) if math.isfinite(point.chi2) else None
+    trial = Trial(name, problem, point)
+    # a curved law next to rigid says what the simpler one says, and each pass costs ten times another law's
+    limit = trial.stiff and hasattr(law, "rates")
+    enough = NO_WORSE * simpler.point.chi2 if limit else -math.inf
+    if point.chi2 > enough:
+        point = descend(problem, point, passes=passes, share=ENOUGH, enough=enough, tell=tell)
+    return replace(trial, point=point) if math.isfinite(point.chi2) else None
 
 
 def with_static(trial: Trial, excess: float) -> Trial:

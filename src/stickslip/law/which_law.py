@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from stickslip.errors import EstimateError, ModelError
 from stickslip.estimate import NORMAL_95, Doubt, Estimate
-from stickslip.law.law import MISFIT, LawFit, answered, surety, teller
+from stickslip.law.law import MISFIT, LawFit, answered, keyed, surety, teller, valued
 from stickslip.law.search import Knob, Point, Problem, Profile, descend, rows_of
 from stickslip.law.start import (
     CALIBRATION,
@@ -33,6 +33,7 @@ from stickslip.law.start import (
 )
 from stickslip.law.stretch import Stretch, channels_of
 from stickslip.law.trials import (
+    LOOK,
     PASSES,
     Search,
     Seen,
@@ -73,7 +74,6 @@ STIFFEST = 1e-5  # of the stroke: what a contact gives way at least
 UNEVEN = 0.1  # of its mean, that a surface strays
 WORK = 24.0  # calls of progress after which most of a fit is taken to be done
 CALLS = 40.0  # of progress that the trial of a law is taken for
-LOOK = 2  # passes of a descent after which it is seen how the sensors' mounts swing
 # times as wide as chance, by unit: so 95 % of intervals held on the first 39 rigs of `benchmarks/servo_laws.py --first
 # 6000`, of a contact's damping on the first 59
 STRAY, STRAYS = 1.25, {"N s/m": 2.5, "m/s": 4.0, "s/m": 4.0}
@@ -179,7 +179,8 @@ def fit_law(
     )
     point = _descended(problem, tell)
     if free is None and not rough and not _explains(problem, point):
-        problem, point = _from_simpler(problem, point, records, shown, tell)
+        guessed = isinstance(law, str | type)
+        problem, point = _from_simpler(problem, point, records, shown, guessed=guessed, tell=tell)
     sure = surety(problem, point, tell) if intervals else None
     if progress:
         progress(1.0)
@@ -221,12 +222,19 @@ def _explains(problem: Problem, point: Point) -> bool:
 
 
 def _from_simpler(
-    problem: Problem, point: Point, records: Sequence[Record], shown: Sequence[Shown], tell: Callable[[], None]
+    problem: Problem,
+    point: Point,
+    records: Sequence[Record],
+    shown: Sequence[Shown],
+    *,
+    guessed: bool,
+    tell: Callable[[], None],
 ) -> tuple[Problem, Point]:
     """Where a search ends that begins at those of the simpler laws which the law contains, where that is lower.
 
     A law next to rigid, or with a curve that is next to none, has valleys of its own: a compliant contact left 6 times
-    the noise of a record of another compliant contact, bristles 32 times that of a rigid one, which they contain.
+    the noise of a record of another compliant contact, bristles 32 times that of a rigid one, which they contain. Where
+    the search began at values that were given, the ones that the friction suggests are tried as well.
     """
     asked = problem.oscillator
     kind = hypothesis_of(asked.law)
@@ -237,8 +245,10 @@ def _from_simpler(
     nuisance = [turned.name for turned in problem.knobs if turned.name not in free_names(asked, None)]
     nuisance = list(dict.fromkeys(nuisance))
     stated = [asked, *([seen_damping(asked, shown)] if "damping" in nuisance else [])]
-    search = Search([(one, []) for one in (*inner, kind)], seen_by(records, stated), nuisance, CALIBRATION, tell)
-    trial = search.tried(shown, None, PASSES, {}).get(kind.name)
+    own = [] if guessed else [kind]
+    search = Search([(one, []) for one in (*inner, *own)], seen_by(records, stated), nuisance, CALIBRATION, tell)
+    trials = search.tried(shown, None, PASSES, {})
+    trial = search.no_worse(kind, [], None, trials, PASSES) if guessed else trials.get(kind.name)
     law = None if trial is None else like(asked, trial.law)
     if trial is None or law is None:
         return problem, point
@@ -368,6 +378,8 @@ def compare_laws(
         ranking, confidence = undescribed(ranking), 0.0
         fit = _flagged(fit, "none of the laws tried describes these records")
     rigid = _excess(fit) if best.name == "Stribeck" and fit.parameters["speed"].interval[0] > 0 else rests.fall
+    if not doubt:
+        fit = _whichever(fit, [trials[one.name] for one in ranking[1:] if one.kept])
     fit = _calibrated(fit, records, calibration)
     if progress:
         progress(1.0)
@@ -479,6 +491,23 @@ def _fit(trial: Trial, shown: Sequence[Shown], stretches: Sequence[Stretch], tel
 def _flagged(fit: LawFit, status: str) -> LawFit:
     """The fit with a reason why its parameters should not be trusted, where none is told yet."""
     return replace(fit, parameters={key: one.doubted(status) for key, one in fit.parameters.items()})
+
+
+def _whichever(fit: LawFit, others: Sequence[Trial]) -> LawFit:
+    """The fit with intervals that hold whichever of the laws kept it is: each reaches as far about another's value.
+
+    A law without static friction made up for it by a damper seven times the true one and gains three deviations off.
+    """
+    told = [
+        {keyed(knob): valued(knob, u, trial.system) for knob, u in zip(trial.problem.knobs, trial.point.u, strict=True)}
+        for trial in others
+    ]
+    parameters = dict(fit.parameters)
+    for key, one in fit.parameters.items():
+        apart = [0.0, *(other[key] - one.value for other in told if key in other)]
+        low, high = one.interval
+        parameters[key] = replace(one, interval=(max(min(0.0, low), low + min(apart)), high + max(apart)))
+    return replace(fit, parameters=parameters)
 
 
 def _calibrated(fit: LawFit, records: Sequence[Record], calibration: float) -> LawFit:

@@ -14,6 +14,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from functools import lru_cache
 from typing import Any, TypeVar
 
 from stickslip.errors import ModelError
@@ -41,6 +42,21 @@ def with_sliding_modes(modes: Sequence[M]) -> tuple[M, ...]:
                 known[up.name] = _through(known[up.name], low.name, speed, between.name)
     every = [known[mode.name] for mode in modes]
     return tuple(every + added)
+
+
+def curved_modes(law: Any) -> tuple[CurvedMode, ...]:
+    """The modes of a curved law with those between them; equal laws have the same."""
+    return _known(law) if by_value(law) else with_sliding_modes(law.rates())
+
+
+@lru_cache(maxsize=32)
+def _known(law: Any) -> tuple[CurvedMode, ...]:
+    return with_sliding_modes(law.rates())
+
+
+def by_value(part: object) -> bool:
+    """Whether an equal law, or drive, is the same one."""
+    return type(part).__hash__ not in (None, object.__hash__)
 
 
 def _speed(quantity: Row) -> float | None:

@@ -132,6 +132,8 @@ class Hypothesis(NamedTuple):
         Where else: at the end of the search of a simpler law that it contains, what it adds hardly felt.
     contains : tuple of str
         Those simpler laws, by name: it is searched anew from where they end, if it ends above.
+    next_to : callable
+        Where such a search begins, of one of them; where it continues it, if nothing is said.
     holds : callable
         Whether a law of the class is this one, by its values.
     """
@@ -141,6 +143,7 @@ class Hypothesis(NamedTuple):
     guesses: Callable[[Observed], list[Any]]
     continued: Callable[[Mapping[str, Searched]], list[Any]] = nothing
     contains: tuple[str, ...] = ()
+    next_to: Callable[[Mapping[str, Searched]], list[Any]] | None = None
     holds: Callable[[Any], bool] = always
 
 

@@ -19,7 +19,6 @@ from stickslip.laws.guessing import (
     LEAST_EXCESS,
     LITTLE,
     SPEEDS,
-    STIFF,
     STIFFEST,
     Array,
     Family,
@@ -29,10 +28,6 @@ from stickslip.laws.guessing import (
 )
 from stickslip.laws.stribeck import require_static_above, stribeck_curve
 from stickslip.parameters import parameter, parametric
-
-# of the smallest stroke, by which bristles bend that begin as a rigid contact's: of a record with stops the softer ones
-# left 40 times what the Stribeck curve in them does
-RIGID = (STIFF / 2, STIFFEST)
 
 
 @parametric
@@ -79,7 +74,12 @@ class LuGre(Sliding):
         """Bristles."""
         return (
             Hypothesis(
-                "LuGre", Family("LuGre", "that of bristles (LuGre)"), _guesses, _from_simpler, ("compliant", "Stribeck")
+                "LuGre",
+                Family("LuGre", "that of bristles (LuGre)"),
+                _guesses,
+                _from_compliant,
+                ("compliant", "Stribeck"),
+                _next_to,
             ),
         )
 
@@ -132,21 +132,25 @@ def _guesses(seen: Observed) -> list[LuGre]:
     ]
 
 
-def _from_simpler(simpler: Mapping[str, Searched]) -> list[LuGre]:
-    """The contact with a steep curve, where it gives way; and the Stribeck curve with bristles next to rigid."""
-    contact, curve = simpler.get("compliant"), simpler.get("Stribeck")
-    begun = []
-    if contact is not None and not contact.stiff:
-        bristle, speed = contact.law, FALLS[-1] * float(contact.scales[:, 1].max())
-        static = (1 + LITTLE) * bristle.kinetic
-        begun.append(LuGre(bristle.kinetic, static, speed=speed, stiffness=bristle.stiffness, damping=bristle.damping))
-    if curve is not None:
-        law = curve.law
-        for give in RIGID:
-            stiffness = law.kinetic / (give * float(curve.scales[:, 0].min()))
-            damping = 0.2 * math.sqrt(stiffness * curve.mass)
-            begun.append(LuGre(law.kinetic, law.static, speed=law.speed, stiffness=stiffness, damping=damping))
-    return begun
+def _from_compliant(simpler: Mapping[str, Searched]) -> list[LuGre]:
+    """The contact with a steep curve, where it gives way."""
+    contact = simpler.get("compliant")
+    if contact is None or contact.stiff:
+        return []
+    bristle, speed = contact.law, FALLS[-1] * float(contact.scales[:, 1].max())
+    static = (1 + LITTLE) * bristle.kinetic
+    return [LuGre(bristle.kinetic, static, speed=speed, stiffness=bristle.stiffness, damping=bristle.damping)]
+
+
+def _next_to(simpler: Mapping[str, Searched]) -> list[LuGre]:
+    """As from a contact; of the Stribeck curve with bristles next to rigid: softer ones left 40 times as much."""
+    curve = simpler.get("Stribeck")
+    if curve is None:
+        return _from_compliant(simpler)
+    law = curve.law
+    stiffness = law.kinetic / (STIFFEST * float(curve.scales[:, 0].min()))
+    damping = 0.2 * math.sqrt(stiffness * curve.mass)
+    return [LuGre(law.kinetic, law.static, speed=law.speed, stiffness=stiffness, damping=damping)]
 
 
 def _bristles(seen: Observed, stiffness: Array, speed: Array, excess: Array) -> Array:

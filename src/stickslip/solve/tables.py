@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from stickslip.drives.kinds import Drive, Motion
 from stickslip.errors import ModelError
+from stickslip.laws import filippov
 from stickslip.laws.base import Exit, Law, Mode
 from stickslip.laws.curved import CurvedLaw, CurvedMode
 from stickslip.laws.filippov import with_sliding_modes
@@ -307,7 +308,7 @@ def laws_of(system: System) -> list[Any]:
 
 def by_value(system: Oscillator) -> bool:
     """Whether an equal system is the same one: law and drive are compared by their values."""
-    return all(type(part).__hash__ not in (None, object.__hash__) for part in (system.law, system.drive))
+    return all(map(filippov.by_value, (system.law, system.drive)))
 
 
 def systems_of(systems: Sequence[Oscillator]) -> Systems:

@@ -15,7 +15,7 @@ from stickslip.drives.kinds import Motion
 from stickslip.errors import ModelError
 from stickslip.laws.base import Exit, Mode
 from stickslip.laws.curved import Creeping, CurvedMode
-from stickslip.laws.filippov import with_sliding_modes
+from stickslip.laws.filippov import curved_modes
 from stickslip.oscillator import Contact, Oscillator, Structure
 from stickslip.solve.operations import Bound, Form, Operations, Scaled, combined, flat, guards_of, stilled, sums_of
 from stickslip.solve.tables import JointMode, System, by_value, mode_number, numbered, reached
@@ -155,7 +155,7 @@ class _Contact:
         self.tangent = np.asarray(contact.tangent, dtype=np.float64)
         self.normal = None if contact.normal is None else np.asarray(contact.normal, dtype=np.float64)
         law: Any = contact.law
-        self.modes: tuple[Any, ...] = with_sliding_modes(law.rates()) if alone else contact.modes()
+        self.modes: tuple[Any, ...] = curved_modes(law) if alone else contact.modes()
         self.entry = contact.entry
         self.least = 0.0
         self.symbols: dict[str, Form] = {}
