@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -81,6 +82,41 @@ def test_a_sensor_that_is_late_is_named(channel: str, late: tuple[str, ...]) -> 
     for flaw in (flaw for cycle in cycles for flaw in cycle.flaws):  # while the motion settles, too
         late_by, doubt = map(float, re.findall(r"[\d.]+(?= ±| ms)", flaw.words))
         assert abs(late_by - 3.0) <= min(doubt, 0.08), flaw.words
+
+
+@pytest.mark.parametrize(("channel", "frequency", "amplitude"), [("load", 11.1, 5e-3), ("a", 1.5, 0.65e-3)])
+def test_a_sensor_that_the_spring_hides_is_named(channel: str, frequency: float, amplitude: float) -> None:
+    """By the balance of forces a load was not where friction is below a fifth of the spring's, nor a by a slow x."""
+    rig = ss.Rig.perfect().having("x", white=2e-6).having("a", white=0.05).having(channel, lag=4e-3)
+    system = air_track().having(frequency=frequency, amplitude=amplitude)
+    _, cycles = watched(Sim(system, rig=rig, fs=1000, fast=True, seed=3), 8 / frequency)
+    assert {(flaw.channel, flaw.kind) for cycle in cycles for flaw in cycle.flaws} == {(channel, "late")}
+    assert cycles[1].flaws
+
+
+def test_what_a_mount_rings_is_no_noise() -> None:
+    """Of a load sampled at 1 kHz it hid a noise thirty times the usual, and was called noise when the motion grew."""
+    device = Sim(air_track().having(frequency=11.1), fs=1000, stated=True, fast=True, seed=4)
+    noisy = replace(device, faults=(Fault("noise", PULLED, channel="load"),))
+    _, cycles = watched(noisy, PULLED + 0.5)
+    assert {(flaw.channel, flaw.kind) for cycle in cycles for flaw in cycle.flaws} == {("load", "noisy")}
+    monitor = Monitor(device, RIG)
+    with device.open() as stream:
+        for amplitude in (1.5e-3, 3e-3):
+            stream.drive("base", Tone(amplitude, 11.1))
+            for block in blocks(stream, count=2000):
+                assert not [flaw for cycle in monitor.feed(block) for flaw in cycle.flaws]
+
+
+def test_a_range_that_is_passed_is_named_though_it_cuts_a_cycle_short() -> None:
+    """A short cycle at the moment of the fault was taken for the length of all, and the next ones for a stall."""
+    device = Sim(air_track().having(frequency=11.1), fs=1000, stated=True, fast=True, seed=4)
+    for part in np.arange(0, 1, 0.125):
+        at = PULLED + part / 11.1
+        _, cycles = watched(replace(device, faults=(Fault("saturation", at, channel="z"),)), at + 0.5)
+        flaws = [(cycle.first / device.fs + cycle.period, flaw) for cycle in cycles for flaw in cycle.flaws]
+        assert {(flaw.channel, flaw.kind) for _, flaw in flaws} == {("z", "clipped")}
+        assert flaws[0][0] < at + 2 / 11.1
 
 
 @pytest.mark.parametrize("channels", [("sound",), ("x", "friction", "sound")], ids=["a microphone", "the whole rig"])

@@ -57,6 +57,12 @@ def test_what_can_not_be_chosen_is_refused() -> None:
         bench.next_runs(LAWS, shaker=ss.rig.Shaker(lowest=40.0, highest=50.0))
 
 
+def test_a_static_friction_that_a_fit_leaves_at_the_kinetic_is_told_apart_too() -> None:
+    """More kinetic than static friction is refused: every motion was left out, and the shaker blamed."""
+    alike = replace(SLIDER, law=ss.laws.Coulomb(1.1, static=1.1 * (1 + 1e-13)))
+    assert bench.next_runs({**LAWS, "static": alike}, count=1)[0].separation >= 0.0
+
+
 def test_a_run_list_is_read_back_and_acquired(tmp_path: Path) -> None:
     runs = bench.RunList(
         run=(

@@ -4,6 +4,7 @@ For a person at the rig, whose hands are busy, what the sensors read is drawn by
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
@@ -20,6 +21,7 @@ from stickslip.cycle.sticks import find_sticks
 from stickslip.errors import StickslipError
 from stickslip.estimate import Estimate
 from stickslip.record.record import Record
+from stickslip.signals.response import resonance
 from stickslip.squeak.bursts import find_squeaks
 from stickslip.units import prefixed
 
@@ -45,12 +47,11 @@ NOISIER = 3.0  # times the noise that it had in its first cycles
 NOISY = 0.5  # of its deviation: so much noise is said from the beginning
 STALLED = 1.6  # periods without a new cycle: then the channel that tells cycles is another one
 LEAST_LATE = 1.5  # samples
-CLEAR = 0.2  # of the spring's force: a balance that leaves less tells no phase
+BEYOND = 2.5  # times the motion's frequency: above its tone, under Hann's window of two cycles
 # Set on random simulated rigs, sound and with each fault: benchmarks/sensors.py, seeds from 2001, 3001 and 5001:
 MATTERS = 0.001  # of its deviation: less than that may be the curvature of the motion, which grows with it
 LEAST_CYCLES = 1.5  # that a window has to hold for a phase
 LATE = 5.0  # standard deviations
-TRUSTED = 0.005  # standard deviation of gains, mass and spring together, as parts: a commissioned rig's
 
 
 class Picture:
@@ -167,7 +168,7 @@ class Monitor:
 
     def _stall(self) -> list[Cycle]:
         """What told cycles tells none any more: what is wrong since, and another channel's turn."""
-        period, first, name = self.begins[-1] - self.begins[-2], self.begins[-1], self.names[self.order[0]]
+        period, first, name = self._longest(), self.begins[-1], self.names[self.order[0]]
         rows = self._rows(self.after - period // 2, self.after)  # before that it still told cycles
         self.order.rotate(-1)
         self._afresh()
@@ -189,9 +190,11 @@ class Monitor:
 
     def _stalled(self) -> bool:
         """Whether cycles went on, and do no more."""
-        if len(self.begins) < 2:
-            return False
-        return self.after - self.begins[-1] > STALLED * (self.begins[-1] - self.begins[-2])
+        return len(self.begins) > 1 and self.after - self.begins[-1] > STALLED * self._longest()
+
+    def _longest(self) -> int:
+        """Samples of the longest of the last cycles: what breaks may begin a short one."""
+        return max(after - before for before, after in itertools.pairwise(self.begins))
 
     def window(self) -> Record | None:
         """The last whole cycles; None before there are three."""
@@ -259,11 +262,9 @@ class Monitor:
         """What is wrong with each sensor in the last cycles."""
         flaws = []
         for one, cycle in zip(self.device.inputs, last, strict=True):
-            noise = noise_of(cycle)
+            noise = noise_of(cycle, _ringing(one, self.device.fs))
             known = self.quiet[one.name]
-            # sampled so coarsely, a mount's ringing after each turn reads as noise, and grows with the motion
-            rings = 3.0 if (one.details.get("mount") or (0.0,))[0] > self.device.fs / 8 else 1.0
-            flaw = _flaw(one, cycle, noise, rings * float(np.median(known)) if known else math.nan)
+            flaw = _flaw(one, cycle, noise, float(np.median(known)) if known else math.nan)
             if flaw is None and len(known) < 3:
                 known.append(max(noise, _count(cycle[np.isfinite(cycle)]) / math.sqrt(12)))
             flaws += [flaw] if flaw else []
@@ -272,12 +273,23 @@ class Monitor:
         return flaws + _late(sound, self.device.inputs, self.constants, (period, self.device.fs))
 
 
-def noise_of(values: Array) -> float:
-    """Standard deviation of white noise, by third differences; jumps, and what they ring, spoil the upper half."""
-    steps = np.sort(np.abs(np.diff(values[np.isfinite(values)], 3)))
-    least = steps[: math.ceil(0.5 * len(steps))]
-    # the third difference of unit noise deviates by sqrt(20); the lower half of |normal| has the mean 0.3247
-    return float(np.mean(least) / 0.3247 / math.sqrt(20)) if len(least) else math.nan
+def noise_of(values: Array, ringing: Sequence[float] = (1.0,)) -> float:
+    """Standard deviation of white noise, by third differences, of which jumps spoil the upper half.
+
+    What a mount rings of them, samples long, vanishes under the differences that `ringing` gives.
+    """
+    kernel, finite = np.convolve((1.0, -3.0, 3.0, -1.0), ringing), values[np.isfinite(values)]
+    if len(finite) < len(kernel):
+        return math.nan
+    steps = np.sort(np.abs(np.convolve(finite, kernel, "valid")))
+    # the lower half of |normal| has the mean 0.3247
+    return float(np.mean(steps[: math.ceil(0.5 * len(steps))]) / 0.3247 / np.linalg.norm(kernel))
+
+
+def _ringing(one: Input, fs: float) -> list[float]:
+    """The differences under which a stated mount's free ringing vanishes; none where no mount is stated."""
+    mount = one.details.get("mount")
+    return np.real(np.poly(np.exp(np.array(resonance(*mount).poles) / fs))).tolist() if mount else [1.0]
 
 
 def _flaw(one: Input, values: Array, noise: float, before: float) -> Flaw | None:
@@ -312,7 +324,8 @@ def _late(
 ) -> list[Flaw]:
     """Which of displacement and acceleration comes after the other, and whether the load does after both.
 
-    By a = x'' and load = -(m a + c x' + k (x - z)). Delays that are stated are expected.
+    By a = x'', and by the friction's jumps, of which load and acceleration speak alike. Delays that are stated are
+    expected.
     """
     period, fs = times
     if not {"x", "a"} <= set(channels) or len(channels["x"]) < LEAST_CYCLES * period * fs:
@@ -322,22 +335,46 @@ def _late(
     lag, error = lines.lag(lambda late: lines.of("x", 2, expected["x"] + late), lines.of("a", 0, expected["a"]))
     error = math.hypot(error, lines.doubt("x", 2), lines.doubt("a"))
     flaws = _judged("x", lag, error, fs) or _judged("a", -lag, error, fs)
-    delays = expected | {flaw.channel: expected[flaw.channel] + abs(lag) for flaw in flaws}
-    whole = "z" in channels or not any(one.name == "z" for one in inputs)
-    if not (whole and "load" in channels and {"mass", "stiffness"} <= set(constants)):
+    if not ("load" in channels and {"mass", "stiffness"} <= set(constants)):
         return flaws
-    if not any(one.name == "z" and "delay" in one.details for one in inputs):
-        delays["z"] = delays["x"]  # of the same make as x, where nothing is stated
-    spring = constants["stiffness"] * lines.of("x", 0, delays["x"])
-    spring -= constants["stiffness"] * lines.of("z", 0, delays["z"]) if "z" in channels else 0.0
-    moving = constants.get("damping", 0.0) * lines.of("x", 1, delays["x"]) + spring
-    due = -(constants["mass"] * lines.of("a", 0, delays["a"]) + moving)
-    part = float(np.linalg.norm(due) / np.linalg.norm(spring))
-    if part > CLEAR:
-        lag, error = lines.lag(lambda late: lines.of("load", 0, expected["load"] + late), due)
-        others = math.hypot(lines.doubt("x", 2), lines.doubt("a"), TRUSTED / lines.omega) / part
-        flaws += _judged("load", lag, math.hypot(error, others, lines.doubt("load")), fs)
-    return flaws
+    natural = math.sqrt(constants["stiffness"] / constants["mass"]) / math.tau
+    frequency = np.asarray(np.fft.rfftfreq(len(channels["a"]), 1 / fs), dtype=np.float64)
+    felt = {one.name: _felt(channels[one.name], one, frequency) for one in inputs if one.name in ("load", "a")}
+    after, error = _apart(felt["load"], felt["a"], frequency, max(BEYOND / period, 2 * natural))
+    after -= sum(lag for flaw in flaws if flaw.channel == "a")
+    known = _judged("a", -after, error, fs) if not flaws else []
+    return [*flaws, *known, *_judged("load", after, error, fs)]
+
+
+def _felt(values: Array, one: Input, frequency: Array) -> NDArray[np.complex128]:
+    """Spectrum of a channel under Hann's window, its stated delay and mount taken out."""
+    known = np.isfinite(values)
+    spectrum = np.fft.rfft(np.hanning(len(values)) * np.where(known, values - np.mean(values[known]), 0.0))
+    mount = one.details.get("mount")
+    held = resonance(*mount).at(frequency) if mount else 1.0
+    return np.asarray(spectrum * np.exp(2j * np.pi * frequency * one.details.get("delay", 0.0)) / held)
+
+
+def _apart(
+    load: NDArray[np.complex128], a: NDArray[np.complex128], frequency: Array, lowest: float
+) -> tuple[float, float]:
+    """By how much [s] the load comes after the acceleration, and its deviation.
+
+    Of m a + k x = -f each line beyond the base's tone and the resonance is m (1 - (natural / frequency)^2) a = -f: load
+    and acceleration turn alike, whatever mass, spring and gains are. Noise turns them at random.
+    """
+    band = (frequency > lowest) & (frequency < min(10 * lowest, frequency[-1] / 2))
+    omega, cross = math.tau * frequency[band], -np.conj(a[band]) * load[band]
+    if len(cross) < 4:
+        return 0.0, math.inf
+    tried = np.linspace(-0.25, 0.25, 401) / lowest
+    late = float(tried[np.argmax(np.real(np.exp(1j * np.outer(tried, omega)) @ cross))])
+    turned, weight = np.angle(cross * np.exp(1j * omega * late)), np.abs(cross)
+    power = float(weight @ omega**2)
+    late -= float(weight @ (omega * turned)) / power
+    turned = np.angle(cross * np.exp(1j * omega * late))
+    lines = float(weight.sum() ** 2 / (weight @ weight)) / 1.5  # Hann's window makes neighbours alike
+    return late, math.sqrt(float(weight @ turned**2) / power / max(1.0, lines - 1))
 
 
 class _Lines(NamedTuple):

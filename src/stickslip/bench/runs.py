@@ -313,7 +313,8 @@ def _effects(system: Oscillator, motion: tuple[float, float], answer: Array) -> 
     for name in (field.name for field in fields(law)):
         value = getattr(law, name)
         if isinstance(value, (int, float)) and not isinstance(value, bool) and value > 0:
-            changed = replace(system, law=replace(law, **{name: value * (1 + NUDGE)}))
+            nudged = value * (1 - NUDGE if name == "kinetic" else 1 + NUDGE)  # which no static friction is below
+            changed = replace(system, law=replace(law, **{name: nudged}))
             columns.append(_steady(changed, motion) - answer)
     if system.damping:
         columns.append(_steady(replace(system, damping=system.damping * (1 + NUDGE)), motion) - answer)
