@@ -2,7 +2,8 @@
 
 Seven servos' published parameters as centres, encoders of 8 to 16 bit, 50 Hz to 1 kHz, gravity, currents with noise;
 with the torque measured to 1 %, or by the controller's kp alone, known to 1 %, its kd unknown; with play between motor
-and link, which both have an encoder. Counted are the numbers that stand without a grave doubt.
+and link, which both have an encoder, or ("link alone", "motor alone": of joints that have play) one of them. Counted
+are the numbers that stand without a grave doubt.
 
     python benchmarks/joints.py --draws 100 --first 1000
 """
@@ -24,7 +25,8 @@ import stickslip as ss
 TOLD = ("level", "forward", "back", "load", "viscous", "inertia", "damping", "backlash")
 
 PLAYING = ("play", "play without gravity")
-KINDS = ("torque", "controller", "torque alone", *PLAYING)
+ALONE = ("link alone", "motor alone")
+KINDS = ("torque", "controller", "torque alone", *PLAYING, *ALONE)
 
 
 def truths(joint: joints.Joint, time: np.ndarray) -> dict[str, float]:
@@ -43,10 +45,14 @@ Found = tuple[ss.cycle.JointFriction, ss.cycle.JointBacklash | None]
 
 def asked(joint: joints.Joint, kind: str) -> Found:
     """What is said of one joint, and of its play."""
-    record = joint.record
-    if kind == "torque alone":
-        alone = {name: record[name] for name in ("theta", "force")}
-        record = ss.Record.of(alone, fs=record.fs, units={"force": "N m"}).with_details("force", gain_sd=joints.GAIN)
+    record, written = joint.record, dict(joint.record.samples)
+    if kind == "motor alone":
+        written["theta"] = written["motor"] / joint.truth["ratio"]
+    left_out = {"torque alone": "reference", **dict.fromkeys(ALONE, "motor")}.get(kind)
+    if left_out is not None:
+        del written[left_out]
+        units = {name: record.channels[name].unit for name in written}
+        record = ss.Record.of(written, fs=record.fs, units=units).with_details("force", gain_sd=joints.GAIN)
     regression = ss.cycle.regress_joint(record, **({"kp": joint.kp} if kind == "controller" else {}))
     if kind in PLAYING:
         with contextlib.suppress(ss.errors.EstimateError):
@@ -67,8 +73,10 @@ def main() -> None:
         refused, spent, claims = 0, list[float](), list[tuple[bool, bool]]()
         for seed in range(options.first, options.first + options.draws):
             joint = joints.drawn(
-                seed, torque=kind != "controller", play=kind in PLAYING, loaded=kind != "play without gravity"
+                seed, torque=kind != "controller", play=kind in PLAYING + ALONE, loaded=kind != "play without gravity"
             )
+            if kind in ALONE and not joint.truth["play"]:
+                continue
             begun = time.process_time()
             try:
                 found, teeth = asked(joint, kind)
@@ -90,7 +98,7 @@ def main() -> None:
                     wide[name].append((estimate.interval[1] - estimate.interval[0]) / 2 / true[name])
                 if options.misses and not held[name][-1] and name in ("level", "load", "backlash"):
                     print(f"{seed} {joint.servo} {joint.record.fs:.0f} Hz: {true[name]:.4g}, {estimate}")
-        print(f"{kind}: {options.draws - refused} of {options.draws} answered, {np.mean(spent):.2f} s each")
+        print(f"{kind}: {len(spent)} of {len(spent) + refused} answered, {np.mean(spent):.2f} s each")
         for name in TOLD:
             if held[name]:
                 half = f", half width {np.median(wide[name]):.1%}" if wide[name] else ""

@@ -324,6 +324,10 @@ class ElastoSlip:
     Elements yield in the order of their yield displacement f/k. From the virgin start (all springs relaxed) this
     order holds on every branch for ever, so n elements need 2 n + 1 modes.
 
+    It is the Maxwell slip model, and the generalized one (Al-Bender, Lampaert and Swevers, IEEE Trans. Automatic
+    Control 50, 2005) wherever that one's curve of friction over speed is level: an element that slips at its share of
+    the friction then stays there, whatever attracts it.
+
     Examples
     --------
     >>> chain = ElastoSlip.iwan(1e6, width=30e-6, elements=10)
