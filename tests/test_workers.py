@@ -11,6 +11,8 @@ from pathlib import Path
 
 import pytest
 
+from stickslip.workers import workers
+
 ASKS = """
 import os, time
 from stickslip.workers import pool
@@ -19,6 +21,20 @@ if __name__ == "__main__":
     print(processes.submit(os.getpid).result(), flush=True)
     time.sleep(600)
 """
+
+
+def _slowly(number: int) -> tuple[int, int]:
+    time.sleep(0.05)
+    return number, os.getpid()
+
+
+def test_the_one_that_asks_takes_its_part_and_results_stay_in_order() -> None:
+    with workers(2, "stickslip", among=True) as mapped:
+        for _ in range(2):  # while the other process begins, and with it
+            numbers, by = zip(*mapped(_slowly, range(60)), strict=True)
+            assert numbers == tuple(range(60))
+            assert os.getpid() in by
+    assert len(set(by)) == 2
 
 
 @pytest.mark.skipif(os.name != "posix", reason="nothing is killed by a signal here")

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import os
 import signal
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
+from functools import partial
 from importlib import import_module
 from threading import Thread
 from typing import TYPE_CHECKING, Any
@@ -27,20 +28,32 @@ def unheard() -> None:
 
 
 @contextmanager
-def workers(count: int, module: str) -> Iterator[Map]:
+def workers(count: int, module: str, *, among: bool = False) -> Iterator[Map]:
     """`map` over so many processes, or in this one with fewer than two; results in order.
 
-    The processes begin at once, with the import of `module`. What is mapped, and over what, must be picklable. On an
-    error or an interrupt what was not begun is dropped.
+    The processes begin at once, with the import of `module`; `among` them this one works too, which saves it what
+    another takes to begin. What is mapped, and over what, must be picklable. On an error or an interrupt what was not
+    begun is dropped.
     """
     if count < 2:
         yield map
         return
-    processes = pool(count, module)
+    processes = pool(count - among, module)
     try:
-        yield processes.map
+        yield partial(_shared, processes) if among else processes.map
     finally:
         processes.shutdown(wait=False, cancel_futures=True)
+
+
+def _shared(processes: ProcessPoolExecutor, function: Callable[[Any], Any], over: Iterable[Any]) -> Iterator[Any]:
+    """`map` over these processes and this one, which takes the last that none has begun while the next is not done."""
+    asked = list(over)
+    futures, own, end = [processes.submit(function, one) for one in asked], dict[int, Any](), len(asked)
+    for number, future in enumerate(futures):
+        while number < end and not future.done() and futures[end - 1].cancel():
+            end -= 1
+            own[end] = function(asked[end])
+        yield own.pop(number) if number >= end else future.result()
 
 
 def pool(count: int, module: str) -> ProcessPoolExecutor:

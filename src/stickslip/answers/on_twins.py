@@ -78,7 +78,7 @@ def tried(
     """
     findings = findings.having(**{key: without(findings.results.get(key), UNTRIED) for key in NOT_TRIED})
     answers = {estimate.name: estimate for estimate in findings.estimates}
-    with workers(processes, __name__) as mapped:  # they are ready when the rig is found
+    with workers(processes, __name__, among=True) as mapped:  # they are ready when the rig is found
         belief = believe(findings.record, mapped=mapped)
         ask = partial(_ask, stated=belief.record.rig)
         trial = try_on_twins(belief, answers, ask, count=twins, rng=rng, progress=progress, mapped=mapped)
