@@ -341,9 +341,9 @@ def _late(
     frequency = np.asarray(np.fft.rfftfreq(len(channels["a"]), 1 / fs), dtype=np.float64)
     felt = {one.name: _felt(channels[one.name], one, frequency) for one in inputs if one.name in ("load", "a")}
     after, error = _apart(felt["load"], felt["a"], frequency, max(BEYOND / period, 2 * natural))
-    after -= sum(lag for flaw in flaws if flaw.channel == "a")
-    known = _judged("a", -after, error, fs) if not flaws else []
-    return [*flaws, *known, *_judged("load", after, error, fs)]
+    if any(flaw.channel == "a" for flaw in flaws):
+        return [*flaws, *_judged("load", after - lag, error, fs)]
+    return [*flaws, *_judged("a", -after, error, fs), *_judged("load", after, error, fs)]
 
 
 def _felt(values: Array, one: Input, frequency: Array) -> NDArray[np.complex128]:
