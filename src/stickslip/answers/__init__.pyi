@@ -22,7 +22,10 @@ from stickslip.answers.many import Kept as Kept
 from stickslip.answers.many import Row as Row
 from stickslip.answers.many import require_engine as require_engine
 from stickslip.answers.many import spread as spread
+from stickslip.answers.preparation import is_long as is_long
 from stickslip.answers.preparation import mend as mend
+from stickslip.answers.preparation import read_mended as read_mended
+from stickslip.answers.preparation import read_parts as read_parts
 from stickslip.answers.questions import analyze_blocks as analyze_blocks
 from stickslip.answers.questions import stated_wrongly as stated_wrongly
 from stickslip.answers.squeaks import Condition as Condition

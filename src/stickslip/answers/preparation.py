@@ -1,9 +1,10 @@
-"""A record made ready for the questions: repairs, sensors, delays, and friction by the way that its channels allow."""
+"""A record made ready for the questions: read and mended, sensors, delays, and friction as its channels allow."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,9 @@ from stickslip.balance.lag import HIDDEN, REPEATS, SensorDelay, sensor_delay
 from stickslip.balance.mass import mass_and_stiffness
 from stickslip.balance.motion import is_measured
 from stickslip.estimate import UNSTATED, Doubt, kinds
+from stickslip.files.read import read_blocks, read_record
+from stickslip.files.select import file_told
+from stickslip.printing import printable
 from stickslip.record.channels import Channel
 from stickslip.record.flaws import constant
 from stickslip.record.record import Record, Step
@@ -30,6 +34,94 @@ STRETCH = 1 << 14  # samples from the middle in which a delay is looked for, and
 AT_ONCE = 1 << 18  # samples of which all sensors are put together unasked
 FOUND = " (found in this record)"
 SURE = 3.0  # standard deviations from which a delay is taken out
+LONG = 1 << 26  # bytes on the disk of a record that is asked part by part
+PART = 1 << 18  # rows of such a part
+
+
+def is_long(files: Sequence[Path]) -> bool:
+    """Whether a record may be too long to be held in memory with all that is made of it.
+
+    Parameters
+    ----------
+    files : sequence of Path
+        Those of the record.
+
+    Returns
+    -------
+    bool
+    """
+    return sum(path.stat().st_size for path in files) > LONG
+
+
+def read_mended(files: Sequence[Path], rig: RigSettings, names: Sequence[str] = ()) -> Record:
+    """Read a record as its rig's settings say, mended.
+
+    Parameters
+    ----------
+    files : sequence of Path
+        Those of the record.
+    rig : RigSettings
+        How they are read, which rows, which repairs, and the log.
+    names : sequence of str
+        What the history calls the files; their own names where left out.
+
+    Returns
+    -------
+    Record
+
+    Raises
+    ------
+    FormatError, RecordError, ModelError
+        As :func:`read_record` and :func:`mend`.
+    """
+    record = read_record(files, rows=rig.row_range(), **rig.reading())
+    return rig.logged(mend(_called(record, files, names), repairs=rig.repair))
+
+
+def read_parts(
+    files: Sequence[Path], rig: RigSettings, names: Sequence[str] = (), *, size: int = PART
+) -> Iterator[Record]:
+    """Read a record in parts that fit into memory; whole where rows of it or repairs are asked for.
+
+    Parameters
+    ----------
+    files, rig, names
+        As :func:`read_mended` takes them.
+    size : int
+        Rows of a part.
+
+    Yields
+    ------
+    Record
+
+    Raises
+    ------
+    FormatError, RecordError, ModelError
+        As :func:`read_blocks` and :func:`mend`.
+    """
+    if rig.rows or rig.repair:
+        yield read_mended(files, rig, names)
+        return
+    for part in read_blocks(files, size=size, **rig.reading()):
+        yield rig.logged(_called(part, files, names))
+
+
+def _called(record: Record, files: Sequence[Path], names: Sequence[str]) -> Record:
+    """The record with its files in the history, called as told; one that write_record kept comes back without."""
+    own = [printable(path.name) for path in files]
+    called = dict(zip(own, map(printable, names) if names else own, strict=True))
+    known = {file["name"] for step in record.history for file in step.arguments.get("files", ())}
+    if called.keys() <= known:
+        return replace(record, history=tuple(_renamed(step, called) for step in record.history))
+    sources = [{**file_told(path), "name": called[printable(path.name)]} for path in files]
+    step = Step("read_record", {"files": sources}, "a record as it was written")
+    return replace(record, history=(*record.history, step))
+
+
+def _renamed(step: Step, names: Mapping[str, str]) -> Step:
+    """The step with other names of the files that it read."""
+    files = [{**file, "name": names.get(file["name"], file["name"])} for file in step.arguments.get("files", ())]
+    return replace(step, arguments={**step.arguments, "files": files}) if files else step
 
 
 def mend(record: Record, *, repairs: Sequence[str]) -> Record:

@@ -22,7 +22,6 @@ from stickslip.cli.records import (
     groups_of,
     name_left_out,
     normal_option,
-    read,
     reading_options,
     require_fits,
     result_options,
@@ -206,7 +205,7 @@ def impact(file: str, output: Path | None, as_json: bool, everything: bool, **op
     folder = output or (None if as_json else folder_after(files[0], "impact"))
     with progress(1) as tell:
         tell(f"reading {file}", 0)
-        record = read(files, rig)
+        record = ss.answers.read_mended(files, rig)
         test = ss.balance.impact_test(record, mass=rig.mass)
         written = publish(test, folder, record=record)
     show(test, written, as_json=as_json, everything=everything, record=record)

@@ -14,7 +14,7 @@ import click
 
 import stickslip as ss
 import stickslip.bench as bench
-from stickslip.cli.records import all_option, groups_of, pair, read, usable
+from stickslip.cli.records import all_option, groups_of, pair, usable
 from stickslip.cli.terminal import aligned, print_json, progress, redrawn, say, say_json, show, wrapped
 from stickslip.errors import INTERRUPTED
 
@@ -109,7 +109,7 @@ def _source(
 
     def source(step: BenchStep) -> Record | None:
         if step.name in given:
-            return read([given[step.name]], rig)
+            return ss.answers.read_mended([given[step.name]], rig)
         kept = _kept(folder, step.name) if folder else None
         if kept is not None and kept.exists() and step.name not in anew:
             return ss.read_record(kept)

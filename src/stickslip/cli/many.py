@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 import stickslip as ss
-from stickslip.cli.records import answer_together, checksum, names_of, read, together
+from stickslip.cli.records import answer_together, names_of, together
 from stickslip.cli.terminal import progress, publish, show
 
 if TYPE_CHECKING:
@@ -80,7 +80,7 @@ def ask_many(
     if places.table is not None:
         ss.story.check_table(places.table)
     tasks = [
-        Task(question, tuple(group), tuple(names), "+".join(map(checksum, group)), rig, options)
+        Task(question, tuple(group), tuple(names), "+".join(map(ss.record.checksum, group)), rig, options)
         for group, names in zip(groups, names_of(groups), strict=True)
     ]
     query = {"question": question, "rig": rig.model_dump(), "options": dict(options), "version": ss.__version__}
@@ -169,7 +169,7 @@ def answered(task: Task) -> Row:
     """What one record answers; why, where it does not."""
     name = " + ".join(task.names)
     try:
-        record = read(task.files, task.rig, task.names)
+        record = ss.answers.read_mended(task.files, task.rig, task.names)
         findings = ASK[task.question](record, task.rig, **task.options)
         answer, picture = ss.summary(findings).answer, PICTURES[task.question](findings)
         quoted, level = findings.quoted, findings.level

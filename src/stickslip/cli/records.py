@@ -7,7 +7,6 @@ import dataclasses
 import fnmatch
 import functools
 import glob
-import hashlib
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
@@ -17,20 +16,16 @@ import click
 
 import stickslip as ss
 from stickslip.cli.terminal import complain, progress, publish, show, spoken
-from stickslip.printing import printable
 
 if TYPE_CHECKING:
     from stickslip import Record
-    from stickslip.record import Step
     from stickslip.rig import RigSettings
     from stickslip.systems import Case
 
 Answer = TypeVar("Answer")
 Reader = Callable[[Sequence[Path], "RigSettings", Sequence[str]], "Record"]
 
-LONG = 1 << 26  # bytes on the disk
 RIG_FILE = "rig.toml"  # of the folder one is in: read where no other is named
-PART = 1 << 18  # rows of a long record's part
 
 
 def rig_of(
@@ -176,64 +171,6 @@ def folder_after(file: Path, ending: str) -> Path:
     return Path("".join(sign if sign.isprintable() else "-" for sign in f"{file.stem}-{ending}"))
 
 
-def read(files: Sequence[Path], rig: RigSettings, names: Sequence[str] = ()) -> Record:
-    """The record, its files called by their names or by those given."""
-    record = ss.read_record(files, rows=rig.row_range(), **rig.reading())
-    return rig.logged(ss.answers.mend(_with_source(record, files, names), repairs=rig.repair))
-
-
-def is_long(files: Sequence[Path]) -> bool:
-    """Whether the record may be too long to be held in memory with all that is made of it."""
-    return sum(path.stat().st_size for path in files) > LONG
-
-
-def read_parts(
-    files: Sequence[Path], rig: RigSettings, size: int | None = None, names: Sequence[str] = ()
-) -> Iterator[Record]:
-    """The record in parts that fit into memory; whole where rows of it or repairs are asked for."""
-    if rig.rows or rig.repair:
-        yield read(files, rig, names)
-        return
-    options = {**rig.reading(), **({} if size is None else {"size": size})}
-    for part in ss.read_blocks(files, **options):
-        yield rig.logged(_with_source(part, files, names))
-
-
-def _folder(path: Path) -> dict[str, str]:
-    """As it was typed, unless that says where this machine keeps it."""
-    return {} if path.parent == Path() or path.is_absolute() else {"folder": printable(str(path.parent))}
-
-
-def _with_source(record: Record, files: Sequence[Path], names: Sequence[str]) -> Record:
-    """The record with its files in the history, called as told; one that write_record kept comes back without."""
-    own = [printable(path.name) for path in files]
-    called = dict(zip(own, map(printable, names) if names else own, strict=True))
-    known = {file["name"] for step in record.history for file in step.arguments.get("files", ())}
-    if called.keys() <= known:
-        return dataclasses.replace(record, history=tuple(_called(step, called) for step in record.history))
-    sources = [
-        {"name": name, **_folder(path), "sha256": checksum(path)}
-        for name, path in zip(called.values(), files, strict=True)
-    ]
-    step = ss.record.Step("read_record", {"files": sources}, "a record as it was written")
-    return dataclasses.replace(record, history=(*record.history, step))
-
-
-def _called(step: Step, names: Mapping[str, str]) -> Step:
-    """The step with other names of the files that it read."""
-    read = step.arguments.get("files")
-    if not read:
-        return step
-    files = [{**file, "name": names.get(file["name"], file["name"])} for file in read]
-    return dataclasses.replace(step, arguments={**step.arguments, "files": files})
-
-
-@functools.cache
-def checksum(path: Path) -> str:
-    with path.open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()
-
-
 @contextlib.contextmanager
 def collected(refused: list[ss.StickslipError], files: Sequence[Path], names: Sequence[str] = ()) -> Iterator[None]:
     """Put what the data can not answer aside, with the file's name; what was asked wrongly ends all."""
@@ -255,7 +192,7 @@ def answers(
     tell: Callable[[str, float], None],
     *,
     of_parts: Callable[[Iterator[Record], Callable[[str], None]], Answer] | None = None,
-    reader: Reader = read,
+    reader: Reader | None = None,
 ) -> tuple[list[Answer], list[ss.StickslipError]]:
     """What each record answers, and why those that are left out do not; the last word where none does.
 
@@ -267,11 +204,11 @@ def answers(
         with collected(refused, group, names):
             name = " + ".join(names)
             tell(f"reading {name}", 2 * number)
-            if of_parts is not None and is_long(group):
+            if of_parts is not None and ss.answers.is_long(group):
                 say = functools.partial(_say, tell, f"analysing {name}", 2 * number)
-                results.append(of_parts(read_parts(group, rig, PART, names), say))
+                results.append(of_parts(ss.answers.read_parts(group, rig, names), say))
                 continue
-            record = reader(group, rig, names)
+            record = (reader or ss.answers.read_mended)(group, rig, names)
             tell(f"checking and analysing {name}", 2 * number + 1)
             results.append(ask(record))
     if results:
@@ -293,7 +230,7 @@ def answer_together(
     folder: Path | None,
     as_json: bool,
     everything: bool,
-    reader: Reader = read,
+    reader: Reader | None = None,
 ) -> None:
     """Ask every record, put the answers together, leave them in a folder, and show them."""
     with progress(2 * len(groups) + 1) as tell:

@@ -18,7 +18,6 @@ from stickslip.cli.records import (
     form_option,
     groups_of,
     pair,
-    read,
     reading_options,
     result_options,
     rig_of,
@@ -202,7 +201,7 @@ def join(first: str, second: str, output: Path | None, as_json: bool, everything
     with progress(2) as tell:
         tell("reading", 0)
         a, b = (
-            read(group, rig_of(**{**options, "channels": named or options["channels"]}))
+            ss.answers.read_mended(group, rig_of(**{**options, "channels": named or options["channels"]}))
             for group, named in zip(groups, own, strict=True)
         )
         tell("finding the offset of the clocks", 1)

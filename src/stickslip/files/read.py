@@ -402,7 +402,8 @@ class Reading:
                 _require_twins(self.sources[number].path.name, time, data)
                 with np.errstate(over="ignore", invalid="ignore"):
                     fitted = fit_clock(data[time.key], time.scale, known)
-                    clocks.append((fitted, resolution(_finite(data[time.key])) * time.scale))
+                    finite = data[time.key][np.isfinite(data[time.key])]
+                    clocks.append((fitted, resolution(finite) * time.scale))
             elif rate is not None:
                 clocks.append((Clock(rate[0], rate[1] + first / rate[0]), 0.0))
         if not clocks:
@@ -436,7 +437,7 @@ class Reading:
         self, data: Mapping[tuple[int, str], Array], clock: Clock, action: str, extra: Mapping[str, Any] | None = None
     ) -> Record:
         samples = {wanted.channel.name: _combined(wanted, data) for wanted in self.wanted}
-        files = [source.to_dict() for source in self.sources]
+        files = [source.told for source in self.sources]
         for number, time in self.times.items():
             if time.assumed and self.fs is None:
                 files[number]["seconds"] = printable(time.key[1])
@@ -553,10 +554,6 @@ def _require_equal_ends(data: Mapping[tuple[int, str], Array], first: int) -> No
             "the columns of one record are equally long",
             f"keep the rows that all have with rows=({first}, {ends[shortest]})",
         )
-
-
-def _finite(values: Array) -> Array:
-    return values[np.isfinite(values)]
 
 
 def _seconds(clock: Clock, length: int) -> Array:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import itertools
 import re
 from collections import Counter
@@ -17,6 +16,7 @@ from stickslip.files.expression import Linear, Spec, apply_sensitivity, channel_
 from stickslip.files.table import Block, Column, Table, supplied, unique
 from stickslip.printing import printable
 from stickslip.record.channels import UNSTATED, VOCABULARY, Channel, checked_name, described
+from stickslip.record.metadata import checksum
 from stickslip.units import LONGEST, Unit, parse_unit
 
 _SLASH = re.compile(r"[\[(][^\[(\])]*[\])]|([/\\])")  # one in brackets belongs to a unit
@@ -118,22 +118,21 @@ class Source:
     bytes: int
 
     @cached_property
-    def sha256(self) -> str:
-        """Of the file's bytes: asked last, of what could be read, since a large file takes a while."""
-        with supplied(self.path), self.path.open("rb") as file:
-            return hashlib.file_digest(file, "sha256").hexdigest()
-
-    def to_dict(self) -> dict[str, str | int]:
-        """Plain data for the history; with the folder as it was typed, unless that says where this machine keeps it."""
-        folder = printable(str(self.path.parent))
-        entry: dict[str, str | int] = {
-            "name": printable(self.path.name),
-            **({} if folder == "." or self.path.is_absolute() else {"folder": folder}),
-            "sha256": self.sha256,
-            "bytes": self.bytes,
-            "format": self.format,
-        }
+    def told(self) -> dict[str, str | int]:
+        """Plain data for the history: asked last, of what could be read, since a large file's sum takes a while."""
+        entry: dict[str, str | int] = {**file_told(self.path), "bytes": self.bytes, "format": self.format}
         return entry | ({"cut": self.table.cut} if self.table.cut else {})
+
+
+def file_told(path: Path) -> dict[str, str]:
+    """Name, sum and folder of a file, that as it was typed, unless it says where this machine keeps it."""
+    folder = printable(str(path.parent))
+    with supplied(path):
+        return {
+            "name": printable(path.name),
+            **({} if folder == "." or path.is_absolute() else {"folder": folder}),
+            "sha256": checksum(path),
+        }
 
 
 Key = tuple[int, str]  # the file's number and the column's name

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -20,6 +19,7 @@ from stickslip.record.metadata import (
     KEY,
     OF,
     Digests,
+    checksum,
     described_beside,
     read_beside,
     record_to_metadata,
@@ -99,7 +99,7 @@ def _write_with_beside(path: Path, beside: Path, columns: Columns, metadata: str
     try:
         with whole(path, replace=overwrite) as part:
             _write_csv(part, columns, metadata)
-            _describe(beside, metadata, {OF: _checksum(part), BEFORE: before} if before else {}, replace=overwrite)
+            _describe(beside, metadata, {OF: checksum(part), BEFORE: before} if before else {}, replace=overwrite)
             new = not before
     except FormatError:
         if new:
@@ -115,11 +115,6 @@ def _describe(path: Path, metadata: str, more: dict[str, Any], *, replace: bool)
     added = "".join(f", {json.dumps(key)}: {json.dumps(value)}" for key, value in more.items())
     with whole(path, replace=replace) as part:
         part.write_text(f"{BEGINS}{metadata}{added}}}\n", "utf-8")
-
-
-def _checksum(path: Path) -> str:
-    with path.open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 @contextmanager

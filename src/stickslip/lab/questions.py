@@ -28,12 +28,10 @@ Array = NDArray[np.float64]
 
 TWINS = 40  # simulated rigs on which answers are tried
 MOST_FIGURES, MOST_SOUNDS, LONGEST_SOUND = 6, 8, 1 << 20  # shown in the lab; bytes of a sound
+WIDEST = 1 << 18  # rows of a stretch of which the extremes are drawn: none reaches over two parts
 POINTS = 2000  # pairs of least and greatest value of a channel that are drawn
 MOTION, FORCES = {"x", "v"}, {"friction", "load", "force"}
 CONSTANTS = ("mass", "stiffness", "damping")
-LONG = 1 << 26  # bytes of files from which a record is asked part by part
-PART = 1 << 18  # rows of such a part
-AS_WRITTEN = "a record as it was written"
 
 
 def describe(query: Query) -> dict[str, Any]:
@@ -98,7 +96,7 @@ def shown(name: str, parts: Iterable[Record]) -> dict[str, Any]:
     assert first is not None
     whole = rows == len(first)
     faults = [_fault(fault) for fault in first.check()]
-    restored = first.history[-1].outcome == AS_WRITTEN
+    restored = first.history[-1].outcome == "a record as it was written"
     notes = [step.outcome for step in first.history if step.outcome and step.arguments.get("files")]
     if not whole:
         notes.append(f"the check-up looked at the first {len(first)} of {rows} rows")
@@ -153,7 +151,7 @@ class Thinned:
         self._total += len(part)
         for name in part:
             self._kept.setdefault(name, []).append(extremes(part[name], self.width))
-        while -(-self._total // self.width) > POINTS and self.width < PART:
+        while -(-self._total // self.width) > POINTS and self.width < WIDEST:
             self.width *= 2
             for name, blocks in self._kept.items():
                 self._kept[name] = [_halved(np.concatenate(blocks))]
@@ -414,43 +412,22 @@ class Query:
 
     def record(self, number: int = 0) -> Record:
         """One of the records, whole, mended as asked."""
-        rig, files = self.rig(number), self.records[number]
-        read = ss.read_record(files, rows=rig.row_range(), **rig.reading())
-        return ss.answers.mend(self.named(read, files), repairs=rig.repair)
+        return ss.answers.read_mended(self.records[number], self.rig(number), self._called(number))
 
     def parts(self, number: int = 0) -> Iterator[Record]:
         """One of the records in parts that fit into memory; whole if it is short, or rows or repairs are asked for."""
-        rig, files = self.rig(number), self.records[number]
-        if rig.rows or rig.repair or not self.is_long(number):
-            yield self.record(number)
-            return
-        for part in ss.read_blocks(files, size=PART, **rig.reading()):
-            yield self.named(part, files)
+        if not self.is_long(number):
+            return iter([self.record(number)])
+        return ss.answers.read_parts(self.records[number], self.rig(number), self._called(number))
 
     def is_long(self, number: int) -> bool:
-        return sum(path.stat().st_size for path in self.records[number]) > LONG
+        return ss.answers.is_long(self.records[number])
 
     def name(self, number: int) -> str:
-        return " + ".join(self.names[path.name] for path in self.records[number])
+        return " + ".join(self._called(number))
 
-    def named(self, record: Record, files: Sequence[Path]) -> Record:
-        """The record, its history telling the users' own names of the files."""
-        ours = {path.name for path in files}
-        steps = [_renamed(step, self.names) for step in record.history]
-        if not any(file["name"] in ours for step in record.history for file in step.arguments.get("files", ())):
-            files_sent = [
-                {"name": self.names[path.name]} for path in files
-            ]  # as write_record left it: it names no file
-            steps.append(ss.record.Step("read_record", {"files": files_sent}, AS_WRITTEN))
-        return dataclasses.replace(record, history=tuple(steps))
-
-
-def _renamed(step: ss.record.Step, names: Mapping[str, str]) -> ss.record.Step:
-    files = [
-        {key: names.get(value, value) if key == "name" else value for key, value in file.items() if key != "folder"}
-        for file in step.arguments.get("files", ())
-    ]
-    return dataclasses.replace(step, arguments={**step.arguments, "files": files}) if files else step
+    def _called(self, number: int) -> list[str]:
+        return [self.names[path.name] for path in self.records[number]]
 
 
 def on_the_page(sentence: str) -> str:

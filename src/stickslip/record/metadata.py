@@ -184,9 +184,37 @@ def read_beside(path: Path) -> dict[str, Any]:
         metadata = parse_metadata(file.read(LONGEST))
     about = metadata.get(KEY)
     if BEFORE in metadata:
-        with path.open("rb") as text:
-            about = about if hashlib.file_digest(text, "sha256").hexdigest() == metadata.get(OF) else metadata[BEFORE]
+        about = about if checksum(path) == metadata.get(OF) else metadata[BEFORE]
     return about if isinstance(about, dict) else {}
+
+
+def checksum(path: Path) -> str:
+    """The sha256 of a file's bytes, by which a record's history knows it again.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+
+    Returns
+    -------
+    str
+        In hexadecimal digits.
+
+    Raises
+    ------
+    OSError
+        The file can not be read.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> with tempfile.NamedTemporaryFile() as file:
+    ...     checksum(Path(file.name))[:8]
+    'e3b0c442'
+    """
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def record_to_metadata(record: Record) -> dict[str, Any]:
