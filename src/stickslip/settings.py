@@ -6,7 +6,7 @@ import difflib
 import json
 import re
 import tomllib
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, TypeVar, get_args
 
@@ -95,6 +95,34 @@ def toml_key(key: str) -> str:
     """A key, in quotes where TOML wants them."""
     bare = key.replace("_", "").replace("-", "").isalnum() and key.isascii()
     return key if bare else toml_value(key)
+
+
+def toml_lines(values: Mapping[str, Any], *, within: str = "", levels: int = 1) -> Iterator[str]:
+    """The lines of a file: plain values first, then a table of each mapping; below so many levels they stand in a line.
+
+    Examples
+    --------
+    >>> print(*toml_lines({"law": {"name": "Dahl"}, "about": "a sieve"}), sep="\\n")
+    about = "a sieve"
+    <BLANKLINE>
+    [law]
+    name = "Dahl"
+    """
+    tables = {key: value for key, value in values.items() if levels and _holds_tables(value)}
+    for key, value in values.items():
+        if key not in tables and value is not None and value != {}:
+            yield f"{toml_key(key)} = {toml_value(value)}"
+    for key, value in tables.items():
+        name = f"{within}.{toml_key(key)}" if within else toml_key(key)
+        for table in [value] if isinstance(value, Mapping) else value:
+            if levels == 1 or not all(map(_holds_tables, table.values())):
+                yield from ("", f"[{name}]" if table is value else f"[[{name}]]")
+            yield from toml_lines(table, within=name, levels=levels - 1)
+
+
+def _holds_tables(value: Any) -> bool:
+    first = value[0] if isinstance(value, list) and value else value
+    return isinstance(first, Mapping) and bool(first)
 
 
 def checked(

@@ -19,7 +19,7 @@ from stickslip.laws.lugre import LuGre
 from stickslip.laws.rough import RoughSurface
 from stickslip.laws.stribeck import FrictionCurve, Tabulated
 from stickslip.laws.time_delay import SpeedCurve
-from stickslip.settings import nearest, toml_value
+from stickslip.settings import nearest, toml_lines
 
 TABLE = 33  # points of a curve over the speed, where a program takes a table
 WIDE, FASTEST = 10.0, 1.0  # it goes to ten times the law's own speed, or to 1 m/s where it has none
@@ -142,22 +142,16 @@ def _toml(law: Law | CurvedLaw) -> str:
         raise ModelError(
             f"a {strange[0]}", f"a system's file names one of {', '.join(registered())}", "export Python or C"
         )
-    return f"# {remark(formula_of(law))}\n{toml_table('law', law)}"
+    return "\n".join([f"# {remark(formula_of(law))}", *[*toml_lines({"law": plain(law)})][1:]])
 
 
-def toml_table(heading: str, thing: object) -> str:
-    """A law or a drive of numbers and words as a table of a system's file."""
-    lines = [f"{name} = {_toml_value(value)}" for name, value in _values(thing)]
-    return "\n".join([f"[{heading}]", f'name = "{type(thing).__name__}"', *lines])
-
-
-def _toml_value(value: Any) -> str:
-    if is_dataclass(value):
-        inner = ", ".join(f"{name} = {_toml_value(entry)}" for name, entry in _values(value))
-        return f'{{ name = "{type(value).__name__}", {inner} }}'
-    if isinstance(value, str):
-        return toml_value(value)
-    return f"[{', '.join(map(_number, value))}]" if _listed(value) else _number(value)
+def plain(part: Any) -> Any:
+    """A law or a drive as plain data: its name and what it holds; what it holds itself likewise."""
+    if is_dataclass(part):
+        return {"name": type(part).__name__, **{name: plain(value) for name, value in _values(part)}}
+    if hasattr(part, "tolist"):
+        return part.tolist()
+    return [plain(item) for item in part] if _listed(part) else part
 
 
 def _python(law: Law | CurvedLaw) -> str:

@@ -20,7 +20,7 @@ from stickslip.printing import printable
 from stickslip.record.channels import VOCABULARY, Channel
 from stickslip.record.metadata import Log
 from stickslip.record.record import RIG_UNITS, Record
-from stickslip.settings import STRICT, checked, quantity, read_toml, toml_key, toml_value
+from stickslip.settings import STRICT, checked, quantity, read_toml, toml_lines
 from stickslip.units import prefixed
 
 # The first word that stands in a column's name decides, where its unit fits; the narrower ones come first.
@@ -417,20 +417,7 @@ def rig_toml(settings: Mapping[str, Any]) -> Iterator[str]:
     [channels]
     x = "plate [mm]"
     """
-    yield from _toml_lines(settings, "")
-
-
-def _toml_lines(values: Mapping[str, Any], path: str) -> Iterator[str]:
-    """A table, plain keys first, then the tables in it."""
-    for key, value in values.items():
-        if not isinstance(value, Mapping) and value is not None:
-            yield f"{toml_key(key)} = {toml_value(value)}"
-    for key, value in values.items():
-        if isinstance(value, Mapping) and value:
-            name = f"{path}.{toml_key(key)}" if path else toml_key(key)
-            if any(not isinstance(inner, Mapping) for inner in value.values()):
-                yield from ("", f"[{name}]")
-            yield from _toml_lines(value, name)
+    return toml_lines(settings, levels=9)  # deeper than any
 
 
 def rig_settings(values: Mapping[str, Any], *, source: str = "the settings", lines: Sequence[str] = ()) -> RigSettings:

@@ -22,11 +22,11 @@ from stickslip.law.fit_curve import CurveFit
 from stickslip.law.law import LawFit
 from stickslip.law.stretch import driving
 from stickslip.law.verdict import LawComparison
-from stickslip.laws.export import export_law, toml_table
+from stickslip.laws.export import export_law, plain
 from stickslip.parameters import unit
 from stickslip.record.record import Record
 from stickslip.rig.settings import rig_toml
-from stickslip.settings import toml_value
+from stickslip.settings import toml_lines
 from stickslip.story.scope import Scope, corrected, of_fit, reading_of
 from stickslip.story.story import Line, Story, Table
 from stickslip.story.words import Caution, doubts, interval_of, leading, number, value_of
@@ -203,14 +203,11 @@ def _whole(law: str, result: LawComparison | LawFit | CurveFit, record: Record) 
     if constants.get("mass") is None or constants.get("stiffness") is None:
         return f"{ALONE}\n{law}"
     drive = _drive(record, given)
+    named = {name: constants[name] for name in ("mass", "stiffness", "damping", "damper") if name in constants}
+    system = {name: value if isinstance(value, str) else float(value) for name, value in named.items()}
     start = {"x": float(record["x"][0])} if isinstance(drive, Release) and "x" in record else {}
-    system: dict[str, Any] = {
-        name: constants[name] for name in ("mass", "stiffness", "damping", "damper") if name in constants
-    }
-    tables = [law, _plain("system", system), toml_table("drive", drive)]
-    return "\n".join(
-        [*tables, *([_plain("start", start)] if start else []), _plain("run", {"duration": record.duration})]
-    )
+    tables = {"system": system, "drive": plain(drive), "start": start, "run": {"duration": record.duration}}
+    return "\n".join([law, *toml_lines(tables)])
 
 
 def _drive(record: Record, given: Drive) -> Drive:
@@ -236,13 +233,6 @@ def _tone(values: Array, fs: float) -> tuple[float, float, float, float]:
     a, b, _ = solution
     share = 1 - float(np.var(values - waves @ solution) / np.var(values))
     return float(np.hypot(a, b)), frequency, float(np.arctan2(-b, a)), share
-
-
-def _plain(name: str, values: Mapping[str, Any]) -> str:
-    lines = [
-        f"{key} = {toml_value(value if isinstance(value, str) else float(value))}" for key, value in values.items()
-    ]
-    return "\n".join([f"[{name}]", *lines])
 
 
 def of_predictions(predictions: Predictions) -> Story:

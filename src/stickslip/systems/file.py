@@ -23,13 +23,14 @@ from stickslip.errors import ModelError
 from stickslip.files.read import read_record
 from stickslip.laws.base import Law
 from stickslip.laws.curved import CurvedLaw
+from stickslip.laws.export import plain
 from stickslip.laws.formula import Formula
 from stickslip.laws.stribeck import Curve
 from stickslip.laws.time_delay import SpeedCurve
 from stickslip.oscillator import Contact, Oscillator, Structure
 from stickslip.parameters import PARTS, changed, declared, find, places, unit
 from stickslip.scenarios import DRIVES, LAWS
-from stickslip.settings import STRICT, checked, line_of, nearest, quantity, read_toml, toml_value
+from stickslip.settings import STRICT, checked, line_of, nearest, quantity, read_toml, toml_lines
 from stickslip.solve.tables import System, numbered
 from stickslip.units import parse_constant
 
@@ -549,10 +550,10 @@ def export_system(case: Case, *, format: str = "toml") -> str:
     """
     if format not in FORMATS:
         raise ModelError(f"format = '{format}'", f"it is one of {', '.join(FORMATS)}", nearest(str(format), FORMATS))
-    tables = _tables(case)
+    tables = {name: table for name, table in _tables(case).items() if table or format != "toml"}
     if format == "json":
         return json.dumps(tables, ensure_ascii=False, allow_nan=False)
-    return "\n".join(_toml(tables) if format == "toml" else _python(case, tables)) + "\n"
+    return "\n".join(toml_lines(tables) if format == "toml" else _python(case, tables)) + "\n"
 
 
 def _tables(case: Case) -> dict[str, Any]:
@@ -560,52 +561,36 @@ def _tables(case: Case) -> dict[str, Any]:
     system = case.system
     tables: dict[str, Any] = {"about": case.about, "system": _values(system)}
     if isinstance(system, Structure):
-        tables["contacts"] = [{**_values(contact), "law": _part_text(contact.law, LAWS)} for contact in system.contacts]
+        tables["contacts"] = [{**_values(contact), "law": _part_text(contact.law)} for contact in system.contacts]
     else:
-        tables["law"] = _part_text(system.law, LAWS)
-    tables["drive"] = _part_text(system.drive, DRIVES)
+        tables["law"] = _part_text(system.law)
+    tables["drive"] = _part_text(system.drive)
     run = case.run if case.fs is None else {**case.run, "fs": case.fs}
     for name, values in (("start", case.start), ("run", run)):
         tables[name] = {key: value if isinstance(value, str) else float(value) for key, value in values.items()}
     return tables
 
 
-def _part_text(part: Any, known: Mapping[str, Any]) -> dict[str, Any]:
+def _part_text(part: Any) -> dict[str, Any]:
     """A law or a drive, with its name."""
-    name = type(part).__name__
-    if name not in known:
-        raise ModelError(f"a {name}", f"a system's file names one of {', '.join(known)}", "run it from Python")
-    return {"name": name, **_values(part), **{
-        inner: _part_text(getattr(part, inner), register)
-        for inner, register in (("law", LAWS), ("drive", DRIVES)) if is_dataclass(getattr(part, inner, None))
-    }}  # fmt: skip
+    inner = part
+    while is_dataclass(inner):
+        name = type(inner).__name__
+        if name not in LAWS and name not in DRIVES:
+            raise ModelError(
+                f"a {name}", f"a system's file names one of {', '.join(LAWS | DRIVES)}", "run it from Python"
+            )
+        if any(callable(value) and not isinstance(value, Formula) for value in vars(inner).values()):
+            raise ModelError("a law that holds a Python function", "a file holds text", "write the curve as a Formula")
+        inner = getattr(inner, "law", getattr(inner, "drive", None))
+    text: dict[str, Any] = plain(part)
+    return text
 
 
 def _values(part: Any) -> dict[str, Any]:
-    """What a part holds itself, as plain data."""
+    """What a system or a contact holds itself, as plain data."""
     own = {field.name: getattr(part, field.name) for field in fields(part) if field.name not in PARTS}
-    return {name: _plain(value) for name, value in own.items() if value is not None}
-
-
-def _plain(value: Any) -> Any:
-    if isinstance(value, Formula):
-        return value.text
-    if callable(value):
-        raise ModelError("a law that holds a Python function", "a file holds text", "write the curve as a Formula")
-    if isinstance(value, np.ndarray | np.generic):
-        return value.tolist()
-    return [_plain(item) for item in value] if isinstance(value, list | tuple) else value
-
-
-def _toml(tables: Mapping[str, Any]) -> Iterator[str]:
-    if tables["about"]:
-        yield f"about = {toml_value(tables['about'])}"
-    for name, table in tables.items():
-        for table_row in table if isinstance(table, list) else [table]:
-            if name != "about" and table_row:
-                yield ""
-                yield f"[[{name}]]" if isinstance(table, list) else f"[{name}]"
-                yield from (f"{key} = {toml_value(value)}" for key, value in table_row.items())
+    return {name: plain(value) for name, value in own.items() if value is not None}
 
 
 def _python(case: Case, tables: Mapping[str, Any]) -> Iterator[str]:
