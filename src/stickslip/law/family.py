@@ -220,7 +220,9 @@ def scatter(influence: Array, alone: Array, residual: Array, samples: Samples) -
     parameter, that knows little: no less than `alone`, the deviation if residuals were independent and alike, for as
     many as they are worth.
     """
-    parts = samples.cycle if samples.cycle.max(initial=0) + 1 >= FEW_CYCLES else _quarters(samples)
+    parts = samples.cycle
+    if samples.cycle.max(initial=0) + 1 < FEW_CYCLES:
+        parts = samples.cycle * QUARTERS + samples.block * QUARTERS // BLOCKS
     independent = len(residual) / correlation_time(residual)
     terms = influence.shape[1]
     left = max(1.0, independent - terms)
@@ -258,10 +260,6 @@ def model_error(residual: Array, samples: Samples) -> float:
     mean, scatter_ = between(residual)
     repeats = weight @ (mean**2 - scatter_ / np.maximum(count, 1)) / weight.sum()
     return math.sqrt(max(0.0, float(repeats)))
-
-
-def _quarters(samples: Samples) -> NDArray[np.intp]:
-    return samples.cycle * QUARTERS + samples.block * QUARTERS // BLOCKS
 
 
 def _of_parts(influence: Array, part: NDArray[np.intp]) -> tuple[float, float]:

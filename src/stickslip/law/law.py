@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -179,19 +179,24 @@ def answered(problem: Problem, point: Point, sure: Surety | None, shown: Sequenc
         level = _mean_friction(problem, point, value_of(system, "kinetic"))
         parameters = {"kinetic": level, **parameters}
         system = system.having(kinetic=level.value)
-    checks = tuple(f"{name} is left with {residual[name] / noise[name]:.3g} times its noise" for name in residual)
-    worst = max(residual, key=lambda name: residual[name] / noise[name])
+    over = {name: residual[name] / noise[name] for name in residual}
+    checks = tuple(f"{name} is left with {times:.3g} times its noise" for name, times in over.items())
     worries = [too_few(shown, sum(math.isinf(knob.prior) for knob in problem.knobs))]
-    if residual[worst] > MISFIT * noise[worst]:
-        times = residual[worst] / noise[worst]
+    if not explained(over.values()):
+        worst = max(over, key=lambda name: over[name])
         worries.append(
-            f"{worst} is left with {times:.3g} times its noise: the law is not the whole of it, or mass=, stiffness= "
-            "or a unit is wrong"
+            f"{worst} is left with {over[worst]:.3g} times its noise: the law is not the whole of it, or mass=, "
+            "stiffness= or a unit is wrong"
         )
     system, surface = replace(system, drive=problem.oscillator.drive), "rough" if problem.profile else "even"
     size, count, correlations = sum(counts.values()), len(problem.knobs), _between(problem, sure)
     fit = LawFit(system, parameters, correlations, noise, residual, point.chi2, size, count, tuple(traces), surface)
     return replace(fit, status=Status(*worries), checks=checks)
+
+
+def explained(over: Iterable[float]) -> bool:
+    """Whether a law leaves no channel with more than noise, by how many times its noise each is left with."""
+    return all(times <= MISFIT for times in over)
 
 
 def _between(problem: Problem, sure: Surety | None) -> Array:

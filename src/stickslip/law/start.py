@@ -362,16 +362,13 @@ def stiffest(oscillator: Oscillator, stretches: Sequence[Stretch], share: float)
 
 def bounded(turned: Knob, oscillator: Oscillator, stretches: Sequence[Stretch], share: float) -> Knob:
     """The knob; a contact gets no stiffer than next to rigid, where it would cost much and tell nothing."""
-    if turned.kind != "log" or turned.name not in ("law.stiffness", "law.damping") or not _slides_at(oscillator):
+    slides = getattr(oscillator.law, "kinetic", 0.0) > 0
+    if turned.kind != "log" or turned.name not in ("law.stiffness", "law.damping") or not slides:
         return turned
     most = stiffest(oscillator, stretches, share)
     if turned.name == "law.damping":
         most = 2 * math.sqrt(most * oscillator.mass)
     return turned._replace(origin=min(most, turned.origin), most=max(0.0, math.log(most / turned.origin)))
-
-
-def _slides_at(oscillator: Oscillator) -> bool:
-    return getattr(oscillator.law, "kinetic", 0.0) > 0
 
 
 def better_start(oscillator: Oscillator, names: Sequence[str], shown: Sequence[Shown]) -> Oscillator:

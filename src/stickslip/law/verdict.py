@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from stickslip.estimate import Doubt, Estimate, Result, Status
 from stickslip.law.data import told
-from stickslip.law.law import MISFIT, LawFit
+from stickslip.law.law import LawFit, explained
 from stickslip.laws.guessing import family_of
 from stickslip.oscillator import Oscillator
 from stickslip.record.record import Record, Step
@@ -132,8 +132,8 @@ class Evidence:
         Friction that falls with the speed and differs by the direction was told as bristles or as a state variable at
         99.5 %, which left 1.24 times the noise.
         """
-        beyond = any(self.squares[name] > (MISFIT * self.noise[name]) ** 2 for name in self.counts)
-        return SUPPORTED if beyond else CERTAIN
+        over = (math.sqrt(self.squares[name]) / max(self.noise[name], 1e-300) for name in self.counts)
+        return CERTAIN if explained(over) else SUPPORTED
 
     @property
     def allowance(self) -> float:
@@ -293,7 +293,7 @@ class Remainder(NamedTuple):
     @property
     def explained(self) -> bool:
         """Whether no more is left than noise."""
-        return self.share <= LEFT and self.over <= MISFIT
+        return self.share <= LEFT and explained([self.over])
 
     def __str__(self) -> str:
         return f"leaves {100 * self.share:.{0 if self.share > LEFT else 2}f} % of {self.channel}"

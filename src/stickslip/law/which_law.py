@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from stickslip.errors import EstimateError, ModelError
 from stickslip.estimate import NORMAL_95, Doubt, Estimate
-from stickslip.law.law import MISFIT, LawFit, answered, keyed, surety, teller, valued
+from stickslip.law.law import LawFit, answered, explained, keyed, surety, teller, valued
 from stickslip.law.search import Knob, Point, Problem, Profile, descend, rows_of
 from stickslip.law.start import (
     CALIBRATION,
@@ -214,8 +214,8 @@ def _posed(
 
 def _explains(problem: Problem, point: Point) -> bool:
     """Whether no channel is left with more than noise."""
-    return all(
-        math.sqrt(float(np.mean(values[rows] ** 2))) <= MISFIT
+    return explained(
+        math.sqrt(float(np.mean(values[rows] ** 2)))
         for stretch, values in zip(problem.stretches, point.residuals, strict=True)
         for rows in rows_of(stretch.sensors)
     )
