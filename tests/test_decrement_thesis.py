@@ -67,7 +67,8 @@ def test_the_bound_of_four_extremes_is_that_of_their_rate() -> None:
     beta = ex.rate(x, i=2, m=1)
     dry, alpha = float(ex.dry(x, beta)[1]), ex.rate_bound(x, i=2, m=1, error=0.005)
     by_rate = ex.dry_bound(x, i=2, beta=beta, dry_displacement=dry, error=0.005, rate_error=alpha)
-    assert ex.dry_bound_of_four(x, i=2, dry_displacement=dry, error=0.005) == pytest.approx(by_rate, rel=1e-12)
+    span = abs(x[2] - x[1]) + 2 * dry  # equation 6.19
+    assert (1 + span / abs(x[3] - x[1])) * 0.005 == pytest.approx(by_rate, rel=1e-12)
 
 
 def test_table_6_8_was_computed_from_a_rate_cut_off() -> None:

@@ -249,10 +249,6 @@ def _around(orbit: SteadyState, kinds: tuple[str, ...]) -> list[float]:
     return _lengths(motion, kinds) + whole
 
 
-def _extrema(motion: Trajectory) -> list[float]:
-    return [float(state[0]) for state in motion.states]
-
-
 def _fastest_growing(system: System) -> complex:
     """Of steady sliding on a belt, the eigenvalue with the largest real part [1/s]."""
     if isinstance(system, Oscillator):
@@ -327,7 +323,7 @@ OF_RUNS: dict[str, Callable[[Trajectory], Any]] = {
     "changes": lambda motion: len(motion.modes) - 1,
     "end": lambda motion: motion.sample([motion.duration], ("x",))[0][:, 0].tolist(),
     "stop_time": lambda motion: motion.events[-1].time,
-    "extrema": _extrema,
+    "extrema": lambda motion: [float(state[0]) for state in motion.states],
     "slip_time": lambda motion: _last_of(motion, "slip"),
     "stick_time": lambda motion: _last_of(motion, "stick"),
     "last_amplitude": lambda motion: max(abs(motion.state(time)["x"]) for time in _last_turns(motion)),

@@ -114,11 +114,12 @@ def sliding(given: Given, case: int, *, base: float | None = None) -> ss.solve.S
     """The steady motion at a base amplitude [m], that of Table 3.3 if none is told."""
     section = given["sliding"]
     base = section["base"][case] if base is None else base
-    return _steady(section["mass"], section["spring"], contact(given, case), base, section["frequency"][case])
+    return steady(section["mass"], section["spring"], contact(given, case), base, section["frequency"][case])
 
 
-@functools.lru_cache(256)
-def _steady(mass: float, spring: float, law: Any, base: float, frequency: float) -> ss.solve.SteadyState:
+@functools.lru_cache(2048)
+def steady(mass: float, spring: float, law: Any, base: float, frequency: float) -> ss.solve.SteadyState:
+    """The steady motion of a mass on its spring, the base moving as a cosine."""
     drive = ss.drives.HarmonicBase(base, frequency=frequency)
     return ss.steady_state(ss.Oscillator(mass=mass, stiffness=spring, law=law, drive=drive))
 
@@ -140,7 +141,8 @@ def equation_3_4(section: Mapping[str, Any], case: int) -> float:
 
 
 @functools.lru_cache(8)
-def _measured(mass: float, spring: float, law: Any, base: float, frequency: float) -> ss.Record:
+def on_rig(mass: float, spring: float, law: Any, base: float, frequency: float) -> ss.Record:
+    """What the virtual rig makes of that motion: two seconds, with friction."""
     drive = ss.drives.HarmonicBase(base, frequency=frequency)
     run = ss.simulate(ss.Oscillator(mass=mass, stiffness=spring, law=law, drive=drive), duration=10)
     rig = ss.Rig()
@@ -152,7 +154,7 @@ def measured(given: Given, case: int, *, surface: int = 4) -> ss.Record:
     """What the virtual rig makes of one of the three cases: two seconds, with friction, on one of many surfaces."""
     section = given["sliding"]
     law = ss.laws.RoughSurface(contact(given, case), share=section["roughness"], length=2e-4, span=2e-3, seed=surface)
-    return _measured(section["mass"], section["spring"], law, base_for(given, case), section["frequency"][case])
+    return on_rig(section["mass"], section["spring"], law, base_for(given, case), section["frequency"][case])
 
 
 def slopes_of_sticks(record: ss.Record) -> Array:

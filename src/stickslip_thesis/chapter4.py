@@ -19,6 +19,7 @@ from scipy.optimize import brentq
 
 import stickslip as ss
 from stickslip.figures.style import BLUE, FAINT, GREEN, INK, ORANGE, PURPLE, Plate, styled
+from stickslip_thesis.chapter3 import on_rig, steady
 from stickslip_thesis.drawing import around, characteristics, contact_with_inertia, figure, panels, responses, tag
 from stickslip_thesis.printed import Given, Ours
 
@@ -115,13 +116,6 @@ def damping(given: Given, ratio: float) -> float:
     section = given["stick_slip"]
     reading = Reading(section["critical"], coupled=True)
     return reading.damping(ratio, mass=section["mass"], spring=section["spring"], stiffness=section["stiffness"])
-
-
-@functools.lru_cache(2048)
-def steady(mass: float, spring: float, law: Any, base: float, frequency: float) -> ss.solve.SteadyState:
-    """The steady motion of a mass on its spring, the base moving as a cosine."""
-    drive = ss.drives.HarmonicBase(base, frequency=frequency)
-    return ss.steady_state(ss.Oscillator(mass=mass, stiffness=spring, law=law, drive=drive))
 
 
 def micro_slips(orbit: ss.solve.SteadyState) -> int:
@@ -239,19 +233,10 @@ def _spectrum(time: Array, values: Array) -> tuple[Array, Array]:
     return np.fft.rfftfreq(size, time[1] - time[0]), power / np.max(power)
 
 
-@functools.lru_cache(4)
-def _measured(mass: float, spring: float, law: Any, base: float, frequency: float) -> ss.Record:
-    drive = ss.drives.HarmonicBase(base, frequency=frequency)
-    run = ss.simulate(ss.Oscillator(mass=mass, stiffness=spring, law=law, drive=drive), duration=10)
-    rig = ss.Rig()
-    record = rig.stated(rig.measure(run, fs=4000, rng=7, start=8.0))
-    return ss.friction_force(record, mass=mass, stiffness=spring, method="fusion")
-
-
 def measured(given: Given) -> ss.Record:
     """What the virtual rig makes of case 2: two seconds, with friction."""
     section = given["stick_slip"]
-    return _measured(
+    return on_rig(
         section["mass"], section["spring"], _contact(given, section["case2"]), section["base"], section["frequency"]
     )
 

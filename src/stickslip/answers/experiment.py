@@ -244,7 +244,9 @@ def plan_experiment(
                     progress(f"{', '.join(sensors)} at {fs:g} Hz, draw {draw + 1} of {draws}", share)
                 known = rig.stated(replace(record, samples={name: record[name] for name in sensors}))
                 tried.setdefault(sensors, []).append(_Trial(known, rig, run, start + rig.offset).answers())
-        setups += [Setup(float(fs), sensors, _accuracies(answers)) for sensors, answers in tried.items()]
+        for sensors, answers in tried.items():
+            accuracies = {key: _accuracy([answer[key] for answer in answers], UNITS[key]) for key in answers[0]}
+            setups.append(Setup(float(fs), sensors, accuracies))
     return ExperimentPlan(tuple(setups), draws, seed)
 
 
@@ -338,11 +340,6 @@ def _answer_of(truth: float, error: Callable[[], Array | float]) -> _Answer:
     except StickslipError as refusal:
         return _Answer(truth, refusal=str(refusal))
     return _Answer(truth, float(np.mean(errors)), float(np.mean(np.square(errors))))
-
-
-def _accuracies(answers: Sequence[Mapping[str, _Answer]]) -> dict[str, Accuracy]:
-    """All draws together, by question."""
-    return {question: _accuracy([answer[question] for answer in answers], UNITS[question]) for question in answers[0]}
 
 
 def _accuracy(answers: Sequence[_Answer], unit: str) -> Accuracy:

@@ -176,13 +176,6 @@ def dry_bound(
     return math.pi * e * span / (2 * (1 + e)) * rate_error + error
 
 
-def dry_bound_of_four(extremes: ArrayLike, *, i: int, dry_displacement: float, error: float) -> float:
-    """The same where beta is of the four extremes at i, m = 1 (equation 6.19)."""
-    x = np.asarray(extremes, dtype=float)
-    span = abs(float(x[i] - x[i - 1])) + 2 * dry_displacement
-    return (1 + span / abs(float(x[i + 1] - x[i - 1]))) * error
-
-
 def dry_worst(extremes: ArrayLike, *, i: int, m: int, error: float) -> float:
     """The largest error of x_k itself, by (6.14) and (6.9) at i, over every way that extremes can be off.
 

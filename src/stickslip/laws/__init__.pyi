@@ -1,10 +1,10 @@
 from stickslip.laws.compliant import CompliantContact as CompliantContact
 from stickslip.laws.compliant import InertialContact as InertialContact
 from stickslip.laws.coulomb import Coulomb as Coulomb
+from stickslip.laws.coulomb import Geared as Geared
 from stickslip.laws.coulomb import LinearSlope as LinearSlope
 from stickslip.laws.coulomb import PositionLoad as PositionLoad
 from stickslip.laws.export import export_law as export_law
-from stickslip.laws.geared import Geared as Geared
 from stickslip.laws.lugre import Dahl as Dahl
 from stickslip.laws.lugre import LuGre as LuGre
 from stickslip.laws.pairs import Pair as Pair

@@ -295,7 +295,7 @@ class Sensor:
             if name in own:
                 parts[name] = value
                 continue
-            owners = [part for part, thing in parts.items() if _has(thing, name)]
+            owners = [part for part, thing in parts.items() if name in getattr(thing, "__dataclass_fields__", ())]
             if not owners and name in {f.name for f in fields(Mount)}:
                 raise ModelError(
                     f"the sensor for {self.channel} stands on no mount whose '{name}' could be changed",
@@ -306,7 +306,3 @@ class Sensor:
                 raise ModelError(f"a sensor has no '{name}'", f"it has {', '.join(sorted(own))}", "correct the name")
             parts[owners[0]] = replace(parts[owners[0]], **{name: value})
         return replace(self, **parts)
-
-
-def _has(thing: Any, name: str) -> bool:
-    return thing is not None and hasattr(thing, "__dataclass_fields__") and name in thing.__dataclass_fields__

@@ -94,7 +94,9 @@ def _require_frequencies(wanted: Array, lowest: float, fs: float, duration: floa
         or (np.diff(wanted) <= 0).any()
     ):
         raise RecordError(
-            f"frequencies = {_shortly(wanted)}", "they are positive and rise", "give the lowest and the highest in Hz"
+            f"frequencies = {np.array2string(wanted, threshold=6, precision=4)}",
+            "they are positive and rise",
+            "give the lowest and the highest in Hz",
         )
     if wanted[-1] > fs / 2:
         raise RecordError(
@@ -117,10 +119,6 @@ def check_centre(centre: float) -> None:
             "it is 3 to 100: below, a wavelet sees the mean; above, it is longer than what it is to tell apart",
             "leave it at 4.5",
         )
-
-
-def _shortly(values: Array) -> str:
-    return np.array2string(values, threshold=6, precision=4)
 
 
 def labelled(

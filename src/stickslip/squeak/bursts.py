@@ -362,6 +362,9 @@ class _Listener:
         loudest, loud = hearing.loudest(part)
         reference = REFERENCES.get(unit, 1.0)
         calibrated = unit == "Pa" and not spoilt
+        ends = " and ".join(self._cut(part))
+        cut = f"cut by the {ends} of the record: it may last longer" if ends else ""
+        clipped = "clipped: its level and harmonics can not be told" if spoilt else ""
         return Squeak(
             start=float(record.time[part.first]),
             duration=(part.last - part.first) / record.fs,
@@ -378,7 +381,7 @@ class _Listener:
             phase=float(motion.phase[loudest]) if motion.phase is not None else math.nan,
             speed=float(motion.velocity[loudest]) if motion.velocity is not None else math.nan,
             loud=(float(record.time[loud[0]]), float(record.time[loud[1] - 1])),
-            status=self._status(part, spoilt),
+            status=Status(cut, clipped),
         )
 
     @cached_property
@@ -414,7 +417,8 @@ class _Listener:
             return self._swinging(part, kind)
         if part.growth < GROWN and self._cut(part):
             return "tonal", "not told", "cut by the record: whether it grew or was struck can not be told"
-        if self.record.channels[self.name].unit == "Pa" and self._loudness(part) < QUIET:
+        heard = self.hearing.values[part.first : part.last]
+        if self.record.channels[self.name].unit == "Pa" and level(heard, REFERENCES["Pa"], fs=self.record.fs) < QUIET:
             return "tonal", "no", f"quieter than {QUIET:g} dB: it would not be heard"
         if part.growth < GROWN and part.middle < EVEN and part.hidden:
             return "tonal", "not told", "what sounds before it hides whether it grew or was struck"
@@ -480,7 +484,11 @@ class _Listener:
 
     def _broad(self, part: Span, *, slides: bool) -> tuple[str, str, str]:
         rate = part.rate
-        if not math.isnan(rate) and self.name in TANGENTIAL and self._at_reversals(rate):
+        if (
+            not math.isnan(rate)
+            and self.name in TANGENTIAL  # the jumps of dry friction come once or twice in a forcing cycle
+            and any(abs(rate / (turns * self.motion.frequency) - 1) < ALIKE for turns in (1, 2))
+        ):
             return "noise", "no", f"its {rate:.3g} jumps in a second are the reversals of the motion"
         if not math.isnan(rate) and (slides or (rate < VOICED and part.wander > WANDERS)):
             evidence = (
@@ -501,10 +509,6 @@ class _Listener:
         evidence = "broad band, and it begins and ends; of sound alone it can not be told whether anything rubs"
         return "scrape", "not told", evidence
 
-    def _at_reversals(self, rate: float) -> bool:
-        """Whether pulses come once or twice in a forcing cycle, as the jumps of dry friction do."""
-        return any(abs(rate / (turns * self.motion.frequency) - 1) < ALIKE for turns in (1, 2))
-
     def _modulation(self, part: Span) -> float:
         """Amplitude of the friction force about the tone, over the friction's level."""
         band = (0.8 * part.line, min(1.2 * part.line, 0.49 * self.record.fs))
@@ -514,19 +518,10 @@ class _Listener:
         beats = filtered(near, self.record.fs, band)[rows]
         return float(math.sqrt(2) * np.std(beats) / max(np.mean(np.abs(near[rows])), np.finfo(float).tiny))
 
-    def _loudness(self, part: Span) -> float:
-        return level(self.hearing.values[part.first : part.last], REFERENCES["Pa"], fs=self.record.fs)
-
     def _cut(self, part: Span) -> list[str]:
         """Which ends of the record cut it."""
         margin = self.hearing.hop
         return [*["beginning"] * (part.first <= margin), *["end"] * (part.last >= len(self.record) - margin)]
-
-    def _status(self, part: Span, spoilt: bool) -> str:
-        ends = self._cut(part)
-        doubts = [f"cut by the {' and '.join(ends)} of the record: it may last longer"] if ends else []
-        doubts += ["clipped: its level and harmonics can not be told"] if spoilt else []
-        return Status(*doubts)
 
     def cautions(self, unit: str) -> list[str]:
         """What every level and every burst rests on."""

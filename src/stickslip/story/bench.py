@@ -212,7 +212,8 @@ def of_tour(tour: Tour) -> Story:
             (folder / "next.toml").write_text(run_list(tour.proposals).toml(), encoding="utf-8")
 
     return Story(
-        "Dry friction of an air-track slider", _abstract(tour), lines=_lines(tour), tables=_run_tables(tour),
+        "Dry friction of an air-track slider", _abstract(tour), lines=_lines(tour),
+        tables=[_runs(tour), _next(tour)] if tour.proposals else [_runs(tour)],
         parts=parts, settings=_log_rows(tour), data=lambda: dict(plain(_data(tour))), write=write,
     )  # fmt: skip
 
@@ -296,10 +297,6 @@ def _lines(tour: Tour) -> list[Line]:
         if estimate is not None:
             lines.append(Line.of(estimate, truth.get(name), name=f"{name}, by ringing"))
     return lines
-
-
-def _run_tables(tour: Tour) -> list[Table]:
-    return [_runs(tour), _next(tour)] if tour.proposals else [_runs(tour)]
 
 
 def _runs(tour: Tour) -> Table:
