@@ -49,11 +49,21 @@ def is_long(files: Sequence[Path]) -> bool:
     Returns
     -------
     bool
+
+    Raises
+    ------
+    OSError
+        A file is not there.
+
+    Examples
+    --------
+    >>> is_long([])
+    False
     """
     return sum(path.stat().st_size for path in files) > LONG
 
 
-def read_mended(files: Sequence[Path], rig: RigSettings, names: Sequence[str] = ()) -> Record:
+def read_mended(files: Sequence[Path], *, rig: RigSettings, names: Sequence[str] = ()) -> Record:
     """Read a record as its rig's settings say, mended.
 
     Parameters
@@ -73,13 +83,22 @@ def read_mended(files: Sequence[Path], rig: RigSettings, names: Sequence[str] = 
     ------
     FormatError, RecordError, ModelError
         As :func:`read_record` and :func:`mend`.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from stickslip import write_record
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = write_record(Record.of({"x": range(10)}, fs=2.0), folder + "/run.csv")
+    ...     read_mended([path], rig=rig_settings({"rows": "2:6"}))["x"].tolist()
+    [2.0, 3.0, 4.0, 5.0]
     """
     record = read_record(files, rows=rig.row_range(), **rig.reading())
     return rig.logged(mend(_called(record, files, names), repairs=rig.repair))
 
 
 def read_parts(
-    files: Sequence[Path], rig: RigSettings, names: Sequence[str] = (), *, size: int = PART
+    files: Sequence[Path], *, rig: RigSettings, names: Sequence[str] = (), size: int = PART
 ) -> Iterator[Record]:
     """Read a record in parts that fit into memory; whole where rows of it or repairs are asked for.
 
@@ -98,9 +117,18 @@ def read_parts(
     ------
     FormatError, RecordError, ModelError
         As :func:`read_blocks` and :func:`mend`.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from stickslip import write_record
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = write_record(Record.of({"x": range(10)}, fs=2.0), folder + "/run.csv")
+    ...     [len(part) for part in read_parts([path], rig=rig_settings({}), size=4)]
+    [4, 4, 2]
     """
     if rig.rows or rig.repair:
-        yield read_mended(files, rig, names)
+        yield read_mended(files, rig=rig, names=names)
         return
     for part in read_blocks(files, size=size, **rig.reading()):
         yield rig.logged(_called(part, files, names))

@@ -205,7 +205,7 @@ def impact(file: str, output: Path | None, as_json: bool, everything: bool, **op
     folder = output or (None if as_json else folder_after(files[0], "impact"))
     with progress(1) as tell:
         tell(f"reading {file}", 0)
-        record = ss.answers.read_mended(files, rig)
+        record = ss.answers.read_mended(files, rig=rig)
         test = ss.balance.impact_test(record, mass=rig.mass)
         written = publish(test, folder, record=record)
     show(test, written, as_json=as_json, everything=everything, record=record)

@@ -109,7 +109,7 @@ def _source(
 
     def source(step: BenchStep) -> Record | None:
         if step.name in given:
-            return ss.answers.read_mended([given[step.name]], rig)
+            return ss.answers.read_mended([given[step.name]], rig=rig)
         kept = _kept(folder, step.name) if folder else None
         if kept is not None and kept.exists() and step.name not in anew:
             return ss.read_record(kept)

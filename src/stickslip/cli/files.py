@@ -37,7 +37,7 @@ def check(file: str, **options: Any) -> None:
     refused: list[ss.StickslipError] = []
     for group in groups_of(file):
         with collected(refused, group):
-            record = ss.answers.read_mended(group, rig)
+            record = ss.answers.read_mended(group, rig=rig)
             say(f"{record!r}")
             for fault in [str(fault) for fault in record.check()] or ["nothing wrong was found"]:
                 say(f"- {spoken(fault)}")
@@ -59,7 +59,7 @@ def convert(file: str, out: Path, force: bool, **options: Any) -> None:
         raise click.BadParameter(f"'{out}' is the file to be read", param_hint="OUT")
     if out.exists() and not force:
         raise click.BadParameter(f"'{out}' is there already; --force writes over it", param_hint="OUT")
-    say(ss.write_record(ss.answers.read_mended(files, rig_of(**options)), out, overwrite=force))
+    say(ss.write_record(ss.answers.read_mended(files, rig=rig_of(**options)), out, overwrite=force))
 
 
 @click.command()
@@ -117,7 +117,7 @@ def init(files: tuple[str, ...], yes: bool, output: Path, force: bool, **options
         raise click.BadParameter(f"'{output}' is there already; --force writes over it", param_hint="--output")
     groups = groups_of(*files)
     stated = rig_of(**{**options, "here": False})
-    record = ss.answers.read_mended(groups[0], stated)
+    record = ss.answers.read_mended(groups[0], rig=stated)
     guesses = [] if stated.channels else ss.rig.guess_columns(record)
     _show(groups[0], record, guesses)
     if not yes:
@@ -245,7 +245,7 @@ def _after(groups: Sequence[Sequence[Path]], rig: RigSettings, output: Path) -> 
     yield f"{output} is written."
     for group in groups[1:]:
         try:
-            ss.answers.read_mended(group, rig.model_copy(update={"rows": f"0:{LOOKED_AT}", "repair": ()}))
+            ss.answers.read_mended(group, rig=rig.model_copy(update={"rows": f"0:{LOOKED_AT}", "repair": ()}))
         except ss.StickslipError as error:
             complain(f"{' + '.join(map(str, group))} is not like the first: {spoken(error)}")
     for sentence in _wrong(groups[0], rig):
@@ -257,7 +257,7 @@ def _after(groups: Sequence[Sequence[Path]], rig: RigSettings, output: Path) -> 
 def _wrong(files: Sequence[Path], rig: RigSettings) -> Iterator[str]:
     """What the record says against what was stated."""
     try:
-        findings: Findings = ss.analyze(ss.answers.read_mended(files, rig), rig=rig)
+        findings: Findings = ss.analyze(ss.answers.read_mended(files, rig=rig), rig=rig)
     except ss.StickslipError as error:
         yield spoken(error)
         return

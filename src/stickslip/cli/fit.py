@@ -90,7 +90,7 @@ def fit(
     count = f"{len(names) if names else 'six'} laws"
     with progress(3) as tell:
         tell("reading", 0)
-        records = [ss.answers.read_mended(group, rig) for group in groups]
+        records = [ss.answers.read_mended(group, rig=rig) for group in groups]
         tell("fitting", 1)
         mistaken = None if curve is not None else ss.answers.stated_wrongly(records, rig=rig)
         try:
@@ -144,11 +144,11 @@ def _fitted_reading(law: Path, rig: RigSettings) -> dict[str, Any]:
 def _read(files: Sequence[Path], rig: RigSettings, names: Sequence[str], *, fitted: Mapping[str, Any]) -> Record:
     """The record by the columns of the fit, by its own where it has none of that name."""
     try:
-        return ss.answers.read_mended(files, rig.model_copy(update=fitted), names)
+        return ss.answers.read_mended(files, rig=rig.model_copy(update=fitted), names=names)
     except ss.errors.RecordError as error:
         if not fitted or error.kind != ABSENT:
             raise
-    return ss.answers.read_mended(files, rig, names)
+    return ss.answers.read_mended(files, rig=rig, names=names)
 
 
 @click.command()

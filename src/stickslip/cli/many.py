@@ -169,7 +169,7 @@ def answered(task: Task) -> Row:
     """What one record answers; why, where it does not."""
     name = " + ".join(task.names)
     try:
-        record = ss.answers.read_mended(task.files, task.rig, task.names)
+        record = ss.answers.read_mended(task.files, rig=task.rig, names=task.names)
         findings = ASK[task.question](record, task.rig, **task.options)
         answer, picture = ss.summary(findings).answer, PICTURES[task.question](findings)
         quoted, level = findings.quoted, findings.level

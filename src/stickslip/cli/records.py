@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from stickslip.systems import Case
 
 Answer = TypeVar("Answer")
-Reader = Callable[[Sequence[Path], "RigSettings", Sequence[str]], "Record"]
+Reader = Callable[..., "Record"]
 
 RIG_FILE = "rig.toml"  # of the folder one is in: read where no other is named
 
@@ -206,9 +206,9 @@ def answers(
             tell(f"reading {name}", 2 * number)
             if of_parts is not None and ss.answers.is_long(group):
                 say = functools.partial(_say, tell, f"analysing {name}", 2 * number)
-                results.append(of_parts(ss.answers.read_parts(group, rig, names), say))
+                results.append(of_parts(ss.answers.read_parts(group, rig=rig, names=names), say))
                 continue
-            record = (reader or ss.answers.read_mended)(group, rig, names)
+            record = (reader or ss.answers.read_mended)(group, rig=rig, names=names)
             tell(f"checking and analysing {name}", 2 * number + 1)
             results.append(ask(record))
     if results:

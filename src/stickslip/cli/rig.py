@@ -201,7 +201,7 @@ def join(first: str, second: str, output: Path | None, as_json: bool, everything
     with progress(2) as tell:
         tell("reading", 0)
         a, b = (
-            ss.answers.read_mended(group, rig_of(**{**options, "channels": named or options["channels"]}))
+            ss.answers.read_mended(group, rig=rig_of(**{**options, "channels": named or options["channels"]}))
             for group, named in zip(groups, own, strict=True)
         )
         tell("finding the offset of the clocks", 1)

@@ -90,7 +90,7 @@ def joint(
         return ss.answers.compare_joints(logs, **stated) if len(logs) > 1 else logs[0]
 
     if propose is not None:
-        log = ss.answers.axis_record(next(ss.answers.episodes(ss.answers.read_mended(groups[0], rig))), axis=axis)
+        log = ss.answers.axis_record(next(ss.answers.episodes(ss.answers.read_mended(groups[0], rig=rig))), axis=axis)
         ss.write_record(ss.cycle.telling_motion(log), propose)
     answer_together(groups, rig, ask, together=together, folder=folder, as_json=as_json, everything=everything)
 
@@ -259,7 +259,7 @@ def wavelet(
     folder = output or (None if as_json else folder_after(files[0], "wavelet"))
     with progress(3) as tell:
         tell(f"reading {name_of(files)}", 0)
-        parts = _told_of(ss.answers.read_parts(files, rig, size=BLOCK), tell)
+        parts = _told_of(ss.answers.read_parts(files, rig=rig, size=BLOCK), tell)
         query |= {"mass": rig.mass, "stiffness": rig.stiffness}
         findings = ss.answers.time_frequency(parts, frequencies=frequencies, **query)
         tell("drawing and writing", 2)

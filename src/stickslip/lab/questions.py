@@ -412,13 +412,13 @@ class Query:
 
     def record(self, number: int = 0) -> Record:
         """One of the records, whole, mended as asked."""
-        return ss.answers.read_mended(self.records[number], self.rig(number), self._called(number))
+        return ss.answers.read_mended(self.records[number], rig=self.rig(number), names=self._called(number))
 
     def parts(self, number: int = 0) -> Iterator[Record]:
         """One of the records in parts that fit into memory; whole if it is short, or rows or repairs are asked for."""
         if not self.is_long(number):
             return iter([self.record(number)])
-        return ss.answers.read_parts(self.records[number], self.rig(number), self._called(number))
+        return ss.answers.read_parts(self.records[number], rig=self.rig(number), names=self._called(number))
 
     def is_long(self, number: int) -> bool:
         return ss.answers.is_long(self.records[number])
