@@ -16,7 +16,7 @@ from stickslip.laws.base import Exit, Rigid
 from stickslip.laws.curved import CurvedMode, asinh, exp, log, sqrt, symbol, tanh
 from stickslip.solve import march
 from stickslip.solve.tape import tape
-from stickslip.solve.taylor import expansion
+from stickslip.solve.taylor import expansion, length
 
 HEAVY = 1e30  # kg: whatever friction does, the mass keeps its speed
 LUGRE = ss.laws.LuGre(1.0, 1.5, speed=1e-3, stiffness=1e5, damping=math.sqrt(1e5), viscous=0.4)
@@ -489,3 +489,13 @@ def test_lines_of_a_table_spend_no_events() -> None:
     system = ss.Oscillator(1.0, 1.0, table, ss.drives.Belt(0.3))
     run = ss.simulate(system, duration=60.0, budget=20)
     assert len(run.modes) > 20 * 60.0 / (2 * math.pi)
+
+
+@pytest.mark.parametrize("last", [(math.nan, math.nan), (math.nan, 0.0), (0.0, math.nan), (math.inf, 0.0)])
+def test_a_series_that_outgrew_the_numbers_has_no_length(last: tuple[float, float]) -> None:
+    def step(*terms: float) -> float:
+        series = np.array([[1.0, 0.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.1, *terms]])
+        return float(length(series.ravel(), 4, np.ones(2), 1e-12))
+
+    assert step(1e-3, 1e-4) > 0.0
+    assert math.isnan(step(*last))

@@ -127,3 +127,10 @@ def test_a_mass_carried_along_by_a_face_that_shakes_takes_long_steps() -> None:
     run = ss.simulate(ss.Oscillator(4.12, 57.6, law, face, damping=0.308), duration=20.0)
     assert len(run.steps.starts) < 20_000
     assert ss.solve.energy(run).residual < 1e-9
+
+
+def test_a_direct_effect_too_small_for_the_numbers_is_named() -> None:
+    system = ss.Oscillator(1.0, 1.0, textbook(300, "aging", 1e-2), ss.drives.HarmonicForce(1.2, 0.05), damping=0.05)
+    with pytest.raises(ss.errors.SolveError, match=r"v = 0\.1,.*direct=") as refusal:
+        ss.simulate(system, duration=24.0, start={"v": 0.1})
+    assert "nan" not in str(refusal.value)

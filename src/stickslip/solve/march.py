@@ -224,11 +224,11 @@ def march(model, clock, state, big, mode, until, steps, work):
             h *= 1e-3  # the coefficients outgrow the numbers where the step before was far longer than this one can be
             series(model.numbers, mode, state, h, step.s)
             full = length(step.s, step.order, big, model.tolerance)
-        clock[TRY] = h
         stalled = not (full * h > BRIEFEST * (clock[TIME] + 1e-300)) or full <= 0.0
         over = due(model.sums, exits, mode, h, big, step) if stalled else -1
         if stalled and over < 0:
             return STALL, written, leapt, mode
+        clock[TRY] = clock[TRY] if stalled else h  # a mode that is left at once tells nothing of the next one's steps
         if written == len(steps.laps) or tried == len(steps.polys):
             return FULL, written, leapt, mode
         # Certify: a leap after many steps without event, else the Taylor step, to the first exit at the most.

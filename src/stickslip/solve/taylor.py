@@ -156,13 +156,13 @@ def length(s, order, big, tolerance):
     last, before = 0.0, 0.0
     for i in range(len(big)):
         j = i * width
+        if not abs(s[j + order - 1]) + abs(s[j + order]) < math.inf:  # no number: a larger one would hide it
+            return math.nan
         scale = max(big[i], 1e-3 * (abs(s[j + 1]) + abs(s[j + 2])))
         if scale > 0.0:
             inverse = 1.0 / scale
             last = max(last, abs(s[j + order]) * inverse)
             before = max(before, abs(s[j + order - 1]) * inverse)
-        elif s[j + 1] != s[j + 1]:
-            return math.nan
     if not (last + before < math.inf):
         return math.nan
     grow = math.log(GROWTH)
