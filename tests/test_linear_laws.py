@@ -295,7 +295,8 @@ def test_a_contact_with_a_mass_moves_as_an_implicit_solver_says() -> None:
 
     opening = run.state(0.0)
     begin = [0.0, opening["v"], 0.0 - opening["stretch"], opening["u"]]
-    known = solve_ivp(rates, (0, 1.5), begin, "Radau", rtol=1e-9, atol=1e-12, t_eval=np.linspace(0, 1.5, 31))
+    # at rtol=1e-9 the reference was 1e-6 off itself, and which side of the bound it fell on hung on the machine
+    known = solve_ivp(rates, (0, 1.5), begin, "Radau", rtol=1e-11, atol=1e-14, t_eval=np.linspace(0, 1.5, 31))
     own = run.sample(known.t, ("x", "v"))[0]
     assert own[0] == pytest.approx(known.y[0], abs=1e-6 * np.max(np.abs(known.y[0])))
     assert own[1] == pytest.approx(known.y[1], abs=1e-6 * np.max(np.abs(known.y[1])))
