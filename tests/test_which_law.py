@@ -195,10 +195,10 @@ def test_numbers_hold_whichever_of_the_laws_kept_it_is() -> None:
     """Coulomb's law made up for a static friction by a damper seven times the true one and gains 1.5 % off."""
     channels = {"x": "plate [mm]", "z": "base [mm]", "a": "acc [g]"}
     told = ss.read_record(Path(__file__).parents[1] / "examples" / "rig.csv", channels=channels)
-    found = ss.compare_laws(told, slider(), laws=["Coulomb", "static"])
-    assert set(found.kept) == {"Coulomb", "static"}
+    comparison = ss.compare_laws(told, slider(), laws=["Coulomb", "static"])
+    assert set(comparison.kept) == {"Coulomb", "static"}
     true = {"kinetic": 1.1, "damping": 0.12, "stiffness": 2310.0, "x.gain": 1.0, "a.gain": 1.0, "x.delay": 0.0}
-    assert [name for name, value in true.items() if not found.fit.parameters[name].includes(value)] == []
+    assert [name for name, value in true.items() if not comparison.fit.parameters[name].includes(value)] == []
 
 
 def test_a_law_with_values_that_units_do_not_tell_is_fitted_as_it_is() -> None:

@@ -219,11 +219,13 @@ def _shown(value: object) -> str:
 
 def _mended(message: str) -> str:
     """What a model says of a value, in the words of a settings file."""
-    said = message.removeprefix("Value error, ").replace("Input should", "it should")
-    said = (
-        said.replace("Tuple should", "it should").replace("String should", "it should").replace(" after validation", "")
+    sentence = message.removeprefix("Value error, ").replace("Input should", "it should")
+    sentence = (
+        sentence.replace("Tuple should", "it should")
+        .replace("String should", "it should")
+        .replace(" after validation", "")
     )
-    return said.replace("a valid dictionary", "a table").replace("a valid ", "a ")
+    return sentence.replace("a valid dictionary", "a table").replace("a valid ", "a ")
 
 
 def line_of(path: Sequence[str], lines: Sequence[str]) -> str:

@@ -37,8 +37,8 @@ def numbers(given: Given) -> Ours:
     """The chapter's numbers."""
     section, free = given["rig"], free_vibration(given)
     lines = {
-        each.name: each.frequency.value
-        for each in ss.balance.impact_test(impact(given), mass=section["mass"]).resonances
+        resonance.name: resonance.frequency.value
+        for resonance in ss.balance.impact_test(impact(given), mass=section["mass"]).resonances
     }
     return {
         "damping ratio": ss.decay.log_decrement(free).damping_ratio.value,

@@ -46,13 +46,13 @@ def numbers(given: Given) -> Ours:
     slopes = [slopes_of_sticks(measured(given, case)) for case in CASES]
     speeds = [ss.contact.transition_speed(measured(given, case)).turns for case in CASES]
     return {
-        "stiffness": [float(np.mean(each)) / 1e4 for each in slopes],
-        "stiffness scatter": [float(np.std(each, ddof=1)) / 1e4 for each in slopes],
+        "stiffness": [float(np.mean(slope)) / 1e4 for slope in slopes],
+        "stiffness scatter": [float(np.std(slope, ddof=1)) / 1e4 for slope in slopes],
         "mean stiffness": float(np.mean(section["stiffness"])),
         "amplitude": [1e3 * orbit.amplitude for orbit in orbits],
         "speed by equation": [equation_3_4(section, case) for case in CASES],
-        "speed read off": [float(np.mean(each)) for each in speeds],
-        "speed scatter": [float(np.std(each, ddof=1)) for each in speeds],
+        "speed read off": [float(np.mean(speed)) for speed in speeds],
+        "speed scatter": [float(np.std(speed, ddof=1)) for speed in speeds],
         "base": [1e3 * base_for(given, case) for case in CASES],
         "harmonics": harmonics(given).ratio(2),
     }  # fmt: skip

@@ -232,9 +232,9 @@ def system_i(given: Given) -> Any:
         _block(ax, (7.2, y - 0.2 * (sign < 0)), 0.5, 0.2, colour=ORANGE)
     cases = [section["case1"], section["case2"]]
     _told(ax, (7.9, 2.9), (8.2, 4.4), "damper, switched on: ζ = "
-          + " or ".join(f"{each['damping_ratio']:g}" for each in cases))  # fmt: skip
+          + " or ".join(f"{case['damping_ratio']:g}" for case in cases))  # fmt: skip
     _told(ax, (7.45, 1.75), (7.6, 0.5), "paper, switched on: f_k = "
-          + " or ".join(f"{section['stiffness'] * each['dry']:.3f} N" for each in cases), colour=ORANGE)  # fmt: skip
+          + " or ".join(f"{section['stiffness'] * case['dry']:.3f} N" for case in cases), colour=ORANGE)  # fmt: skip
     _moves(ax, (4.4, 3.5), 1.0, (2.6, 4.4), section["resolution"])
     return drawn
 

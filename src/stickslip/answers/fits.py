@@ -104,8 +104,8 @@ def _weighed(comparison: LawComparison, rig: RigSettings) -> LawComparison:
     share = rig.mass.sd / rig.mass.value if isinstance(rig.mass, Estimate) else 0.0
     if not share:
         return comparison
-    found = comparison.fit.parameters
-    weighed = {name: widened(one, share) if "mass" in dimensions(one.unit) else one for name, one in found.items()}
+    parameters = comparison.fit.parameters
+    weighed = {name: widened(one, share) if "mass" in dimensions(one.unit) else one for name, one in parameters.items()}
     return replace(comparison, fit=replace(comparison.fit, parameters=weighed))
 
 

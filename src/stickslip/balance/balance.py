@@ -110,24 +110,24 @@ class Rig(Balance):
 
     def words(self, record: Record, method: str, width: float, *, one_filter: bool) -> list[str]:
         """What was assumed and how derivatives were taken, for the history."""
-        said = [
+        statements = [
             "f = k z - k x - c v - m a"
             if "z" in record
             else "no channel z: the base is taken to be fixed, f = - k x - c v - m a"
         ]
         if "force" in record:
-            said.append("the applied force is added")
+            statements.append("the applied force is added")
         measured = [name for name in ("v", "a") if name in record]
         if measured:
-            said.append(f"{' and '.join(measured)} as measured")
+            statements.append(f"{' and '.join(measured)} as measured")
         if one_filter:
-            said.append(f"all channels smoothed to {width:.4g} Hz (-3 dB)")
+            statements.append(f"all channels smoothed to {width:.4g} Hz (-3 dB)")
         elif method == "smoother" and len(measured) < 2:
-            said.append(f"the velocity smoothed to {width:.4g} Hz (-3 dB)")
+            statements.append(f"the velocity smoothed to {width:.4g} Hz (-3 dB)")
         elif method == "five-point":
-            said.append("derivatives by central differences and five-point averages")
-        said.append(f"contact against the {self.contact}")
-        return said
+            statements.append("derivatives by central differences and five-point averages")
+        statements.append(f"contact against the {self.contact}")
+        return statements
 
 
 def known_constants(record: Record, **given: Any) -> dict[str, Any]:

@@ -90,8 +90,8 @@ class Picture:
         columns = np.floor((ends - self.after) * COLUMNS / (SPAN * device.fs)).astype(int) + COLUMNS - 1
         lows, tops = (np.array([part[k] for part in self.parts]).T for k in (1, 2))
         traces = zip(device.inputs, lows, tops, strict=True)
-        told = [_line(one, low, top, np.maximum(columns, 0)) for one, low, top in traces]
-        return [f"{self.after / device.fs:.1f} of {self.seconds:g} s", *told]
+        lines = [_line(one, low, top, np.maximum(columns, 0)) for one, low, top in traces]
+        return [f"{self.after / device.fs:.1f} of {self.seconds:g} s", *lines]
 
 
 def _line(one: Input, low: NDArray[np.float64], top: NDArray[np.float64], columns: NDArray[np.int_]) -> str:

@@ -261,14 +261,14 @@ def _print_all(story: Story) -> None:
     """Everything that the page tells in words, each sentence once."""
     lines = [line for text in story.headline for line in _lines(text)]
     lines += [*_remedy(story), *_numbers(story, story.lines), ""]
-    said = {str(sentence) for sentence in (*story.headline, *story.notices)} | {
+    shown = {str(sentence) for sentence in (*story.headline, *story.notices)} | {
         notice.reason for notice in story.notices
     }
     lines += [line for caution in story.notices for line in _caution(story, caution)]
-    lines += [line for fault in story.faults or () if fault not in said for line in _lines(fault, "- ")]
+    lines += [line for fault in story.faults or () if fault not in shown for line in _lines(fault, "- ")]
     for table in story.tables:
         lines += [*_table(table.title, table.headings, table.rows), *_lines(table.note)]
-    lines += [line for note in story.notes if note not in said for line in _lines(note, "Note: ")]
+    lines += [line for note in story.notes if note not in shown for line in _lines(note, "Note: ")]
     _print(story.title, lines)
 
 

@@ -206,8 +206,8 @@ def _verdict(
     least, rigid, most = limits
     ways = [slope.value * level for slope in slopes]
     factor, unit = prefixed(np.array([*ways, least * level]), length)
-    said = " and ".join(f"{factor * way:.2g} {unit} {side}" for way, (_, side) in zip(ways, SIDES, strict=True))
-    moves = f"while friction builds up to {level:.3g} {FORCES[length]} it moves {said}"
+    ranges = " and ".join(f"{factor * way:.2g} {unit} {side}" for way, (_, side) in zip(ways, SIDES, strict=True))
+    moves = f"while friction builds up to {level:.3g} {FORCES[length]} it moves {ranges}"
     against = [slope for slope in slopes if slope.interval[1] < 0 and abs(slope.value) > least]
     if against:
         return "can not be told", f"{moves}, against its load: something else moves than the contact"

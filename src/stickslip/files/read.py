@@ -192,7 +192,7 @@ def _open(
             "a record needs one channel at least",
             "check the file, or name columns in channels=",
         )
-    said = {
+    given = {
         "channels": dict(channels) if channels is not None else None,
         "fs": fs,
         "units": dict(units) if units else None,
@@ -201,7 +201,7 @@ def _open(
         "delimiter": options.delimiter,
         "decimal": options.decimal,
     }
-    arguments = {name: value for name, value in said.items() if value is not None}
+    arguments = {name: value for name, value in given.items() if value is not None}
     return Reading(sources, tuple(wanted), times, fs, rows or (None, None), arguments, tuple(notes))
 
 

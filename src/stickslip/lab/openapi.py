@@ -49,11 +49,11 @@ def document(routes: Sequence[BaseRoute]) -> dict[str, Any]:
     """The OpenAPI document of the described routes."""
     paths: dict[str, dict[str, Any]] = {}
     for route in routes:
-        said = getattr(route.endpoint, "openapi", None) if isinstance(route, Route) else None
-        if said is None or not isinstance(route, Route):
+        description = getattr(route.endpoint, "openapi", None) if isinstance(route, Route) else None
+        if description is None or not isinstance(route, Route):
             continue
         place = paths.setdefault(re.sub(r"{(\w+):\w+}", r"{\1}", route.path), {})
-        inputs = said["parameters"] + [
+        inputs = description["parameters"] + [
             {"name": name, "in": "path", "required": True, "schema": {"type": KINDS.get(kind, "string")}}
             for name, kind in re.findall(r"{(\w+)(?::(\w+))?}", route.path)
         ]
@@ -62,7 +62,11 @@ def document(routes: Sequence[BaseRoute]) -> dict[str, Any]:
             for code, meaning in REFUSALS.items()
         }
         for method in sorted((route.methods or set()) - {"HEAD"}):
-            place[method.lower()] = {**said, "parameters": inputs, "responses": {**refusals, **said["responses"]}}
+            place[method.lower()] = {
+                **description,
+                "parameters": inputs,
+                "responses": {**refusals, **description["responses"]},
+            }
     return {
         "openapi": "3.1.0",
         "info": {"title": "stickslip lab", "version": ss.__version__},

@@ -498,13 +498,13 @@ def _whichever(fit: LawFit, others: Sequence[Trial]) -> LawFit:
 
     A law without static friction made up for it by a damper seven times the true one and gains three deviations off.
     """
-    told = [
+    values = [
         {keyed(knob): valued(knob, u, trial.system) for knob, u in zip(trial.problem.knobs, trial.point.u, strict=True)}
         for trial in others
     ]
     parameters = dict(fit.parameters)
     for key, one in fit.parameters.items():
-        apart = [0.0, *(other[key] - one.value for other in told if key in other)]
+        apart = [0.0, *(other[key] - one.value for other in values if key in other)]
         low, high = one.interval
         parameters[key] = replace(one, interval=(max(min(0.0, low), low + min(apart)), high + max(apart)))
     return replace(fit, parameters=parameters)

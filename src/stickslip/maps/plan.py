@@ -200,8 +200,8 @@ def _source(value: Any, above: tuple[FunctionType, ...] = ()) -> Any:
     code = value.__code__
     known = {name: value.__globals__[name] for name in _asked(code) if name in value.__globals__}
     known |= {name: cell.cell_contents for name, cell in zip(code.co_freevars, value.__closure__ or (), strict=True)}
-    said = [(name, _source(known[name], (*above, value))) for name in sorted(known)]
-    return value.__qualname__, _said(code), value.__defaults__, value.__kwdefaults__, said
+    rows = [(name, _source(known[name], (*above, value))) for name in sorted(known)]
+    return value.__qualname__, _said(code), value.__defaults__, value.__kwdefaults__, rows
 
 
 def _asked(code: CodeType) -> set[str]:

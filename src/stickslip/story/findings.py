@@ -216,8 +216,8 @@ def of_batch(batch: Batch) -> Story:
 def _headline(batch: Batch, leading: Sequence[str]) -> Iterator[str]:
     answered = sum(row.counts for row in batch.rows)
     ranges = [_range(name, batch.known(name)) for name in leading]
-    said = f": {'; '.join(ranges)}" if ranges else ""
-    yield f"{answered} of {len(batch.rows)} records answer{said}."
+    bounds = f": {'; '.join(ranges)}" if ranges else ""
+    yield f"{answered} of {len(batch.rows)} records answer{bounds}."
     copies = [row for row in batch.rows if row.same_as]
     if copies:
         yield Caution(

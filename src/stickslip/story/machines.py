@@ -28,11 +28,11 @@ RARELY = 0.005  # of the time
 
 def of_tribometer(findings: Findings) -> Story:
     """One test."""
-    found = findings.tribometer
+    tribometer = findings.tribometer
     return Story(
         findings.name, list(_of_one_test(findings)), cautions(findings),
         settings={key: str(value) for key, value in findings.settings.items()},
-        tables=[_definitions(findings)], draw=lambda: tribometer_plates(found), data=lambda: _test_data(findings),
+        tables=[_definitions(findings)], draw=lambda: tribometer_plates(tribometer), data=lambda: _test_data(findings),
     )  # fmt: skip
 
 
@@ -43,45 +43,46 @@ def of_tribometers(comparison: Comparison) -> Story:
     ]
     table = Table("Tests", ("test", *(name.replace("_", " ") for name in DEFINITIONS)), rows)
     mean: Estimate = comparison.plateau
-    told = f"Over {len(rows)} tests the coefficient of friction is {value_of(mean)} (95 %: {interval_of(mean)})."
-    return Story(f"{len(rows)} tests", [told], tables=[table])
+    sentence = f"Over {len(rows)} tests the coefficient of friction is {value_of(mean)} (95 %: {interval_of(mean)})."
+    return Story(f"{len(rows)} tests", [sentence], tables=[table])
 
 
 def _of_one_test(findings: Findings) -> Iterator[str]:
-    found = findings.tribometer
-    doubt = "" if stands(found.plateau.status) else f", which is not to be trusted ({found.plateau.status})"
+    tribometer = findings.tribometer
+    doubt = "" if stands(tribometer.plateau.status) else f", which is not to be trusted ({tribometer.plateau.status})"
     yield (
-        f"The kinetic coefficient of friction is {value_of(found.plateau)} by the plateau "
-        f"(95 %: {interval_of(found.plateau)}) under {value_of(found.load)}{doubt}."
+        f"The kinetic coefficient of friction is {value_of(tribometer.plateau)} by the plateau "
+        f"(95 %: {interval_of(tribometer.plateau)}) under {value_of(tribometer.load)}{doubt}."
     )
-    others = [getattr(found, name) for name in DEFINITIONS if name != "plateau"]
-    if any(abs(one.value - found.plateau.value) > APART * found.plateau.value for one in others if one.known):
-        told = ", ".join(f"{value_of(one)} {one.name.rpartition(', ')[2]}" for one in others if one.known)
-        yield f"By other definitions it is {told}: say which when you quote it."
+    others = [getattr(tribometer, name) for name in DEFINITIONS if name != "plateau"]
+    if any(abs(one.value - tribometer.plateau.value) > APART * tribometer.plateau.value for one in others if one.known):
+        rest = ", ".join(f"{value_of(one)} {one.name.rpartition(', ')[2]}" for one in others if one.known)
+        yield f"By other definitions it is {rest}: say which when you quote it."
     if findings.static is not None:
         yield f"The static coefficient is {value_of(findings.static)} (95 %: {interval_of(findings.static)})."
-    if found.wear_in is not None:
-        change, way = found.wear_in.change, "above" if found.wear_in.change.value > 0 else "below"
+    wear = tribometer.wear_in
+    if wear is not None:
+        change, way = wear.change, "above" if wear.change.value > 0 else "below"
         yield (
-            f"It wears in over {value_of(found.wear_in.cycles)} cycles (95 %: {interval_of(found.wear_in.cycles)}), "
+            f"It wears in over {value_of(wear.cycles)} cycles (95 %: {interval_of(wear.cycles)}), "
             f"from {value_of(change.scaled(1 if change.value > 0 else -1, '1'))} {way} where it settles."
         )
 
 
 def _definitions(findings: Findings) -> Table:
     """The coefficient by every definition, side by side."""
-    told = [(getattr(findings.tribometer, name), words) for name, words in DEFINITIONS.items()]
+    definitions = [(getattr(findings.tribometer, name), words) for name, words in DEFINITIONS.items()]
     if findings.static is not None:
-        told.append((findings.static, "what the contact bears before it slips"))
-    rows = [(one.name.rpartition(", ")[2], value_of(one), interval_of(one), words) for one, words in told]
+        definitions.append((findings.static, "what the contact bears before it slips"))
+    rows = [(one.name.rpartition(", ")[2], value_of(one), interval_of(one), words) for one, words in definitions]
     return Table("The coefficient by the definitions in use", ("definition", "value", "95 %", "of each cycle"), rows)
 
 
 def _test_data(findings: Findings) -> dict[str, Any]:
-    found = findings.tribometer
+    tribometer = findings.tribometer
     return {
-        "load_measured": found.measured, "of_cycles": dict(found.of_cycles), "cycle_time": found.time,
-        "map": {name: getattr(found, name) for name in ("position", "cycle", "forward", "back")},
+        "load_measured": tribometer.measured, "of_cycles": dict(tribometer.of_cycles), "cycle_time": tribometer.time,
+        "map": {name: getattr(tribometer, name) for name in ("position", "cycle", "forward", "back")},
     }  # fmt: skip
 
 
@@ -150,10 +151,11 @@ def _of_one_joint(findings: Findings) -> Iterator[str]:
     fastest = float(np.abs(joint.speed).max())
     rate = f"{fastest:.3g} rad/s" if unit == "N m" else f"{fastest:.3g} m/s"
     yield f"To that come {' and '.join(parts)}; it was moved at up to {rate}."
-    told = {"reference": "its controller's gains make", "current": "its current makes"}
+    sources = {"reference": "its controller's gains make", "current": "its current makes"}
     torque = "the torque that" if unit == "N m" else "the force that"
+    source = sources.get(joint.source, "was measured")
     yield (
-        f"With an inertia of {value_of(joint.inertia)} that explains {torque} {told.get(joint.source, 'was measured')};"
+        f"With an inertia of {value_of(joint.inertia)} that explains {torque} {source};"
         f" {100 * joint.residual:.2g} % of it is left unexplained while it slides."
     )
     if findings.breakaway is not None:

@@ -200,16 +200,16 @@ def _counted(bursts: Sequence[Squeak]) -> str:
 
 def _cautions(findings: Findings) -> list[str]:
     """What should keep the reader from trusting it."""
-    said = list(findings.squeaks.cautions)
+    lines = list(findings.squeaks.cautions)
     if any(fault.kind == "spike" for fault in findings.faults):
-        said.append(
+        lines.append(
             "What stands off as a spike may be a contact that sticks, lifts or lands: look before it is replaced."
         )
     spoilt: dict[str, list[str]] = {}
     for place, burst in enumerate(findings.squeaks.bursts):
         for doubt in doubts_of(burst.status):
             spoilt.setdefault(doubt.words, []).append(str(place + 1))
-    return said + [
+    return lines + [
         f"Burst{'s' if len(places) > 1 else ''} {', '.join(places)}: {part}." for part, places in spoilt.items()
     ]
 
