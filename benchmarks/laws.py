@@ -169,7 +169,8 @@ def draw(name: str, condition: str, seed: int, laws: list[str] | None) -> dict[s
 
 def _held(fit: ss.law.LawFit, law: Any) -> dict[str, list[float]]:
     """Of each parameter of the law its true value, the fitted one and the ends of its interval."""
-    own = {name.removeprefix("law."): each for name, each in fit.parameters.items()}
+    # what the rig has by the same name is not the law's
+    own = {name.removeprefix("law."): one for name, one in fit.parameters.items() if name not in RIG}
     return {
         name: [value, own[name].value, *own[name].interval]
         for name, value in vars(law).items() if isinstance(value, float) and name in own

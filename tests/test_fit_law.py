@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from functools import cache
 from typing import Any
 
@@ -53,6 +54,17 @@ def test_a_mount_that_was_tapped_poorly_is_no_damper() -> None:
     for name, true in truth.items():
         assert abs(fit.parameters[name].value - true) < 3.5 * fit.parameters[name].sd, name
     assert fit.parameters["load.frequency"].sd < 1e-4
+
+
+def test_no_mount_is_turned_into_another_where_nothing_fits() -> None:
+    """One was turned by e^5, and to follow its swing took 6 GB of memory."""
+    record = measured(CONTACT, 2.5, 1.0)
+    frequency, damping = record.channels["a"].mount or (0.0, 0.0)
+    record = record.with_details("a", mount=(1.6 * frequency, 3 * damping))
+    fit = ss.fit_law(record, ss.Oscillator(law=ss.laws.Coulomb(1.1), **RIG), intervals=False)
+    assert fit.status != "ok"
+    assert abs(math.log(fit.parameters["a.frequency"].value)) < 0.1001  # ten times what a tap is off by
+    assert abs(math.log(fit.parameters["a.damping"].value)) < 1.001
 
 
 def test_a_base_that_is_late_is_no_damper() -> None:

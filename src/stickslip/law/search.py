@@ -60,6 +60,8 @@ class Knob(NamedTuple):
     @property
     def least(self) -> float:
         """The least coordinate that has a meaning."""
+        if self.kind in OF_MOUNTS:
+            return -self.most
         return -self.origin / self.scale if self.kind in ("above", "positive") else -math.inf
 
 

@@ -32,6 +32,7 @@ AUDIBLE = 2.0  # times its noise that a motion must stray
 CALIBRATION = 0.005  # by which gains and springs are wrong, if nothing is known
 DELAYED = 5e-5  # s by which a stated delay is wrong
 MOUNTED = {"frequency": 0.01, "damping": 0.1}  # parts by which what is stated of a mount is wrong: it is hard to tap
+FARTHEST = 10.0  # times that: a law that does not fit turned a mount by e^5, and to follow its swing took 6 GB
 VISCOUS = {"viscous", "slope"}  # parameters of laws that a viscous damper can not be told from
 GRID = {"stiffness": (0.25, 1.0, 4.0, 64.0), "rate": (0.4, 1.0, 2.5), "steepness": (1.0,), "lag": (0.3, 1.0, 3.0)}
 EXCESS = (0.04, 0.15, 0.25, 0.4)  # of static over kinetic friction
@@ -315,7 +316,7 @@ def nuisance_knob(
     """How what is not known well is turned: a damper anywhere from zero on, all else near what is stated."""
     tail = name.rpartition(".")[2]
     if _of_sensor(name) and tail in MOUNTED:
-        return Knob(name, tail, 1.0, MOUNTED[tail], prior=1.0)
+        return Knob(name, tail, 1.0, MOUNTED[tail], most=FARTHEST, prior=1.0)
     if _of_sensor(name):
         calibrated = Knob(name, tail, 1.0, 0.01, prior=max(calibration, 1e-9) / 0.01)
         return calibrated if tail == "gain" else Knob(name, tail, 0.0, 1e-4, prior=DELAYED / 1e-4)
