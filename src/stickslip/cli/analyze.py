@@ -29,7 +29,7 @@ from stickslip.cli.records import (
     usable,
     with_left_out,
 )
-from stickslip.cli.terminal import complain, progress, publish, show
+from stickslip.cli.terminal import complain, deliver, progress, publish
 from stickslip.errors import INTERRUPTED
 from stickslip.workers import processors
 
@@ -97,7 +97,7 @@ def analyze(
         query = {"method": method, "twins": twins if chosen else 0}
         answer_many("analyze", groups, rig, query, places, folder=folder, output=output, **shown)
         return
-    with progress(2 * len(groups) + 1) as tell:
+    with progress(2 * len(groups)) as tell:
         all_findings, refused = answers(
             groups,
             rig,
@@ -106,38 +106,36 @@ def analyze(
             of_parts=lambda parts, say: ss.answers.analyze_blocks(parts, rig=rig, method=method, progress=say),
         )
 
-        def together(findings: list[Findings]) -> Any:
-            return with_left_out(ss.compare(findings) if len(findings) > 1 else findings[0], refused)
+    def together(findings: list[Findings]) -> Any:
+        return with_left_out(ss.compare(findings) if len(findings) > 1 else findings[0], refused)
 
-        tell("drawing and writing", 2 * len(groups))
-        results, written = _sure(all_findings, twins, together, folder if output or not as_json else None, tell)
     name_left_out(refused)
-    show(results, written, **shown)
+    _deliver_sure(all_findings, twins, together, folder if output or not as_json else None, **shown)
 
 
-def _sure(
+def _deliver_sure(
     all_findings: list[Findings],
     twins: int,
     together: Callable[[list[Findings]], Findings | Comparison],
     folder: Path | None,
-    tell: Callable[..., None],
-    **context: Any,
-) -> tuple[Findings | Comparison, Path | None]:
-    """The results, tried on twins and written; the quick ones are written first, and stay where that is interrupted.
+    **shown: Any,
+) -> None:
+    """Deliver the results, tried on twins; the quick ones are written first, and stay where that is interrupted.
 
     Figures are drawn once, with what stays: they take longer than the quick answers do.
     """
     if not twins:
-        results = together(all_findings)
-        return results, publish(results, folder, **context)
+        deliver(together(all_findings), folder, **shown)
+        return
     from concurrent.futures import ThreadPoolExecutor
 
-    with ThreadPoolExecutor(1) as beside:  # drawn here, while other processes look for the twins
+    context = {name: value for name, value in shown.items() if name not in ("as_json", "everything")}
+    with ThreadPoolExecutor(1) as beside:  # written here, while other processes look for the twins
         quick = beside.submit(publish, together(all_findings), folder, figures=False, **context)
         try:
-            results = together([_tried(findings, twins, tell) for findings in all_findings])
-            tell("drawing and writing")
-            return results, publish(results, quick.result(), **context)
+            with progress(1) as tell:
+                results = together([_tried(findings, twins, tell) for findings in all_findings])
+            deliver(results, quick.result(), **shown)
         except KeyboardInterrupt:
             if folder is None:
                 raise
@@ -175,15 +173,13 @@ def _tried(findings: Findings, twins: int, tell: Callable[..., None]) -> Finding
 @twins_option
 def demo(output: Path, as_json: bool, everything: bool, twins: int) -> None:
     """Analyse the bundled record of a simulated rig, with the true answers beside the estimates."""
-    with progress(3) as tell:
+    with progress(2) as tell:
         tell("reading the bundled record", 0)
         record = ss.datasets.demo()
         tell("analysing", 1)
         constants = {name: record.truth[name] for name in ("mass", "stiffness", "damping")}
         findings = ss.analyze(record, **constants)
-        tell("drawing and writing", 2)
-        results, written = _sure([findings], twins, lambda parts: parts[0], output, tell, form="csv")
-    show(results, written, as_json=as_json, everything=everything)
+    _deliver_sure([findings], twins, lambda parts: parts[0], output, as_json=as_json, everything=everything, form="csv")
 
 
 @click.command()
@@ -207,5 +203,4 @@ def impact(file: str, output: Path | None, as_json: bool, everything: bool, **op
         tell(f"reading {file}", 0)
         record = ss.answers.read_mended(files, rig=rig)
         test = ss.balance.impact_test(record, mass=rig.mass)
-        written = publish(test, folder, record=record)
-    show(test, written, as_json=as_json, everything=everything, record=record)
+    deliver(test, folder, as_json=as_json, everything=everything, record=record)

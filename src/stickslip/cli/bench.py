@@ -15,7 +15,7 @@ import click
 import stickslip as ss
 import stickslip.bench as bench
 from stickslip.cli.records import all_option, groups_of, pair, usable
-from stickslip.cli.terminal import aligned, print_json, progress, redrawn, say, say_json, show, wrapped
+from stickslip.cli.terminal import aligned, deliver, print_json, progress, redrawn, say, say_json, wrapped
 from stickslip.errors import INTERRUPTED
 
 if TYPE_CHECKING:
@@ -80,13 +80,13 @@ def commission(
     source, truth = _source(given, device, rig, folder, seed=options["seed"], anew=anew)
     if device is not None and not isinstance(device, bench.Sim):  # who is at the rig is asked, and no bar runs beside
         done = bench.commission(source, rig=rig, steps=chosen, answered=_answered)
-        written = _written(done, folder) if folder else None
     else:
-        with progress(len(chosen) + 1) as tell:
+        with progress(len(chosen)) as tell:
             done = bench.commission(source, rig=rig, steps=chosen, truth=truth, progress=tell)
-            tell("drawing and writing", len(chosen))
-            written = _written(done, folder) if folder else None
-    show(done, written, as_json=as_json, everything=everything)
+    if folder:
+        folder.mkdir(parents=True, exist_ok=True)
+        (folder / "rig.toml").write_text(done.known.toml(), encoding="utf-8")
+    deliver(done, folder and folder / "report", as_json=as_json, everything=everything)
     if folder and not as_json:
         say(f"Settings: {folder / 'rig.toml'}")
 
@@ -183,14 +183,6 @@ def _answered(step: BenchStep, outcome: Any) -> None:
     """What a step found, before the next one is asked; on the error stream, as the questions are."""
     rows = [f"not answered: {outcome}"] if isinstance(outcome, str) else [*map(str, outcome.estimates)]
     say("\n".join(line for row in rows for line in wrapped(row, "  ")), err=True)
-
-
-def _written(done: Any, folder: Path) -> Path:
-    """The report, and rig.toml beside it."""
-    folder.mkdir(parents=True, exist_ok=True)
-    report = ss.publish(done, folder=folder / "report")
-    (folder / "rig.toml").write_text(done.known.toml(), encoding="utf-8")
-    return report
 
 
 TRIGGER = re.compile(r"\s*(\w+)\s*([<>])\s*(\S+)\s*")
@@ -376,9 +368,7 @@ def tour(fast: bool, seed: int, output: Path, as_json: bool, everything: bool) -
     usable(click.get_current_context(), None, report)  # type: ignore[arg-type]
     with progress(100) as tell:
         done = bench.tour(output, seed=seed, fast=fast, progress=lambda stage, share: tell(stage, 100 * share))
-        tell("drawing and writing", 95)
-        written = ss.publish(done, folder=report)
-    show(done, written, as_json=as_json, everything=everything)
+    deliver(done, report, as_json=as_json, everything=everything)
 
 
 @simulated_bench.command("next")

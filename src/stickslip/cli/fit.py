@@ -21,7 +21,7 @@ from stickslip.cli.records import (
     result_options,
     rig_of,
 )
-from stickslip.cli.terminal import complain, progress, publish, show
+from stickslip.cli.terminal import complain, deliver, progress
 from stickslip.errors import ABSENT, EstimateError
 
 if TYPE_CHECKING:
@@ -88,7 +88,7 @@ def fit(
     given = {"--laws": laws, "--system": system}
     options = [word for name, value in given.items() if value is not None for word in (name, str(value))]
     count = f"{len(names) if names else 'six'} laws"
-    with progress(3) as tell:
+    with progress(2) as tell:
         tell("reading", 0)
         records = [ss.answers.read_mended(group, rig=rig) for group in groups]
         tell("fitting", 1)
@@ -100,10 +100,8 @@ def fit(
             )  # fmt: skip
         except ss.StickslipError as error:
             raise _caused(error, mistaken) from error
-        context = {} if mistaken is None else {"mistaken": mistaken, "options": options}
-        tell("drawing and writing", 2)
-        written = publish(result, folder, record=records, **context)
-    show(result, written, as_json=as_json, everything=everything, record=records, **context)
+    context: dict[str, Any] = {} if mistaken is None else {"mistaken": mistaken, "options": options}
+    deliver(result, folder, as_json=as_json, everything=everything, record=records, **context)
 
 
 def _caused(error: ss.StickslipError, mistaken: Findings | None) -> ss.StickslipError:

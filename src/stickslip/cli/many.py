@@ -11,7 +11,7 @@ import click
 
 import stickslip as ss
 from stickslip.cli.records import answer_together, names_of, together
-from stickslip.cli.terminal import progress, publish, show
+from stickslip.cli.terminal import deliver, progress
 
 if TYPE_CHECKING:
     from stickslip import Record
@@ -110,14 +110,13 @@ def answer_many(
     output: Path | None,
     **shown: bool,
 ) -> None:
-    """Ask all records, write what was found into `folder` (not of JSON alone), show it, forget what was kept of it."""
+    """Ask all records, show what was found, write it into `folder` (not of JSON alone), forget what was kept of it."""
     with progress(len(groups)) as tell:
         batch = ask_many(question, groups, rig, query, places, folder=folder, tell=tell)
-    written = publish(batch, folder if output or not shown["as_json"] else None)
+    deliver(batch, folder if output or not shown["as_json"] else None, **shown)
     if places.table is not None:
         ss.story.write_table(batch, places.table)
     _kept(folder).unlink(missing_ok=True)
-    show(batch, written, **shown)
 
 
 def answer_all(

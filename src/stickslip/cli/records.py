@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import click
 
 import stickslip as ss
-from stickslip.cli.terminal import complain, progress, publish, show, spoken
+from stickslip.cli.terminal import complain, deliver, progress, spoken
 
 if TYPE_CHECKING:
     from stickslip import Record
@@ -233,13 +233,11 @@ def answer_together(
     reader: Reader | None = None,
 ) -> None:
     """Ask every record, put the answers together, leave them in a folder, and show them."""
-    with progress(2 * len(groups) + 1) as tell:
-        found, refused = answers(groups, rig, ask, tell, reader=reader)
-        results = with_left_out(together(found), refused)
-        tell("drawing and writing", 2 * len(groups))
-        written = publish(results, folder)
+    with progress(2 * len(groups)) as tell:
+        answered, refused = answers(groups, rig, ask, tell, reader=reader)
+        results = with_left_out(together(answered), refused)
     name_left_out(refused)
-    show(results, written, as_json=as_json, everything=everything)
+    deliver(results, folder, as_json=as_json, everything=everything)
 
 
 def _say(tell: Callable[[str, float], None], what: str, done: float, state: str) -> None:

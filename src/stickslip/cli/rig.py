@@ -23,7 +23,7 @@ from stickslip.cli.records import (
     rig_of,
     wanted_case,
 )
-from stickslip.cli.terminal import aligned, progress, publish, say, say_json, show, wrapped
+from stickslip.cli.terminal import aligned, deliver, progress, say, say_json, wrapped
 
 if TYPE_CHECKING:
     from stickslip import Record, Rig
@@ -125,9 +125,8 @@ def measure(case: str, output: Path | None, as_json: bool, everything: bool, pla
         tell("simulating", 0)
         run = ss.story.outcome(wanted, progress=lambda share: tell(f"simulating, {100 * share:.0f} %", 0)).run
         results = _planned(run, bench, tell, options) if plan else _measured(run, bench, tell, options)
-        context = {"needs": needs} if plan else {"form": form}
-        written = publish(results, folder, **context)
-    show(results, written, as_json=as_json, everything=everything, **context)
+    context = {"needs": needs} if plan else {"form": form}
+    deliver(results, folder, as_json=as_json, everything=everything, **context)
 
 
 def _bench(preset: str, changes: tuple[str, ...]) -> Rig:
@@ -208,9 +207,8 @@ def join(first: str, second: str, output: Path | None, as_json: bool, everything
         named_on: Any = shared[0] if shared and len(shared) == 1 else shared
         rate = ss.signals.clock_rate(a, b, on=named_on) if drift else 1.0
         joined = ss.signals.synchronise(a, b, on=named_on, offset=seconds, rate=rate)
-        folder = output or (None if as_json else folder_after(groups[0][0], "joined"))
-        written = publish(joined, folder, form=form)
-    show(joined, written, as_json=as_json, everything=everything, form=form)
+    folder = output or (None if as_json else folder_after(groups[0][0], "joined"))
+    deliver(joined, folder, as_json=as_json, everything=everything, form=form)
 
 
 @click.command()

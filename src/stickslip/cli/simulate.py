@@ -23,7 +23,17 @@ from stickslip.cli.records import (
     usable,
     wanted_case,
 )
-from stickslip.cli.terminal import print_json, progress, publish, say, say_json, show, wrapped
+from stickslip.cli.terminal import (
+    deliver,
+    print_json,
+    progress,
+    publish,
+    say,
+    say_json,
+    say_report,
+    show,
+    wrapped,
+)
 from stickslip.errors import INTERRUPTED
 
 if TYPE_CHECKING:
@@ -65,11 +75,11 @@ def simulate(
     folder = output or (None if as_json else folder_name(wanted, "stickslip"))
     if folder:
         ss.story.require_output(wanted, folder=folder, **{key: options[key] for key in ("form", "animation")})
-    with progress(4 if options["animation"] else 3) as tell:
+    with progress(1) as tell:
         tell("simulating", 0)
         result = ss.story.outcome(wanted, progress=lambda share: tell(f"simulating, {100 * share:.0f} %", share))
-        written = publish(result, folder, tell=tell, **options)
-    show(result, written, as_json=as_json, everything=everything, **options)
+    parts = 4 if options["animation"] else 3
+    deliver(result, folder, as_json=as_json, everything=everything, parts=parts, **options)
     if result.run.status == "interrupted":
         raise SystemExit(INTERRUPTED)
 
@@ -143,7 +153,8 @@ def sweep(file: Path, engine: str, store: Path | None, output: Path | None, as_j
     if as_json:
         print_json({**story.data(), "store": str(place)})
         raise SystemExit(0 if whole else INTERRUPTED)
-    show(atlas, written, as_json=False, everything=everything)
+    show(atlas, as_json=False, everything=everything)
+    say_report(written, as_json=False)
     say(f"Map: {place}")
     if not whole:
         say("Call again to go on.")
@@ -268,8 +279,7 @@ def _answer(
     with progress(1) as tell:
         tell(f"{what} of {case.name}", 0)
         answer = ask()
-        written = publish(answer, folder)
-    show(answer, written, as_json=as_json, everything=everything)
+    deliver(answer, folder, as_json=as_json, everything=everything)
 
 
 PORT = 8723

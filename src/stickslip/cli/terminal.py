@@ -209,7 +209,29 @@ def publish(result: Any, folder: Path | None, **context: Any) -> Path | None:
     return None if folder is None else ss.publish(result, folder=folder, wording=spoken, **context)
 
 
-def show(result: Any, written: Path | None, *, as_json: bool, everything: bool = False, **context: Any) -> None:
+def deliver(
+    result: Any, folder: Path | None, *, as_json: bool, everything: bool = False, parts: int = 0, **context: Any
+) -> None:
+    """Show a result, then write its folder: figures take longer than most answers, which are read meanwhile.
+
+    A writing in several `parts` tells of each itself.
+    """
+    try:
+        show(result, as_json=as_json, everything=everything, **context)
+    finally:  # a reader that goes early, as `head` does, takes the words away and not the folder
+        with progress(parts or 1) as tell:
+            tell("drawing and writing", 0)
+            written = publish(result, folder, **({"tell": tell} if parts else {}), **context)
+    say_report(written, as_json=as_json)
+
+
+def say_report(written: Path | None, *, as_json: bool) -> None:
+    """Where the page lies, to a person."""
+    if written is not None and not as_json:
+        say(f"Report: {written / 'report.html'}")
+
+
+def show(result: Any, *, as_json: bool, everything: bool = False, **context: Any) -> None:
     """A result as its story tells it, in short or with `everything`; `context` as in ``publish``."""
     story = ss.summary(result, **context)
     if as_json:
@@ -220,8 +242,6 @@ def show(result: Any, written: Path | None, *, as_json: bool, everything: bool =
             _print_all(part)
     else:
         _print_short(story)
-    if written is not None:
-        say(f"Report: {written / 'report.html'}")
 
 
 def _print_short(story: Story) -> None:

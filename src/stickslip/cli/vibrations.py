@@ -26,7 +26,7 @@ from stickslip.cli.records import (
     result_options,
     rig_of,
 )
-from stickslip.cli.terminal import progress, publish, show
+from stickslip.cli.terminal import deliver, progress
 
 if TYPE_CHECKING:
     from stickslip import Record
@@ -257,14 +257,12 @@ def wavelet(
     query = {key: options.pop(key) for key in ("channel", "wavelet_frequency", "normalisation")}
     rig = rig_of(**options)
     folder = output or (None if as_json else folder_after(files[0], "wavelet"))
-    with progress(3) as tell:
+    with progress(2) as tell:
         tell(f"reading {name_of(files)}", 0)
         parts = _told_of(ss.answers.read_parts(files, rig=rig, size=BLOCK), tell)
         query |= {"mass": rig.mass, "stiffness": rig.stiffness}
         findings = ss.answers.time_frequency(parts, frequencies=frequencies, **query)
-        tell("drawing and writing", 2)
-        written = publish(findings, folder)
-    show(findings, written, as_json=as_json, everything=everything)
+    deliver(findings, folder, as_json=as_json, everything=everything)
 
 
 def _told_of(parts: Iterator[Record], tell: Callable[[str, float], None]) -> Iterator[Record]:
