@@ -22,7 +22,6 @@ from stickslip.answers.findings import Comparison, Findings, require_several
 from stickslip.errors import ModelError, RecordError
 from stickslip.estimate import NORMAL_95, Estimate, Result
 from stickslip.law.fit_curve import LATE
-from stickslip.maps.engines import AHEAD, client_of
 from stickslip.statistics import student
 from stickslip.workers import processors
 from stickslip.workers import workers as processes
@@ -325,6 +324,11 @@ def _one_thread_each() -> Iterator[None]:
 def _by_cluster(answer: Callable[[Task], Row], tasks: Sequence[Task], address: str | None) -> Iterator[Row]:
     if not tasks:
         return
+    from stickslip.maps.engines import (  # systems and laws, which a record on this machine does not need
+        AHEAD,
+        client_of,
+    )
+
     with client_of(address) as client:
         from distributed import as_completed
 

@@ -16,16 +16,17 @@ from typing import TYPE_CHECKING, Any
 from stickslip import __version__
 from stickslip.errors import ModelError, RecordError
 from stickslip.figures import style
-from stickslip.figures.style import Plate
 from stickslip.files.write import whole
 from stickslip.printing import printable
-from stickslip.squeak.spectra import Clip
-from stickslip.story.scope import Scope
 from stickslip.story.story import Story, summary
 from stickslip.whole import whole_folder
 
 if TYPE_CHECKING:
     from jinja2 import Environment
+
+    from stickslip.figures.style import Plate
+    from stickslip.squeak.spectra import Clip
+    from stickslip.story.scope import Scope
 
 TEMPLATE = "page.html.jinja"
 SCRIPT = "scope.js"
