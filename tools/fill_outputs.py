@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import contextlib
 import io
-import os
 import re
 import shlex
 import shutil
@@ -63,7 +62,6 @@ def filled(page: str, *, mark: bool = False) -> Iterator[str]:
 
 
 if __name__ == "__main__":
-    os.environ.setdefault("STICKSLIP_TWINS", "0")
     mark = "--mark" in sys.argv
     for path in (Path(each).resolve() for each in sys.argv[1:] if each != "--mark"):
         with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder):
