@@ -311,5 +311,5 @@ def _status(bands: tuple[ForceBand, ...], record: Record, cut: str) -> str:
         doubts.append("the forces differ where they are largest: ask consistency(record) which channel it is")
     stated = any(record.channels[name].delay for name in ("x", "a") if name in record)
     if not stated and "delays" not in str(record.history):
-        doubts.append("no delay is stated: one counts as a difference")
+        doubts.append("no delay of a sensor is stated: one would count as a difference of the forces")
     return Status(*doubts)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from stickslip.errors import StickslipError
 from stickslip.law.stretch import DriveFrom, driving
 from stickslip.laws.compliant import CompliantContact
-from stickslip.laws.coulomb import LinearSlope
+from stickslip.laws.coulomb import Coulomb, LinearSlope
 from stickslip.laws.lugre import LuGre
 from stickslip.laws.state_variable import StateVariable
 from stickslip.laws.stribeck import Stribeck
@@ -131,7 +131,8 @@ class Belief:
             for own, value in numbers.items()
             if isinstance(value, float) and value
         ]
-        return f"the law {type(law).__name__} ({', '.join(parts)})" if parts else "no friction"
+        label = Coulomb.label if isinstance(law, LinearSlope) and not law.slope else law.label
+        return f"{label.partition(':')[0]} ({', '.join(parts)})" if parts else "no friction"
 
     @property
     def slope(self) -> float:
