@@ -97,7 +97,7 @@ def test_a_wrong_sign_and_a_lag_are_said() -> None:
     assert "opposite signs" in turned.status
     assert turned.agree_up_to.value == 0
     late = ss.balance.compare_force(measured(8.7)[0], **RIG)
-    assert "no delay is stated" in late.status
+    assert "no delay of a sensor is stated" in late.status
 
 
 def test_a_cell_at_the_end_of_its_range_is_said() -> None:
