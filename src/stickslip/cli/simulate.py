@@ -49,10 +49,19 @@ LIST_WIDTH = 100
 @click.option("--fs", metavar="HZ", help="Sampling rate of the record; fine enough for the motion unless given.")
 @form_option
 @click.option("--animate", "animation", type=click.Choice(["gif", "mp4"]), help="Add a moving picture; mp4 by ffmpeg.")
+@click.option("--fmu", type=click.Path(path_type=Path), metavar="FILE.fmu",
+              help="Also write the mass with its friction as a functional mock-up unit (FMI 3), which a C compiler "
+              "here compiles; force and z are its inputs.")  # fmt: skip
 @click.option("--sound", is_flag=True, help="Add what is heard, sound.wav; of a squeak rig its sensors' record too.")
 @result_options("NAME-stickslip")
 def simulate(
-    case: str | None, listed: bool, output: Path | None, as_json: bool, everything: bool, **options: Any
+    case: str | None,
+    listed: bool,
+    output: Path | None,
+    as_json: bool,
+    everything: bool,
+    fmu: Path | None,
+    **options: Any,
 ) -> None:
     """Simulate masses that rub, exactly, event by event.
 
@@ -65,6 +74,7 @@ def simulate(
     stickslip simulate FD-4
     stickslip simulate slider.toml --cycles 100 --set "kinetic=1.3 N" --animate gif
     stickslip simulate "SQUEAK wet 6.13 N" --sound
+    stickslip simulate law/law.toml --fmu slider.fmu
 
     Ctrl-C while it runs keeps what was simulated until then, marked "interrupted", with exit code 130.
     """
@@ -72,6 +82,8 @@ def simulate(
         _list_scenarios(as_json=as_json, everything=everything)
         return
     wanted = wanted_case(case, **{key: options.pop(key) for key in ("duration", "cycles", "changes", "fs")})
+    if fmu is not None:
+        _write_fmu(wanted, fmu)
     folder = output or (None if as_json else folder_name(wanted, "stickslip"))
     if folder:
         ss.story.require_output(wanted, folder=folder, **{key: options[key] for key in ("form", "animation")})
@@ -82,6 +94,14 @@ def simulate(
     deliver(result, folder, as_json=as_json, everything=everything, parts=parts, **options)
     if result.run.status == "interrupted":
         raise SystemExit(INTERRUPTED)
+
+
+def _write_fmu(case: Case, path: Path) -> None:
+    system = case.system
+    if not isinstance(system, ss.Oscillator):
+        raise click.BadParameter("an FMU holds one mass; give an oscillator", param_hint="--fmu")
+    values = {name: getattr(system, name) for name in ("mass", "stiffness", "damping", "damper")}
+    ss.laws.export_fmu(system.law, path, **values)
 
 
 def _list_scenarios(*, as_json: bool, everything: bool) -> None:

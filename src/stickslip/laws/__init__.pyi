@@ -4,6 +4,7 @@ from stickslip.laws.coulomb import Coulomb as Coulomb
 from stickslip.laws.coulomb import Geared as Geared
 from stickslip.laws.coulomb import LinearSlope as LinearSlope
 from stickslip.laws.coulomb import PositionLoad as PositionLoad
+from stickslip.laws.export import export_fmu as export_fmu
 from stickslip.laws.export import export_law as export_law
 from stickslip.laws.lugre import Dahl as Dahl
 from stickslip.laws.lugre import LuGre as LuGre

@@ -5,12 +5,20 @@ A friction law as Python that runs as it stands: a function of the speed, or a c
 
 from __future__ import annotations
 
+import platform
 import re
+import shutil
+import subprocess
+import tempfile
 from collections.abc import Callable, Mapping, Sequence
+from importlib import resources
+from pathlib import Path
+from xml.sax.saxutils import quoteattr
 
 from stickslip.errors import ModelError
 from stickslip.laws.base import Exit, Law, Mode, Row
-from stickslip.laws.curved import FUNCTIONS, CurvedLaw, CurvedMode, Expression
+from stickslip.laws.curved import FUNCTIONS, Creeping, CurvedLaw, CurvedMode, Expression
+from stickslip.laws.filippov import curved_modes, with_sliding_modes
 from stickslip.laws.formula import remark, written
 
 Modes = Sequence[Mode | CurvedMode]
@@ -52,6 +60,62 @@ NOTES = {
     "delayed_speed": "delayed_speed [m/s]: the speed a lag ago",
     "face_acceleration": "face_acceleration [m/s^2]: of the counter-face",
 }
+INPUT = 'causality="input" variability="continuous"'
+PARAMETER = 'causality="parameter" variability="fixed" initial="exact"'
+STATE = 'causality="output" variability="continuous" initial="exact"'
+OUTPUT = 'causality="output" variability="continuous" initial="calculated"'
+LOCAL = 'causality="local" variability="continuous" initial="calculated"'
+VARIABLES = {  # of an FMU, in the order of fmu.c: unit, what it is, what a tool may do with it
+    "force": ("N", "pushes the mass", INPUT),
+    "z": ("m", "of the spring's end: a base, or a servo's reference", INPUT),
+    "z_rate": ("m/s", "how fast z goes on", INPUT),
+    "mass": ("kg", "", PARAMETER),
+    "stiffness": ("N/m", "spring between x and z", PARAMETER),
+    "damping": ("N.s/m", "of the damper on the mass", PARAMETER),
+    "face_speed": ("m/s", "of the counter-face: a belt's", PARAMETER),
+    "x": ("m", "displacement of the mass", STATE),
+    "v": ("m/s", "its velocity", f'{STATE} derivative="8"'),
+}
+TURNING_UNITS = {
+    "N": "N.m", "m": "rad", "m/s": "rad/s", "m/s2": "rad/s2", "kg": "kg.m2", "N/m": "N.m/rad", "N.s/m": "N.m.s/rad",
+}  # fmt: skip
+BASES = {  # exponents of SI's base units
+    "s": "s='1'", "m": "m='1'", "m/s": "m='1' s='-1'", "m/s2": "m='1' s='-2'", "kg": "kg='1'",
+    "N": "kg='1' m='1' s='-2'", "N/m": "kg='1' s='-2'", "N.s/m": "kg='1' s='-1'", "rad": "rad='1'",
+    "rad/s": "rad='1' s='-1'", "rad/s2": "rad='1' s='-2'", "kg.m2": "kg='1' m='2'", "N.m": "kg='1' m='2' s='-2'",
+    "N.m/rad": "kg='1' m='2' s='-2' rad='-1'", "N.m.s/rad": "kg='1' m='2' s='-1' rad='-1'",
+}  # fmt: skip
+UNITS = [f"    <Unit name='{name}'><BaseUnit {powers}/></Unit>" for name, powers in BASES.items()]
+XML = """\
+<?xml version="1.0" encoding="UTF-8"?>
+<fmiModelDescription fmiVersion="3.0" modelName="{name}" instantiationToken={token} description={about}
+    generationTool="stickslip">
+  <ModelExchange modelIdentifier="{name}" needsCompletedIntegratorStep="true" canGetAndSetFMUState="true"
+    canSerializeFMUState="true"/>
+  <CoSimulation modelIdentifier="{name}" canHandleVariableCommunicationStepSize="true" canGetAndSetFMUState="true"
+    canSerializeFMUState="true"/>
+  <UnitDefinitions>
+{units}
+  </UnitDefinitions>
+  <DefaultExperiment startTime="0" stepSize="1e-3"/>
+  <ModelVariables>
+{variables}
+  </ModelVariables>
+  <ModelStructure>
+{structure}
+  </ModelStructure>
+</fmiModelDescription>
+"""
+BUILD = """\
+<?xml version="1.0" encoding="UTF-8"?>
+<fmiBuildDescription fmiVersion="3.0">
+  <BuildConfiguration modelIdentifier="{name}">
+    <SourceFileSet language="C99">
+      <SourceFile name="{name}.c"/>
+    </SourceFileSet>
+  </BuildConfiguration>
+</fmiBuildDescription>
+"""
 CLASS = """\
 class Friction:
     \"\"\"A contact: contact = Friction(x, v); then its friction is contact.step(x, v, dt, OTHERS) every dt [s].
@@ -79,10 +143,149 @@ GO_ON = """\
 
 def c_code(law: Law | CurvedLaw, formula: str) -> str:
     """The law's friction as a function of the motion, mode by mode."""
-    modes: Modes = modes_of(law)
+    return _friction(law, formula, modes_of(law))
+
+
+def sizes_of(law: Law | CurvedLaw) -> list[float]:
+    """How large x, v and what the friction remembers are about, by which solvers set what they may be off by."""
+    units: Mapping[str, str] = getattr(law, "memory_units", {})
+    return [1e-3, 1e-2, *(1e-6 if name in law.places or units.get(name) == "m" else 1.0 for name in law.memory)]
+
+
+def fmu_code(law: Law | CurvedLaw, formula: str, begins: Sequence[float], *, on_base: bool) -> tuple[str, int]:
+    """C code of a mass that rubs, as FMI 3 calls it, less the token that it answers to; and how many exits a mode has.
+
+    `begins` are its values before anything is set: those of fmu.c, from the time to the speed v.
+    """
+    if isinstance(law, Creeping):
+        raise ModelError(
+            f"{type(law).__name__} in an FMU",
+            "its friction takes its whole range at speeds too small to be told from none",
+            "export C",
+        )
+    modes: Modes = curved_modes(law) if isinstance(law, CurvedLaw) else with_sliding_modes(law.modes())
+    forms = [form for mode in modes for form in (mode.friction or {}, *mode.rates.values())]
+    if any("delayed_speed" in (form.symbols if isinstance(form, Expression) else form) for form in forms):
+        raise ModelError(
+            f"{type(law).__name__} in an FMU",
+            "it asks for the speed a lag ago, which its states do not hold",
+            "export C, or use SmoothStateVariable for a friction that lags",
+        )
+    exits = max(len(mode.exits) for mode in modes)
+    held = [mode.friction is None for mode in modes]
+    speeds = ", ".join(repr(float(getattr(mode, "speed", 0.0))) for mode in modes)
+    tables = [
+        f"#define FRICTION_MODES {len(modes)}",
+        f"#define FRICTION_EXITS {exits}",
+        f"#define ON_BASE {int(on_base)}",
+        f"static const int holds[FRICTION_MODES] = {{ {', '.join(str(int(mode)) for mode in held)} }};",
+        f"static const double held_speed[FRICTION_MODES] = {{ {speeds} }};",
+        f"static const double begins[{len(begins)}] = {{ {', '.join(repr(float(value)) for value in begins)} }};",
+        f"static const double sizes[] = {{ {', '.join(map(repr, sizes_of(law)))} }};",
+        "",
+    ]
+    friction, names = _friction(law, formula, modes), _names(law)
+    frame = resources.files("stickslip").joinpath("data/fmu.c").read_text("utf-8")
+    return "\n".join([friction, "\n".join(tables), _exits(modes, names), frame]), exits
+
+
+def model_description(
+    name: str,
+    token: str,
+    about: str,
+    *,
+    law: Law | CurvedLaw,
+    begins: Sequence[float],
+    exits: int,
+    turning: bool,
+) -> str:
+    """What a tool has to know of the model: its variables and their units, by the value references of fmu.c."""
+    memory, sizes = list(law.memory), [f'nominal="{size!r}"' for size in sizes_of(law)]
+    first = len(VARIABLES) + 1 + len(memory)  # of what is computed; the time is the first of all
+    unit = TURNING_UNITS if turning else {}
+    rows = [variable("time", 0, 'causality="independent" variability="continuous"', "", "s")]
+    for number, (key, (size, what, kind)) in enumerate(VARIABLES.items(), start=1):
+        begin = f'start="{float(begins[number])!r}"' + (f" {sizes[number - 8]}" if key in ("x", "v") else "")
+        rows.append(variable(key, number, f"{kind} {begin}", what, unit.get(size, size)))
+    states = [f"memory_{number}" for number in range(1, len(memory) + 1)]
+    for number, (key, what) in enumerate(zip(states, memory, strict=True), start=len(VARIABLES) + 1):
+        rows.append(variable(key, number, f"{LOCAL} {sizes[number - 8]}", f"{what}, which the friction remembers", ""))
+    force, speeds = unit.get("N", "N"), unit.get("m/s2", "m/s2")
+    rows.append(variable("friction", first, OUTPUT, "against positive velocity where positive", force))
+    rows.append(variable("acceleration", first + 1, f'{OUTPUT} derivative="9"', "of x", speeds))
+    for number, key in enumerate(states, start=2):
+        rows.append(variable(f"der_{key}", first + number, f'{LOCAL} derivative="{8 + number}"', "", ""))
+    mode = first + 2 + len(memory)
+    rows.append(f'<Int32 name="mode" valueReference="{mode}" causality="output" variability="discrete" '
+                'initial="calculated" description="number of the mode of the friction"/>')  # fmt: skip
+    ends = range(mode + 1, mode + 1 + exits)
+    for number, reference in enumerate(ends, start=1):
+        rows.append(variable(f"exit_{number}", reference, LOCAL, "ends the mode where it rises above zero", ""))
+    slopes, kept = [9, *range(first + 1, mode)], range(10, first)
+    structure = [
+        *(f'<Output valueReference="{number}"/>' for number in (8, 9, first, first + 1, mode)),
+        *(f'<ContinuousStateDerivative valueReference="{number}"/>' for number in slopes),
+        *(f'<InitialUnknown valueReference="{number}"/>' for number in (*kept, *range(first, mode + 1))),
+        *(f'<EventIndicator valueReference="{number}"/>' for number in ends),
+    ]
+    return XML.format(
+        name=name, token=quoteattr(token), about=quoteattr(about), units="\n".join(UNITS),
+        variables="\n".join(f"    {row}" for row in rows), structure="\n".join(f"    {row}" for row in structure),
+    )  # fmt: skip
+
+
+def build_description(name: str) -> str:
+    """How the model's C code is compiled."""
+    return BUILD.format(name=name)
+
+
+def variable(name: str, reference: int, kind: str, what: str, unit: str) -> str:
+    """A number of the model."""
+    about = f" description={quoteattr(what)}" if what else ""
+    measured = f' unit="{unit}"' if unit else ""
+    return f'<Float64 name="{name}" valueReference="{reference}" {kind}{measured}{about}/>'
+
+
+def compiler() -> str | None:
+    """The C compiler of this machine, if there is one."""
+    return next(filter(None, map(shutil.which, ("cc", "gcc", "clang"))), None)
+
+
+def compiled_fmu(name: str, code: str) -> tuple[str, bytes]:
+    """The model's code compiled for this machine, and its place in the unit."""
+    command = compiler()
+    if command is None:
+        raise ModelError(
+            "no C compiler (cc, gcc, clang) on this machine",
+            "an FMU holds a program compiled for the machine that runs it",
+            "install one, or give sources_only=True where the importing tool compiles",
+        )
+    systems = {"Linux": ("linux", ".so"), "Darwin": ("darwin", ".dylib"), "Windows": ("windows", ".dll")}
+    kinds = {"amd64": "x86_64", "arm64": "aarch64"}
+    system, suffix = systems.get(platform.system(), (platform.system().lower(), ".so"))
+    machine = platform.machine().lower()
+    with tempfile.TemporaryDirectory() as folder:
+        source, binary = Path(folder) / f"{name}.c", Path(folder) / (name + suffix)
+        source.write_text(code, encoding="utf-8")
+        flags = ["-std=c99", "-O2", "-shared", "-fvisibility=hidden", *(["-fPIC"] if system != "windows" else [])]
+        run = subprocess.run([command, *flags, "-o", binary, source, "-lm"], capture_output=True, text=True)
+        if run.returncode:
+            raise ModelError(
+                f"{command} did not compile the model: {run.stderr.strip()[:200]}",
+                "an FMU holds a program compiled for the machine that runs it",
+                "try another compiler, or give sources_only=True where the importing tool compiles",
+            )
+        return f"binaries/{kinds.get(machine, machine)}-{system}/{name}{suffix}", binary.read_bytes()
+
+
+def _names(law: Law | CurvedLaw) -> dict[str, str]:
+    """What the friction is told and remembers, as C calls it."""
+    return {name: f"in->{name}" for name in INPUTS} | {name: f"s->memory[{j}]" for j, name in enumerate(law.memory)}
+
+
+def _friction(law: Law | CurvedLaw, formula: str, modes: Modes) -> str:
     _require_writable(law, modes)
-    memory = list(law.memory)
-    names = {name: f"in->{name}" for name in INPUTS} | {name: f"s->memory[{j}]" for j, name in enumerate(memory)}
+    memory, names = list(law.memory), _names(law)
     head = HEAD.format(
         formula=remark(formula),
         memory=len(memory),
@@ -182,11 +385,35 @@ def _leave(modes: Modes, names: Mapping[str, str]) -> str:
     ])  # fmt: skip
 
 
+def _exits(modes: Modes, names: Mapping[str, str]) -> str:
+    """What ends a mode where it rises above zero, less so little that it is above zero where this is found to be."""
+    named = {**names, "f": "force", "df": "in->hold_rate"}
+    lines: list[str] = []
+    for mode in modes:
+        own = {**named, **levels_of(mode, lambda form: _text(form, named))}
+        lines.append(f"    case {_token(mode.name)}:")
+        for number, exit_ in enumerate(mode.exits):
+            size = _size(exit_, own)
+            lines.append(f"        z[{number}] = {_text(exit_.quantity, own)} - PASSED * (1.0 + {size});")
+        lines.append("        break;")
+    return "\n".join([
+        "#define PASSED 1e-12",
+        "static void friction_exits(const friction_state *s, const friction_motion *in, double *z)", "{",
+        "    const double force = friction_force(s, in);", "    (void)force; (void)z;",
+        "    switch (s->mode) {", *lines, "    default: break;", "    }", "}", "",
+    ])  # fmt: skip
+
+
+def _size(exit_: Exit, names: Mapping[str, str]) -> str:
+    """How large the terms are of which an exit's quantity is the sum; nothing where it is one alone."""
+    terms = [_text({name: value}, names) for name, value in exit_.quantity.items() if value]
+    return " + ".join(f"fabs({term})" for term in terms) if len(terms) > 1 else "0.0"
+
+
 def _exit(number: int, exit_: Exit, names: Mapping[str, str]) -> str:
     quantity, bit = _text(exit_.quantity, names), f"{1 << number}u"
-    terms = [_text({name: value}, names) for name, value in exit_.quantity.items() if value]
-    size = " + ".join(f"fabs({term})" for term in terms) if len(terms) > 1 else "0.0"
-    due = f"{quantity} > ROUNDING * ({size})" if len(terms) > 1 else f"{quantity} > 0"
+    size = _size(exit_, names)
+    due = f"{quantity} > 0" if size == "0.0" else f"{quantity} > ROUNDING * ({size})"
     first = f"        if (!({due})) s->armed |= {bit};\n" if exit_.crossing else ""
     due = f"(s->armed & {bit}) && {due}" if exit_.crossing else due
     old = {name: text.replace("s->", "before.") for name, text in names.items()}

@@ -2,15 +2,27 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import fields, is_dataclass
 from math import isfinite
+from pathlib import Path
 from typing import Any
+from uuid import NAMESPACE_OID, uuid5
 from xml.sax.saxutils import quoteattr
+from zipfile import ZIP_DEFLATED, ZipFile, ZipInfo
 
 from stickslip.errors import ModelError
 from stickslip.laws.base import Law
-from stickslip.laws.c_code import c_code, modes_of, python_code
+from stickslip.laws.c_code import (
+    build_description,
+    c_code,
+    compiled_fmu,
+    fmu_code,
+    model_description,
+    modes_of,
+    python_code,
+)
 from stickslip.laws.coulomb import Coulomb, LinearSlope
 from stickslip.laws.curved import CurvedLaw, lifted
 from stickslip.laws.formula import one_line, remark, written
@@ -19,7 +31,9 @@ from stickslip.laws.lugre import LuGre
 from stickslip.laws.rough import RoughSurface
 from stickslip.laws.stribeck import FrictionCurve, Tabulated
 from stickslip.laws.time_delay import SpeedCurve
+from stickslip.parameters import finite
 from stickslip.settings import nearest, toml_lines
+from stickslip.whole import whole_file
 
 TABLE = 33  # points of a curve over the speed, where a program takes a table
 WIDE, FASTEST = 10.0, 1.0  # it goes to ten times the law's own speed, or to 1 m/s where it has none
@@ -70,16 +84,102 @@ def export_law(law: Law | CurvedLaw, *, format: str = "toml", turning: bool = Fa
     """
     if format not in FORMATS:
         raise ModelError(f"format = '{format}'", f"it is one of {', '.join(FORMATS)}", nearest(str(format), FORMATS))
-    if not _is_law(law):
-        raise ModelError(f"law = {law!r}", "a law is exported with its values", "give one, as in Coulomb(1.1)")
-    if any(isinstance(part, RoughSurface) for part in _nested(law)):
-        raise ModelError(
-            "a rough surface",
-            "its friction follows a place by chance, and has no formula",
-            "export the contact on it, law.contact",
-        )
+    _require_formula(law)
     write = TURNING.get(format, FORMATS[format]) if turning else FORMATS[format]
     return write(law).rstrip("\n") + "\n" * (format == "c")
+
+
+def export_fmu(
+    law: Law | CurvedLaw,
+    path: str | Path,
+    *,
+    mass: float,
+    stiffness: float = 0.0,
+    damping: float = 0.0,
+    damper: str = "ground",
+    turning: bool = False,
+    sources_only: bool = False,
+) -> Path:
+    r"""How is a mass that rubs written for Simulink, Modelica tools and whatever else takes an FMU?
+
+    A functional mock-up unit of FMI 3, for model exchange and for co-simulation: the friction together with the mass
+    that it holds,
+
+    .. math:: m\ddot x = F + k\,(z - x) + c\,(\dot z - \dot x) - f,
+
+    for at rest friction is whatever holds the mass, which no speed tells; a law alone would close a loop without delay
+    around the model. Inputs are the force F, and z with its rate (of the spring's end: a base, or a servo's reference);
+    outputs x, v, the friction f, the acceleration and the law's mode. Mass, stiffness, damping, the speed of the
+    counter-face and the start of x and v are changed by the tool; the law's own numbers are compiled in. Without a
+    stiffness it is a mass that is pushed.
+
+    In co-simulation the unit steps itself, to 1e-10, and ends its steps where a mode ends; within a step of the tool
+    the force is held and z goes on by its rate. In model exchange the tool's solver integrates, and is told by event
+    indicators where a mode ends.
+
+    Parameters
+    ----------
+    law : Law
+        Any law that :func:`export_law` writes as C but a `TimeDelay`.
+    path : path
+        The file; its name is that of the model.
+    mass : float
+        Mass [kg], or inertia [kg m^2].
+    stiffness : float
+        Spring between x and z [N/m], [N m/rad]; a servo's kp.
+    damping : float
+        Damper [N s/m], [N m s/rad]; a servo's kd.
+    damper : str
+        What it is fixed to: "ground", where its force is without the rate of z, or "base".
+    turning : bool
+        Whether it turns: units are then those of angles and torques.
+    sources_only : bool
+        Whether the importing tool is to compile it; else it is compiled here, for this kind of machine.
+
+    Returns
+    -------
+    Path
+        The file.
+
+    Raises
+    ------
+    ModelError
+        The law has no such form, a value has no meaning, or no C compiler is there.
+
+    Examples
+    --------
+    >>> import tempfile, zipfile
+    >>> path = Path(tempfile.mkdtemp()) / "slider.fmu"
+    >>> with zipfile.ZipFile(export_fmu(Coulomb(1.1), path, mass=2.4, sources_only=True)) as unit:
+    ...     unit.namelist()
+    ['modelDescription.xml', 'sources/buildDescription.xml', 'sources/slider.c']
+    """
+    _require_formula(law)
+    for name, value in (("mass", mass), ("stiffness", stiffness), ("damping", damping)):
+        finite(name, value, unit="", positive=name == "mass", signed=name == "damping")
+    if damper not in ("ground", "base"):
+        raise ModelError(f"damper = '{damper}'", "it is fixed to the ground or the base", "give one of them")
+    path = Path(path)
+    name = re.sub(r"\W", "_", path.stem, flags=re.ASCII)
+    name = name if name[:1].isalpha() else f"model_{name}"
+    begins = (0.0, 0.0, 0.0, 0.0, mass, stiffness, damping, 0.0, 0.0, 0.0)
+    code, exits = fmu_code(law, formula_of(law), begins, on_base=damper == "base")
+    token = f"{{{uuid5(NAMESPACE_OID, name + code)}}}"
+    code = f'#define TOKEN "{token}"\n{code}'
+    content: dict[str, str | bytes] = {
+        "modelDescription.xml": model_description(
+            name, token, formula_of(law), law=law, begins=begins, exits=exits, turning=turning
+        ),
+        "sources/buildDescription.xml": build_description(name),
+        f"sources/{name}.c": code,
+    }
+    if not sources_only:
+        place, binary = compiled_fmu(name, code)
+        content[place] = binary
+    with whole_file(path) as draft, ZipFile(draft, "w", ZIP_DEFLATED) as unit:
+        for place, data in content.items():
+            unit.writestr(ZipInfo(place), data, ZIP_DEFLATED)  # without the time: the same law, the same file
+    return path
 
 
 def urdf_dynamics(law: Coulomb | LinearSlope) -> str:
@@ -102,6 +202,17 @@ def formula_of(law: Any) -> str:
         formula = formula.replace("static", "kinetic" if hasattr(law, "kinetic") else "F(0)")
     inner = getattr(law, "law", None)
     return f"{formula}; {formula_of(inner)}" if is_dataclass(inner) else formula
+
+
+def _require_formula(law: Any) -> None:
+    if not _is_law(law):
+        raise ModelError(f"law = {law!r}", "a law is exported with its values", "give one, as in Coulomb(1.1)")
+    if any(isinstance(part, RoughSurface) for part in _nested(law)):
+        raise ModelError(
+            "a rough surface",
+            "its friction follows a place by chance, and has no formula",
+            "export the contact on it, law.contact",
+        )
 
 
 def _is_law(law: object) -> bool:

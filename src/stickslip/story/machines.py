@@ -16,8 +16,9 @@ from stickslip.errors import ModelError
 from stickslip.estimate import Estimate, stands
 from stickslip.figures.contact import tribometer_plates
 from stickslip.figures.law import plates_of, plates_together
+from stickslip.laws.c_code import compiler
 from stickslip.laws.coulomb import LinearSlope
-from stickslip.laws.export import export_law, urdf_dynamics
+from stickslip.laws.export import export_fmu, export_law, urdf_dynamics
 from stickslip.story.fit import ALONE, FILES
 from stickslip.story.story import Story, Table
 from stickslip.story.words import Caution, cautions, interval_of, number, value_of
@@ -215,3 +216,6 @@ def write_joint(folder: Path, *, joint: JointFriction) -> None:
             continue
         text = f"{ALONE}\n{text}" if form == "toml" else text
         (folder / "joint" / file).write_text(text.rstrip("\n") + "\n", encoding="utf-8")
+    if joint.inertia.known and joint.inertia.value > 0:
+        place, alone = folder / "joint" / "joint.fmu", compiler() is None
+        export_fmu(law, place, mass=joint.inertia.value, turning=turning, sources_only=alone)
