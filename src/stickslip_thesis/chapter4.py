@@ -247,7 +247,7 @@ def _experiments(given: Given) -> Iterator[Plate]:
     v = ss.signals.differentiate(record["x"], record.fs, method="five-point").values
     motion = {"x": record["x"], "v": v, "a": record["a"], "friction": record["friction"]}
     part = slice(0, round(record.fs))
-    yield figure("4.1", responses(record.time[part], {name: each[part] for name, each in motion.items()}), words)
+    yield figure("4.1", responses(record.time[part], {name: values[part] for name, values in motion.items()}), words)
     yield figure(
         "4.2",
         _free_vibration(given),

@@ -219,8 +219,8 @@ def _of_paper(given: Given) -> Ours:
         "paper.zeta of both": [result.damping_ratio.value for result in both],
         "paper.dry of both": [1e3 * result.dry_displacement.value for result in both],
         **{f"paper.{key}": values for key, values in _scatters(given).items()},
-        "paper.zeta off": [100 * abs(1 - each["estimated_ratio"] / each["damping_ratio"]) for each in section],
-        "paper.dry off": [100 * abs(1 - each["estimated_dry"] / each["dry"]) for each in section],
+        "paper.zeta off": [100 * abs(1 - entry["estimated_ratio"] / entry["damping_ratio"]) for entry in section],
+        "paper.dry off": [100 * abs(1 - entry["estimated_dry"] / entry["dry"]) for entry in section],
     }
 
 

@@ -119,7 +119,7 @@ def _arrow(ax: Axes, start: Place, end: Place, words: str, *, colour: str = BLUE
     )  # fmt: skip
 
 
-def _told(ax: Axes, at: Place, place: Place, words: str, *, colour: str = PURPLE) -> None:
+def _annotate(ax: Axes, at: Place, place: Place, words: str, *, colour: str = PURPLE) -> None:
     """Words beside the drawing, with a line to what they are about."""
     ax.annotate(
         words, xy=at, xytext=place, fontsize=8, color=colour, ha="center", va="center",
@@ -157,14 +157,14 @@ def apparatus(given: Given) -> Any:
     ax.plot([7.8, 9.0, 9.0, 7.8], [2.33, 2.33, 1.97, 1.97], color=INK, linewidth=1.6)  # the flange
     _block(ax, (9.0, 1.85), 0.55, 0.6, colour=GREEN)
     _wall(ax, (9.55, 1.55), 1.3, upright=True, side=1)
-    _told(ax, (1.1, 1.6), (1.5, 0.5), f"LVDT, S3: {1e6 * x.digitiser.step:.1f} µm a count")
-    _told(ax, (4.9, 1.6), (4.9, 0.5), "LVDT, S1")
-    _told(ax, (5.9, 2.7), (5.6, 4.3), f"accelerometer, S2,\non a mount of {a.mount.frequency:g} Hz")
-    _told(
+    _annotate(ax, (1.1, 1.6), (1.5, 0.5), f"LVDT, S3: {1e6 * x.digitiser.step:.1f} µm a count")
+    _annotate(ax, (4.9, 1.6), (4.9, 0.5), "LVDT, S1")
+    _annotate(ax, (5.9, 2.7), (5.6, 4.3), f"accelerometer, S2,\non a mount of {a.mount.frequency:g} Hz")
+    _annotate(
         ax, (9.27, 2.45), (9.2, 4.3),
         f"load cell, discharge {load.discharge:g} s,\nbehind a flange of {load.mount.frequency:g} Hz",
     )  # fmt: skip
-    _told(ax, (7.4, 1.84), (7.0, 0.5), f"friction contact, f = {section['kinetic']:g} N", colour=ORANGE)
+    _annotate(ax, (7.4, 1.84), (7.0, 0.5), f"friction contact, f = {section['kinetic']:g} N", colour=ORANGE)
     ax.text(2.6, 4.3, f"natural frequency {section['natural']:g} rad/s", fontsize=8, ha="center")
     return drawn
 
@@ -185,7 +185,7 @@ def massless_contact(given: Given) -> Any:
     _wall(ax, (7.6, 1.55), 3.0)
     ax.plot([8.68, 8.68], [1.55, 1.75], color=INK, linewidth=1.2)
     _arrow(ax, (7.6, 4.0), (8.6, 4.0), "x(t) - y(t)", colour=ORANGE)
-    _told(ax, (8.68, 1.75), (9.7, 2.5), f"massless,\nf_k = {section['kinetic'][1]:g} N", colour=ORANGE)
+    _annotate(ax, (8.68, 1.75), (9.7, 2.5), f"massless,\nf_k = {section['kinetic'][1]:g} N", colour=ORANGE)
     ax.text(1.6, 0.7, f"at {section['frequency'][1]:g} Hz: the base moves by {1e3 * section['base'][1]:g} mm, "
             f"the contact gives way by f_k / K_y = {1e6 * section['kinetic'][1] / section['stiffness'][1]:.2f} µm",
             fontsize=8, ha="left")  # fmt: skip
@@ -209,8 +209,8 @@ def contact_with_inertia(given: Given) -> Any:
     _arrow(ax, (4.6, 3.4), (5.7, 3.4), "y(t)")
     _block(ax, (3.0, 1.3), 6.4, 0.6, "slider", colour=FAINT)
     _arrow(ax, (8.0, 2.3), (9.2, 2.3), "x(t) = X_m cos ωt", colour=ORANGE)
-    _told(ax, (5.1, 1.9), (7.2, 3.1), f"f = ±{section['kinetic']:g}", colour=ORANGE)
-    cases = " and ".join(f"{each:g}" for each in section["amplitude"])
+    _annotate(ax, (5.1, 1.9), (7.2, 3.1), f"f = ±{section['kinetic']:g}", colour=ORANGE)
+    cases = " and ".join(f"{amplitude:g}" for amplitude in section["amplitude"])
     ax.text(5.5, 0.6, f"X_m = {cases}, Ω = ω √(m/k) = {section['ratio']:g}", fontsize=8, ha="center")
     return drawn
 
@@ -231,9 +231,9 @@ def system_i(given: Given) -> Any:
     for y, sign in ((2.05, 1), (1.95, -1)):
         _block(ax, (7.2, y - 0.2 * (sign < 0)), 0.5, 0.2, colour=ORANGE)
     cases = [section["case1"], section["case2"]]
-    _told(ax, (7.9, 2.9), (8.2, 4.4), "damper, switched on: ζ = "
+    _annotate(ax, (7.9, 2.9), (8.2, 4.4), "damper, switched on: ζ = "
           + " or ".join(f"{case['damping_ratio']:g}" for case in cases))  # fmt: skip
-    _told(ax, (7.45, 1.75), (7.6, 0.5), "paper, switched on: f_k = "
+    _annotate(ax, (7.45, 1.75), (7.6, 0.5), "paper, switched on: f_k = "
           + " or ".join(f"{section['stiffness'] * case['dry']:.3f} N" for case in cases), colour=ORANGE)  # fmt: skip
     _moves(ax, (4.4, 3.5), 1.0, (2.6, 4.4), section["resolution"])
     return drawn
@@ -242,7 +242,7 @@ def system_i(given: Given) -> Any:
 def _moves(ax: Axes, start: Place, length: float, words: Place, resolution: float) -> None:
     """The motion of a mass over its face, and the LVDT that feels it."""
     _arrow(ax, start, (start[0] + length, start[1]), "x(t)")
-    _told(ax, (start[0] + 0.2, start[1] - 0.3), words, f"LVDT, {1e6 * resolution:g} µm a count")
+    _annotate(ax, (start[0] + 0.2, start[1] - 0.3), words, f"LVDT, {1e6 * resolution:g} µm a count")
 
 
 @styled
@@ -262,7 +262,7 @@ def system_ii(given: Given) -> Any:
     _wall(ax, (0.8, 1.75), 1.4, upright=True)
     ax.text(2.5, 3.3, f"three springs, k = {_kilo(section['stiffness'])} together", fontsize=8, ha="center")
     friction = f"ζ = {section['damping_ratio']:g}, f_k = {section['kinetic']:g} N"
-    _told(ax, (6.75, 1.65), (8.0, 0.6), f"two linear bearings: {friction}", colour=ORANGE)
+    _annotate(ax, (6.75, 1.65), (8.0, 0.6), f"two linear bearings: {friction}", colour=ORANGE)
     _moves(ax, (5.2, 3.25), 1.1, (3.6, 4.2), given["paper"]["resolution"])
     return drawn
 
@@ -275,23 +275,23 @@ def transducers(given: Given) -> Any:
     _wall(ax, (0.4, 1.0), 10.2)
     _block(ax, (1.0, 1.1), 5.4, 0.9, "mass on the linear bearing, driven at " + f"{section['frequency']:g} Hz")
     ax.plot([1.2, 6.2], [2.05, 2.05], color=INK, linewidth=3)
-    _told(ax, (1.7, 2.1), (1.7, 3.2), "steel strip,\ndry or wet", colour=INK)
+    _annotate(ax, (1.7, 2.1), (1.7, 3.2), "steel strip,\ndry or wet", colour=INK)
     for x in (3.5, 4.5):
         ax.add_patch(_hemisphere((x, 2.42)))
     _block(ax, (3.1, 2.42), 1.8, 0.3)
     _block(ax, (3.85, 2.72), 0.3, 1.9, colour=FAINT)
     _wall(ax, (3.2, 4.62), 1.6, side=1)
-    _told(ax, (4.0, 4.0), (2.2, 4.3), "beam: bends\nand twists", colour=INK)
-    _told(ax, (4.6, 2.3), (6.3, 2.75), f"rubber, {section['heavy']:g} or {section['light']:g} N", colour=ORANGE)
+    _annotate(ax, (4.0, 4.0), (2.2, 4.3), "beam: bends\nand twists", colour=INK)
+    _annotate(ax, (4.6, 2.3), (6.3, 2.75), f"rubber, {section['heavy']:g} or {section['light']:g} N", colour=ORANGE)
     _block(ax, (4.3, 2.72), 0.35, 0.3, colour=GREEN)
-    _told(ax, (4.5, 3.02), (6.5, 3.7), "accelerometer, normal: ÿ", colour=GREEN)
+    _annotate(ax, (4.5, 3.02), (6.5, 3.7), "accelerometer, normal: ÿ", colour=GREEN)
     _block(ax, (8.6, 4.2), 1.2, 0.5, "laser", colour=SHADE)
     for y in (4.35, 4.55):
         ax.plot([4.15, 8.6], [y, y], color=PURPLE, linewidth=0.9, linestyle="--")
     ax.text(6.9, 4.75, "two beams on a reflector, torsion: θ̇", color=PURPLE, fontsize=8, ha="center")
     _block(ax, (8.4, 2.4), 1.1, 0.4, colour=FAINT)
     ax.text(8.95, 2.95, "microphone", fontsize=8, ha="center")
-    _told(ax, (5.9, 2.0), (7.9, 1.7), "accelerometer: ẍ", colour=BLUE)
+    _annotate(ax, (5.9, 2.0), (7.9, 1.7), "accelerometer: ẍ", colour=BLUE)
     _block(ax, (0.5, 1.25), 0.5, 0.6, colour=GREEN)
     ax.text(0.75, 0.5, "load cell: f", color=GREEN, fontsize=8, ha="center")
     ax.text(6.3, 0.5, f"sampled at {section['fs'] / 1e3:g} kHz", fontsize=8, ha="center")

@@ -75,12 +75,12 @@ def _entries(section: str, key: str, value: Any, *, contact: bool) -> Iterator[t
     """Words and value of an entry; beside a spring, stiffness is that of the contact."""
     if isinstance(value, Mapping):
         for inner, held in value.items():
-            yield f"{_words(key)}: {_words(inner)}", _told(section, inner, held)
+            yield f"{_words(key)}: {_words(inner)}", _formatted(section, inner, held)
     else:
-        yield "contact stiffness" if contact and key == "stiffness" else _words(key), _told(section, key, value)
+        yield "contact stiffness" if contact and key == "stiffness" else _words(key), _formatted(section, key, value)
 
 
-def _told(section: str, key: str, value: float | Sequence[float]) -> str:
+def _formatted(section: str, key: str, value: float | Sequence[float]) -> str:
     unit = "1" if section in WITHOUT_UNITS else UNITS.get(key, "1")
     values = np.atleast_1d(np.asarray(value, dtype=float))
     factor, name = prefixed(values, unit)

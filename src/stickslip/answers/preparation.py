@@ -17,7 +17,7 @@ from stickslip.balance.mass import mass_and_stiffness
 from stickslip.balance.motion import is_measured
 from stickslip.estimate import UNSTATED, Doubt, kinds
 from stickslip.files.read import read_blocks, read_record
-from stickslip.files.select import file_told
+from stickslip.files.select import file_entry
 from stickslip.printing import printable
 from stickslip.record.channels import Channel
 from stickslip.record.flaws import constant
@@ -141,7 +141,7 @@ def _called(record: Record, files: Sequence[Path], names: Sequence[str]) -> Reco
     known = {file["name"] for step in record.history for file in step.arguments.get("files", ())}
     if called.keys() <= known:
         return replace(record, history=tuple(_renamed(step, called) for step in record.history))
-    sources = [{**file_told(path), "name": called[printable(path.name)]} for path in files]
+    sources = [{**file_entry(path), "name": called[printable(path.name)]} for path in files]
     step = Step("read_record", {"files": sources}, "a record as it was written")
     return replace(record, history=(*record.history, step))
 

@@ -265,27 +265,29 @@ def _answer(
 
 def _status(pair: Alignment, others: Sequence[float], channels: tuple[str, str], *, hidden: bool) -> str:
     (first, second), gain = channels, pair.theta[1]
-    said: list[Doubt | str] = []
+    doubts: list[Doubt | str] = []
     if gain < 0:
-        said.append(f"{first} or {second} has the wrong sign: the gain is {gain:.3g}")
+        doubts.append(f"{first} or {second} has the wrong sign: the gain is {gain:.3g}")
     if not _alike(pair):
-        said.append(f"{second} is {abs(gain):.3g} times what {first} makes of it: see the units and the sensitivities")
+        doubts.append(
+            f"{second} is {abs(gain):.3g} times what {first} makes of it: see the units and the sensitivities"
+        )
     if others:
         delays = " or ".join(f"{delay:.4g}" for delay in others[:2])
         sentence = f"the motion repeats itself: a delay of {delays} s would explain it as well; the shortest is taken"
-        said.append(Doubt(sentence, REPEATS))
+        doubts.append(Doubt(sentence, REPEATS))
     if hidden:
         sentence = (
             f"what a mount of {second} delays (2 zeta/w_m) is in it: this motion does not tell them apart; state the "
             "mount, or give runs at other frequencies too"
         )
-        said.append(Doubt(sentence, HIDDEN))
+        doubts.append(Doubt(sentence, HIDDEN))
     if pair.unexplained > UNEXPLAINED:
-        said.append(
+        doubts.append(
             f"{first} and {second} differ by more than noise, a delay and a mount ({pair.unexplained:.3g} times the "
             "power of the noise); the intervals are widened"
         )
-    return Status(*said)
+    return Status(*doubts)
 
 
 def _by_residual(record: Record, channels: tuple[str, str]) -> SensorDelay:

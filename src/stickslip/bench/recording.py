@@ -109,7 +109,7 @@ class Seen:
             count, first = self.clipped.get(self.inputs[row].name, (0, block.first + int(at[0]) if len(at) else 0))
             self.clipped[self.inputs[row].name] = (count + len(at), first)
 
-    def told(self, fs: float, begin: int) -> str:
+    def outcome(self, fs: float, begin: int) -> str:
         """In words."""
         parts = [f"{self.samples} samples at {fs:g} Hz"]
         if self.lost:
@@ -160,7 +160,7 @@ class Tape:
         self.seen, self.due = Seen(device.inputs), time.monotonic() + SYNC
         self.path = journal_of(output)
         self.journal: journal.Journal | None = None
-        self.told: dict[str, Any] = {"start": start, "log": log, "notes": notes or {}}
+        self.about: dict[str, Any] = {"start": start, "log": log, "notes": notes or {}}
 
     def write(self, block: Block) -> None:
         """Keep a block; what goes before row 0 is cut off.
@@ -178,7 +178,7 @@ class Tape:
             return
         if self.journal is None:
             self.begin = block.first
-            self.journal = journal.Journal(self.path, _about(self.device, block.samples.dtype, **self.told))
+            self.journal = journal.Journal(self.path, _about(self.device, block.samples.dtype, **self.about))
         self.seen.look(block)
         self.journal.append(block.samples, first=block.first, clock=block.clock)
         if time.monotonic() > self.due:
@@ -200,7 +200,7 @@ class Tape:
         """
         if self.journal is None:
             raise RecordError(f"no sample came from {self.device.name}", "a record has samples", "check the device")
-        outcome = self.seen.told(self.device.fs, self.begin)
+        outcome = self.seen.outcome(self.device.fs, self.begin)
         self.journal.tell(journal.DONE, {"outcome": outcome})
         self.journal.sync()
         self.journal.__exit__()

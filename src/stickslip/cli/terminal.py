@@ -194,8 +194,8 @@ def spoken(sentence: object) -> str:
 
     text = re.sub(r"\bfill_gaps\(record\) and fill_missing\(record\)", "--repair gaps,missing", str(sentence))
     text = re.sub(r'\b(\w+)\(record(?:, "(\w+)")?\)', repair, text)
-    for said, option in _SPOKEN:
-        text = re.sub(said, option, text)
+    for phrase, option in _SPOKEN:
+        text = re.sub(phrase, option, text)
     return text
 
 

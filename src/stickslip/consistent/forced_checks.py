@@ -41,7 +41,7 @@ class Seen:
     tolerance: float
     at: int
     trips: float  # work of the load cell's force over the record, in its largest force times the stroke
-    channels_told: Mapping[str, Channel]
+    stated_channels: Mapping[str, Channel]
     contact: str
 
     @classmethod
@@ -283,7 +283,7 @@ def momentum_check(seen: Seen) -> Check:
     means = seen.lines.means
     if seen.lines.cycles is None:
         return untold(name, "the motion does not repeat")
-    if seen.knows and "load" in means and seen.channels_told["load"].discharge is None:
+    if seen.knows and "load" in means and seen.stated_channels["load"].discharge is None:
         pull = seen.rig["stiffness"] * (means.get("z", 0.0) - means["x"]) + means.get("force", 0.0)
         left, right, unit = pull, means["load"], "N"
         size = float(abs(seen.strongest("load").mean()))

@@ -190,9 +190,9 @@ def coupled_frequency(record: Record) -> Estimate:
         for value in (fitted.stiffness.interval[0], fitted.stiffness.value, fitted.stiffness.interval[1])
     )
     sd = fitted.stiffness.sd / (8 * math.pi**2 * mass * value)
-    said, status = _ringing(record, fitted, value, sd)
+    check, status = _ringing(record, fitted, value, sd)
     method = "sqrt((k + K) / m) / 2 pi, from the likeliest contact"
-    status, checks = Status(fitted.stiffness.status, status), (said, *fitted.stiffness.checks)
+    status, checks = Status(fitted.stiffness.status, status), (check, *fitted.stiffness.checks)
     return Estimate(FREQUENCY, value, (low, high), sd, "Hz", method, status, checks)
 
 

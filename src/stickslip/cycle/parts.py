@@ -108,7 +108,7 @@ def join_sticks(parts: Iterable[tuple[Stretch, Sticks]]) -> Sticks:
     Parameters
     ----------
     parts : iterable of (Stretch, Sticks)
-        In order, what :func:`find_sticks` said of each.
+        In order, what :func:`find_sticks` reason of each.
 
     Returns
     -------
@@ -142,7 +142,7 @@ def join_sticks(parts: Iterable[tuple[Stretch, Sticks]]) -> Sticks:
     if not kept:
         raise EstimateError("no stretch of a record", "one at least is needed", "check the file")
     microslips = [(pair.microslips, span) for pair, span in zip(kept, spans, strict=True) if pair.microslips]
-    lost = {said: sum(said in part.lost for part in kept) for part in kept for said in part.lost}
+    lost = {reason: sum(reason in part.lost for part in kept) for part in kept for reason in part.lost}
     kinds = [part.kind for part in kept]
     method = "fusion" if all(part.method == "fusion" for part in kept) else "speed"
     return Sticks(
@@ -155,7 +155,7 @@ def join_sticks(parts: Iterable[tuple[Stretch, Sticks]]) -> Sticks:
         noise=float(np.median([part.noise for part in kept])),
         frequency=_pooled([part.frequency for part in kept], spans),
         method=method,
-        lost=tuple(_often(said, count, len(kept)) for said, count in lost.items()),
+        lost=tuple(_often(reason, count, len(kept)) for reason, count in lost.items()),
         status=_together([part.status for part in kept], len(kept)),
     )
 
@@ -175,12 +175,12 @@ def _extend(events: list[StickEvent], more: Sequence[StickEvent], stretch: Stret
 
 def _together(statuses: Sequence[str], all_: int) -> str:
     """Every status that is not ok, with how many stretches say so."""
-    bad = Counter(said for said in statuses if said != "ok")
-    return Status(*(_often(said, count, all_) for said, count in bad.items()))
+    bad = Counter(reason for reason in statuses if reason != "ok")
+    return Status(*(_often(reason, count, all_) for reason, count in bad.items()))
 
 
-def _often(said: str, count: int, all_: int) -> str:
-    return said if count == all_ else f"{said} (in {count} of {all_} stretches)"
+def _often(reason: str, count: int, all_: int) -> str:
+    return reason if count == all_ else f"{reason} (in {count} of {all_} stretches)"
 
 
 def _pooled(parts: list[Estimate], spans: list[float], *, shared: bool = False) -> Estimate:

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from stickslip.errors import FormatError
 from stickslip.files.table import Block, Column, Options, Table
-from stickslip.record.metadata import parse_metadata, units_told
+from stickslip.record.metadata import parse_metadata, units_of
 from stickslip.record.record import Step
 
 NAME = "journal"
@@ -135,7 +135,7 @@ def read(path: Path, options: Options) -> Table:
         else:
             entries.append((frame, parse_metadata(contents)))
     kind, scales = _layout(path, about)
-    names = [name for name in units_told(about) if name != about["time"]]
+    names = [name for name in units_of(about) if name != about["time"]]
     width = kind.itemsize * len(names)
     firsts = np.array([frame.first for frame in data], dtype=np.int64)
     counts = np.array([frame.length // width for frame in data], dtype=np.int64)
@@ -150,7 +150,7 @@ def read(path: Path, options: Options) -> Table:
     record = _described(about, entries, int(firsts[0]), rows, cut)
     if rest := path.stat().st_size - end:
         cut = f"{cut}; its last {rest} bytes are no whole frame".removeprefix("; ")
-    units, fs = units_told(record), float(about["fs"])
+    units, fs = units_of(record), float(about["fs"])
     columns = tuple(Column(name, unit, rows, fs, float(about["start"])) for name, unit in units.items())
     reader = _Reader(path, tuple(names), kind, scales, data, firsts, counts, fs, float(about["start"]))
     return Table(columns, reader.blocks, record=record, cut=cut)

@@ -22,7 +22,7 @@ from stickslip.printing import printable
 from stickslip.record.channels import Channel
 from stickslip.record.clock import Clock, fit_clock, resolution
 from stickslip.record.exchange import history_of, metadata_to_record
-from stickslip.record.metadata import Digests, channels_told, require_columns, require_rows, units_told
+from stickslip.record.metadata import Digests, require_columns, require_rows, stated_channels, units_of
 from stickslip.record.record import DETAILS, Record, Step
 
 # Asked in this order whether a file is theirs; each is a module beside this one, imported when it is its turn.
@@ -275,18 +275,18 @@ class Reading:
     notes: tuple[str, ...]
 
     @property
-    def told(self) -> Mapping[str, Any]:
+    def metadata(self) -> Mapping[str, Any]:
         """What write_record left in the file, if it is one and nothing else is asked for."""
         return self.sources[0].table.record if len(self.sources) == 1 and not self.arguments else {}
 
     @cached_property
     def restores(self) -> bool:
         """Whether columns and units are those that write_record left, to be given back as it was."""
-        if not self.told:
+        if not self.metadata:
             return False
         units = {column.name: column.unit for column in self.sources[0].table.columns}
-        stated = units_told(self.told)
-        require_columns(self.told, units)
+        stated = units_of(self.metadata)
+        require_columns(self.metadata, units)
         return len(stated) == len(units) and all(units[name] in (None, unit) for name, unit in stated.items())
 
     def whole(self) -> Record:
@@ -309,9 +309,9 @@ class Reading:
                 "check rows= and the file",
             )
         if self.restores:
-            require_rows(self.told, length)
-            if not Digests(_by_column(data)).changed(self.told):
-                return metadata_to_record(self.told, _by_column(data))
+            require_rows(self.metadata, length)
+            if not Digests(_by_column(data)).changed(self.metadata):
+                return metadata_to_record(self.metadata, _by_column(data))
         if (first, last) != (0, length):
             data = {key: values[first:last] for key, values in data.items()}
         _require_equal_ends(data, first)
@@ -324,7 +324,7 @@ class Reading:
         for data in self._raw(size):
             if self.restores:
                 digests.add(_by_column(data))
-                record = metadata_to_record(self.told, _by_column(data), first)
+                record = metadata_to_record(self.metadata, _by_column(data), first)
             else:
                 clock = self._clock(data, first, fs)
                 record = self._record(data, clock, "read_blocks", {"size": size, "first": first})
@@ -332,8 +332,8 @@ class Reading:
             first += len(record)
             yield record
         if self.restores:
-            require_rows(self.told, first)
-            if changed := digests.changed(self.told):
+            require_rows(self.metadata, first)
+            if changed := digests.changed(self.metadata):
                 raise FormatError(
                     f"{', '.join(changed)} of {self.names} was changed since write_record wrote it",
                     "a record is given back in blocks as it was",
@@ -358,7 +358,7 @@ class Reading:
     def _needed(self) -> list[list[str]]:
         """The columns to read of each file."""
         if self.restores:
-            return [list(units_told(self.told))]
+            return [list(units_of(self.metadata))]
         keys = [key for wanted in self.wanted for key in wanted.scales]
         if self.fs is None:
             keys += [key for time in self.times.values() for key in (time.key, *time.twins)]
@@ -437,7 +437,7 @@ class Reading:
         self, data: Mapping[tuple[int, str], Array], clock: Clock, action: str, extra: Mapping[str, Any] | None = None
     ) -> Record:
         samples = {wanted.channel.name: _combined(wanted, data) for wanted in self.wanted}
-        files = [source.told for source in self.sources]
+        files = [source.entry for source in self.sources]
         for number, time in self.times.items():
             if time.assumed and self.fs is None:
                 files[number]["seconds"] = printable(time.key[1])
@@ -446,11 +446,11 @@ class Reading:
         outcome = f"{length} samples at {clock.fs:g} Hz"
         outcome += "" if clock.stamps is None else ", the time stamps not uniform and kept"
         outcome += f", the time stamps within {clock.wander:.2g} s of uniform" if clock.wander else ""
-        outcome += "; changed since write_record wrote it" if self.told else ""
+        outcome += "; changed since write_record wrote it" if self.metadata else ""
         cut = [f"'{source.path.name}': {source.table.cut}" for source in self.sources if source.table.cut]
         step = Step(action, arguments, "; ".join([outcome, *cut, *self.notes]))
         table = self.sources[0].table.record if len(self.sources) == 1 else {}
-        channels = {wanted.channel.name: _detailed(wanted, channels_told(table)) for wanted in self.wanted}
+        channels = {wanted.channel.name: _detailed(wanted, stated_channels(table)) for wanted in self.wanted}
         return Record(samples, channels, clock.fs, clock.start, (*history_of(table), step), clock.stamps)
 
 

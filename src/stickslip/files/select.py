@@ -118,13 +118,13 @@ class Source:
     bytes: int
 
     @cached_property
-    def told(self) -> dict[str, str | int]:
+    def entry(self) -> dict[str, str | int]:
         """Plain data for the history: asked last, of what could be read, since a large file's sum takes a while."""
-        entry: dict[str, str | int] = {**file_told(self.path), "bytes": self.bytes, "format": self.format}
+        entry: dict[str, str | int] = {**file_entry(self.path), "bytes": self.bytes, "format": self.format}
         return entry | ({"cut": self.table.cut} if self.table.cut else {})
 
 
-def file_told(path: Path) -> dict[str, str]:
+def file_entry(path: Path) -> dict[str, str]:
     """Name, sum and folder of a file, that as it was typed, unless it says where this machine keeps it."""
     folder = printable(str(path.parent))
     with supplied(path):

@@ -24,7 +24,7 @@ from stickslip.record.metadata import (
     read_beside,
     record_to_metadata,
     time_column,
-    units_told,
+    units_of,
 )
 from stickslip.record.record import Record, require_record
 from stickslip.whole import whole_file
@@ -186,7 +186,7 @@ def write_table(table: Table, path: Path) -> Path:
     """
     h5py = optional("h5py")
     require_free(path)
-    units, sums = units_told(table.record), Digests()
+    units, digests = units_of(table.record), Digests()
     rows = int(table.record["rows"])
     with whole(path, replace=False) as part, h5py.File(part, "w", libver="latest") as file:
         for name, unit in units.items():
@@ -196,9 +196,9 @@ def write_table(table: Table, path: Path) -> Path:
             count = len(next(iter(block.values())))
             for name, values in block.items():
                 file[name][first : first + count] = values
-            sums.add(block)
+            digests.add(block)
             first += count
-        file.attrs[KEY] = json.dumps({**table.record, "sha256": sums.told()})
+        file.attrs[KEY] = json.dumps({**table.record, "sha256": digests.sums()})
     return path
 
 

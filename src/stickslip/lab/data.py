@@ -453,7 +453,7 @@ def _question_of(body: bytes) -> Ask:
 async def status(request: Request) -> Response:
     """Where an analysis stands, with its answer when it is done."""
     job = _job(request)
-    return JSONResponse({**job.told(), "answer": job.answer})
+    return JSONResponse({**job.report(), "answer": job.answer})
 
 
 @described("Where an analysis stands, at each change", gives="text/event-stream")
@@ -473,7 +473,7 @@ async def cancel(request: Request) -> Response:
     """Stop an analysis, or remove its answer."""
     job = _job(request)
     await _of(request).jobs.cancel(job)
-    return JSONResponse(job.told())
+    return JSONResponse(job.report())
 
 
 @described("The report of an analysis", gives="text/html")

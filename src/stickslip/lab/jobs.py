@@ -70,7 +70,7 @@ class Job:
         self.task: asyncio.Task[None] | None = None
         self.changed = asyncio.Event()
 
-    def told(self) -> dict[str, Any]:
+    def report(self) -> dict[str, Any]:
         """Where it stands, for the page."""
         return {"state": self.state, "words": self.words, "share": self.share, "message": self.message}
 
@@ -119,7 +119,7 @@ class Jobs:
         """Where it stands, now and at each change until it ends; None where nothing was new for a while."""
         while True:
             changed = job.changed
-            yield job.told()
+            yield job.report()
             if job.ended is not None:
                 return
             while not changed.is_set():

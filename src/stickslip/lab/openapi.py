@@ -35,11 +35,13 @@ def described(
         given: dict[str, Any] = {"description": summary}
         if status != 204:
             given["content"] = {gives: {"schema": answer or {}}}
-        said: dict[str, Any] = {"summary": summary, "responses": {str(status): given}}
-        said["parameters"] = [{"name": name, "in": "query", "schema": schema} for name, schema in (query or {}).items()]
+        operation: dict[str, Any] = {"summary": summary, "responses": {str(status): given}}
+        operation["parameters"] = [
+            {"name": name, "in": "query", "schema": schema} for name, schema in (query or {}).items()
+        ]
         if body is not None:
-            said["requestBody"] = {"required": True, "content": {media: {"schema": body}}}
-        endpoint.openapi = said  # type: ignore[attr-defined]
+            operation["requestBody"] = {"required": True, "content": {media: {"schema": body}}}
+        endpoint.openapi = operation  # type: ignore[attr-defined]
         return endpoint
 
     return noted

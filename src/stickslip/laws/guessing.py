@@ -175,8 +175,8 @@ def required(law: type[Any]) -> int:
 def asked_for(law: type[Any]) -> tuple[Hypothesis, ...]:
     """How records are asked for a law: as its class says, or by the units of its parameters."""
     if hasattr(law, "hypotheses"):
-        said: tuple[Hypothesis, ...] = law.hypotheses()
-        return said
+        own: tuple[Hypothesis, ...] = law.hypotheses()
+        return own
     family = Family(law.__name__, f"that of the law {law.__name__}")
     return (Hypothesis(law.__name__, family, functools.partial(_by_units, law)),)
 

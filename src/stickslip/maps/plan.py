@@ -201,7 +201,7 @@ def _source(value: Any, above: tuple[FunctionType, ...] = ()) -> Any:
     known = {name: value.__globals__[name] for name in _asked(code) if name in value.__globals__}
     known |= {name: cell.cell_contents for name, cell in zip(code.co_freevars, value.__closure__ or (), strict=True)}
     rows = [(name, _source(known[name], (*above, value))) for name in sorted(known)]
-    return value.__qualname__, _said(code), value.__defaults__, value.__kwdefaults__, rows
+    return value.__qualname__, _bytecode(code), value.__defaults__, value.__kwdefaults__, rows
 
 
 def _asked(code: CodeType) -> set[str]:
@@ -209,8 +209,12 @@ def _asked(code: CodeType) -> set[str]:
     return {*code.co_names}.union(*(_asked(inner) for inner in code.co_consts if isinstance(inner, CodeType)))
 
 
-def _said(code: CodeType) -> tuple[Any, ...]:
-    return (code.co_code.hex(), *code.co_names, *(_said(c) if isinstance(c, CodeType) else c for c in code.co_consts))
+def _bytecode(code: CodeType) -> tuple[Any, ...]:
+    return (
+        code.co_code.hex(),
+        *code.co_names,
+        *(_bytecode(c) if isinstance(c, CodeType) else c for c in code.co_consts),
+    )
 
 
 def _content(value: Any) -> str:

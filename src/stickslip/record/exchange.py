@@ -28,7 +28,7 @@ from stickslip.record.metadata import (
     require_version,
     restored,
     trusting,
-    units_told,
+    units_of,
 )
 from stickslip.record.record import Record, StatedRig, Step
 from stickslip.units import parse_unit
@@ -328,7 +328,7 @@ def _unchanged(
     metadata: Mapping[str, Any], arrays: Mapping[str, Array], stated: Mapping[str, str], axis: Array | None
 ) -> Record | None:
     """The record that was described, where channels, units, samples and clock are still its own."""
-    units = units_told(metadata)
+    units = units_of(metadata)
     *channels, time = units
     columns = dict(arrays) if axis is None else {**arrays, time: axis}
     relabelled = any(units[name] != stated.get(name, units[name]) for name in channels)

@@ -231,7 +231,7 @@ def record_to_metadata(record: Record) -> dict[str, Any]:
         "truth": _plain(record.truth),
         "rig": None if record.rig is None else _plain(vars(record.rig)),
         "log": None if record.log is None else record.log.entries(),
-        "sha256": Digests({time_column(record): record.time, **record.samples}).told(),
+        "sha256": Digests({time_column(record): record.time, **record.samples}).sums(),
     }
 
 
@@ -249,7 +249,7 @@ class Digests:
             same = np.where(np.isnan(values), np.nan, np.asarray(values, dtype="<f8") + 0.0)
             self._sums.setdefault(name, hashlib.sha256()).update(same.tobytes())
 
-    def told(self) -> dict[str, str]:
+    def sums(self) -> dict[str, str]:
         """The digests in hexadecimal, by column."""
         return {name: total.hexdigest() for name, total in self._sums.items()}
 
@@ -258,7 +258,7 @@ class Digests:
         with trusting():
             if metadata["sha256"] is None:
                 return []
-            return [name for name, digest in self.told().items() if metadata["sha256"].get(name) != digest]
+            return [name for name, digest in self.sums().items() if metadata["sha256"].get(name) != digest]
 
 
 def time_column(record: Record) -> str:
@@ -270,13 +270,13 @@ def time_column(record: Record) -> str:
     return name
 
 
-def channels_told(metadata: Mapping[str, Any]) -> dict[str, Channel]:
+def stated_channels(metadata: Mapping[str, Any]) -> dict[str, Channel]:
     """The channels that were written, by name; none without metadata."""
     with trusting():
         return {entry["name"]: Channel(**restored(entry)) for entry in metadata.get("channels", ())}
 
 
-def units_told(metadata: Mapping[str, Any]) -> dict[str, str]:
+def units_of(metadata: Mapping[str, Any]) -> dict[str, str]:
     """The columns that were written, the channels and then time, each with its unit.
 
     Raises
@@ -292,7 +292,7 @@ def units_told(metadata: Mapping[str, Any]) -> dict[str, str]:
 
 def require_columns(metadata: Mapping[str, Any], there: Collection[str]) -> None:
     """Refuse a file that lacks a column which its description names."""
-    missing = [name[:40] for name in units_told(metadata) if name not in there]
+    missing = [name[:40] for name in units_of(metadata) if name not in there]
     if missing:
         raise FormatError(
             f"the description of the record is damaged (it names {', '.join(missing)})",

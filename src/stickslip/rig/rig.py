@@ -488,7 +488,7 @@ def _truth(run: Trajectory, begin: float, end: float) -> Mapping[str, Any]:
             "damping": "contact damping",
         }  # fmt: skip
         law = system.law
-        truth |= {said: getattr(law, name) for name, said in names.items() if getattr(law, name, None) is not None}
+        truth |= {title: getattr(law, name) for name, title in names.items() if getattr(law, name, None) is not None}
         if frequency := getattr(system.drive, "frequency", None):
             truth["forcing frequency"] = frequency
     kinds = np.array([mode.kind for mode in run.table.modes])[run.modes]

@@ -106,7 +106,7 @@ def templates(*folders: Path, wording: Callable[[str], str] = str) -> Environmen
     )  # fmt: skip
     environment.filters.update(
         inline_svg=inline_svg,
-        told=told,
+        spelled_out=spelled_out,
         spelled=style.spelled,
         played=played,
         heard=heard,
@@ -166,12 +166,12 @@ def inline_svg(plate: Plate) -> str:
     return f"{opening}>{rest}"
 
 
-def told(value: Any) -> str:
+def spelled_out(value: Any) -> str:
     """An argument of a step, with its parts spelled out."""
     if isinstance(value, Mapping):
-        return ", ".join(f"{key}: {told(item)}" for key, item in value.items())
+        return ", ".join(f"{key}: {spelled_out(item)}" for key, item in value.items())
     if isinstance(value, (list, tuple)):
-        return "; ".join(told(item) for item in value)
+        return "; ".join(spelled_out(item) for item in value)
     return f"{value:.6g}" if isinstance(value, float) else str(value)
 
 

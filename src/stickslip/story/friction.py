@@ -33,10 +33,10 @@ TOO_WIDE = 0.5  # an interval wider than this part of the value deserves a word
 
 def of_findings(findings: Findings) -> Story:
     """One record."""
-    headed = () if next(_wrong(findings), "") else (findings.breakaway, findings.presliding)
-    said = [estimate for answer in headed if answer is not None for estimate in answer.estimates]
+    leading = () if next(_wrong(findings), "") else (findings.breakaway, findings.presliding)
+    headed = [estimate for answer in leading if answer is not None for estimate in answer.estimates]
     return Story(
-        findings.name, list(_headline(findings)), cautions(findings, said), notes=list(_exact(findings)),
+        findings.name, list(_headline(findings)), cautions(findings, headed), notes=list(_exact(findings)),
         settings=_settings(findings), draw=lambda: plates_of(findings), data=lambda: _data(findings),
         look=lambda: scope.of_findings(findings), remedy=_remedy(findings),
     )  # fmt: skip

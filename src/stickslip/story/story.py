@@ -201,16 +201,16 @@ class Story:
     @functools.cached_property
     def notices(self) -> list[Caution]:
         """The cautions, each reason once: those of rows in the rows' order, which numbers them, then the others."""
-        said, order = " ".join(self.headline).casefold(), [line.name for line in self.lines]
+        headline, order = " ".join(self.headline).casefold(), [line.name for line in self.lines]
         flagged = flags((line.name, line.status) for line in self.lines)
-        rows = [flag for flag in flagged if flag.reason.casefold() not in said]
+        rows = [flag for flag in flagged if flag.reason.casefold() not in headline]
         rows.sort(key=lambda flag: min(map(order.index, flag.names)))
         reasons, kinds = {row.reason for row in rows}, {row.kind for row in rows} - {""}
         plain = [caution if isinstance(caution, Caution) else Caution(caution) for caution in self.cautions]
         others = [
             remark
             for remark in plain
-            if remark.reason not in reasons and remark.kind not in kinds and remark.reason.casefold() not in said
+            if remark.reason not in reasons and remark.kind not in kinds and remark.reason.casefold() not in headline
         ]
         return [*rows, *(other for other in others if not other.names), *(other for other in others if other.names)]
 

@@ -103,9 +103,9 @@ class Caution(str):
         return Caution, (self.reason, self.names, self.kind)
 
 
-def cautions(findings: Findings, said: Iterable[Estimate] = ()) -> list[Caution]:
-    """What should keep the reader from trusting a number, but what the headline has `said` of those without a value."""
-    untold = {estimate.name for estimate in said if not estimate.known}
+def cautions(findings: Findings, headed: Iterable[Estimate] = ()) -> list[Caution]:
+    """What should keep the reader from trusting a number, but what `headed` the page of those without a value."""
+    untold = {estimate.name for estimate in headed if not estimate.known}
     statuses = [(estimate.name, estimate.status) for estimate in findings.quoted if estimate.name not in untold]
     return [*flags([*statuses, *findings.doubts]), *faulty(findings.faults)]
 
