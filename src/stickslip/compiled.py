@@ -35,7 +35,8 @@ from typing import Any
 import llvmlite.binding
 import llvmlite.ir
 from numba import cfunc, config, njit, types
-from numba.core import cgutils, event
+from numba.core import cgutils, compiler, event
+from numba.core.codegen import JITCodeLibrary
 from numba.extending import intrinsic
 
 OPTIONS = {"error_model": "numpy", "_nrt": False}
@@ -98,16 +99,59 @@ def _say(sentence: str) -> None:
 compilation = Compilation()
 
 
+class _Flags(compiler.Flags):  # type: ignore[misc]  # numba tells no types
+    """numba's own, compared by what was set: it compares all that may be, as often as it looks for a type."""
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Flags) and self._values == other._values
+
+    def __hash__(self) -> int:
+        return hash(frozenset(self._values))
+
+
+class _Shown(compiler.Compiler):  # type: ignore[misc]
+    """Compiles what Python calls, with all that it calls."""
+
+    def __init__(self, typing: Any, target: Any, library: Any, args: Any, result: Any, flags: Any, names: Any) -> None:
+        super().__init__(typing, target, library, args, result, _Flags(flags), names)
+
+
+class _Called(_Shown):
+    """Compiles what compiled code calls, as far as it is the same wherever it is called."""
+
+    def __init__(self, typing: Any, target: Any, library: Any, *rest: Any) -> None:
+        library = _Body(target.codegen(), "called")
+        library.enable_object_caching()
+        super().__init__(typing, target, library, *rest)
+
+
+class _Body(JITCodeLibrary):  # type: ignore[misc]
+    """Code that is linked into its callers and optimised there: by itself it would be so once more for each level of
+    calls, and made machine code of that nothing runs. That holds its globals for numba's environments alone."""
+
+    def _optimize_final_module(self) -> None:
+        pass
+
+    def _finalize_final_module(self) -> None:
+        self._finalized = True
+        shared = self._get_module_for_linking()
+        kept = [str(own) for own in shared.global_variables if own.name.startswith("_ZN08NumbaEnv")]
+        blank = str(self._codegen._create_empty_module(self.name))
+        self._final_module = llvmlite.binding.parse_assembly("\n".join([blank, *kept]))
+        super()._finalize_final_module()
+
+
 def compiled(**options: Any) -> Callable[[Callable[..., Any]], Any]:
     """numba's `njit` with these options, kept in :func:`folder`.
 
-    What compiled code calls is compiled apart, without the entrances for Python and C: they took a quarter of the time.
+    What compiled code calls is compiled apart, without the entrances for Python and C and as :class:`_Body`: they took
+    a quarter of the time, its optimisation and machine code a third of the rest.
     """
 
     def compile_(function: Callable[..., Any]) -> Any:
-        shown = _keeping(njit, options)(function)
+        shown = _keeping(njit, {"pipeline_class": _Shown, **options})(function)
         if not config.DISABLE_JIT:
-            called = _keeping(njit, options | BARE)(function)
+            called = _keeping(njit, {"pipeline_class": _Called, **options, **BARE})(function)
             shown.get_call_template, shown.get_overload = called.get_call_template, called.get_overload
         return shown
 
