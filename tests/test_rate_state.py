@@ -10,7 +10,7 @@ from scipy.integrate import solve_ivp
 
 import stickslip as ss
 from stickslip.solve import collocation
-from stickslip.solve.curved import model_of
+from stickslip.solve.curved import implicit_of, model_of
 from stickslip.solve.tape import tape
 
 SLOWEST = 1e-10  # m/s: of the reference, in units of a motion of some m/s
@@ -114,10 +114,10 @@ def test_a_contact_that_holds_ages_and_creeps_as_the_law_says() -> None:
 def test_a_leap_that_comes_to_no_number_has_failed() -> None:
     """Its NaN had hidden behind larger numbers, and the same leap was tried for ever."""
     table = tape(ss.Oscillator(1.0, 1.0, textbook(60, "slip", 1e-2)))
-    model, size = model_of(table, 1e-12), len(table.names)
+    implicit, size = implicit_of(table, model_of(table, 1e-12)), len(table.names)
     stages = collocation.room(table.nodes.most, size, table.physical)
     stages.values[:] = math.nan
-    assert collocation.settle(model, 0, np.zeros(size), 1.0, np.ones(size), stages) == math.inf
+    assert collocation.settle(implicit, 0, np.zeros(size), 1.0, np.ones(size), stages) == math.inf
 
 
 def test_a_mass_carried_along_by_a_face_that_shakes_takes_long_steps() -> None:

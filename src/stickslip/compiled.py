@@ -41,7 +41,8 @@ from numba.extending import intrinsic
 
 OPTIONS = {"error_model": "numpy", "_nrt": False}
 FAST = {**OPTIONS, "fastmath": {"contract", "nsz", "arcp"}}
-BARE = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+PYTHON = {"no_cfunc_wrapper": True}  # an entrance for Python, none for C
+BARE = {"no_cpython_wrapper": True, **PYTHON}
 PACKAGE = Path(__file__).parent
 HOLDS_KERNELS = "@compiled("
 IMPORT = re.compile(r"^from (stickslip[\w.]*) import (\([^)]*\)|[^\n]+)", re.MULTILINE)
@@ -145,14 +146,16 @@ def compiled(**options: Any) -> Callable[[Callable[..., Any]], Any]:
     """numba's `njit` with these options, kept in :func:`folder`.
 
     What compiled code calls is compiled apart, without the entrances for Python and C and as :class:`_Body`: they took
-    a quarter of the time, its optimisation and machine code a third of the rest.
+    a quarter of the time, its optimisation and machine code a third of the rest. A number that stands in the call is an
+    argument as any other: numba would compile the function anew for each.
     """
 
     def compile_(function: Callable[..., Any]) -> Any:
-        shown = _keeping(njit, {"pipeline_class": _Shown, **options})(function)
+        shown = _keeping(njit, {"pipeline_class": _Shown, **options, **PYTHON})(function)
         if not config.DISABLE_JIT:
             called = _keeping(njit, {"pipeline_class": _Called, **options, **BARE})(function)
-            shown.get_call_template, shown.get_overload = called.get_call_template, called.get_overload
+            shown.get_call_template = lambda given, named: called.get_call_template(map(types.unliteral, given), named)
+            shown.get_overload = called.get_overload
         return shown
 
     return compile_

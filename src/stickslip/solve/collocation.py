@@ -33,26 +33,31 @@ class Scheme(NamedTuple):
 
 
 class Model(NamedTuple):
-    """A curved system as the march reads it: code by address (Taylor coefficients with their numbers, rates alone), the
-    leaps' method, what rounds, exits, what may sleep, the drive's tones and period [s], the counter-face's velocity
-    and the entry that follows it (-1: none alone), degrees of freedom, entries that are no signals, the tolerance of a
-    step and its order."""
+    """A curved system as the march reads it: code of its Taylor coefficients by address, with their numbers, what
+    rounds, exits, what may sleep, the drive's tones and period [s], the tolerance of a step and its order."""
 
     series: int
     numbers: Array
-    rates: int
-    scheme: Scheme
     sums: Sums
     exits: Exits
     guards: Guards
     tones: Array
     period: float
+    tolerance: float
+    order: int
+
+
+class Implicit(NamedTuple):
+    """A curved system as leaps read it: also code of the rates alone, the method, the counter-face's velocity and the
+    entry that follows it (-1: none alone), degrees of freedom, and entries that are no signals."""
+
+    model: Model
+    rates: int
+    scheme: Scheme
     face: Array
     follows: int
     degrees: int
     physical: int
-    tolerance: float
-    order: int
 
 
 class Stages(NamedTuple):
@@ -127,10 +132,10 @@ def solve(a, b):
 
 
 @compiled(**EXACT)
-def _slopes(model, mode, i, big, stages):
+def _slopes(implicit, mode, i, big, stages):
     """Rates at stage i, their derivatives by differences, and the values of all nodes."""
-    rates = coded(model.rates)
-    numbers, physical = model.numbers, model.physical
+    rates = coded(implicit.rates)
+    numbers, physical = implicit.model.numbers, implicit.physical
     stage, value, slope, every = stages.values[i], stages.rates[i], stages.slopes[i], stages.nodes[i]
     work, moved = stages.one, stages.moved
     rates(numbers, mode, stage, 1.0, work)
@@ -138,14 +143,14 @@ def _slopes(model, mode, i, big, stages):
         value[j] = work[2 * j + 1]
     for j in range(len(every)):
         every[j] = work[2 * j]
-    speed = _faced(model.face, stage) if model.follows >= 0 else 0.0
+    speed = _faced(implicit.face, stage) if implicit.follows >= 0 else 0.0
     for j in range(len(stage)):
         moved[j] = stage[j]
     for d in range(physical):
         # friction may follow the logarithm of the velocity against the counter-face
-        if d == model.follows:
+        if d == implicit.follows:
             step = 1e-7 * abs(stage[d] - speed) + 1e-13 * big[d]
-        elif model.degrees <= d < 2 * model.degrees:
+        elif implicit.degrees <= d < 2 * implicit.degrees:
             step = 1e-7 * abs(stage[d]) + 1e-13 * big[d]
         else:
             step = 1e-7 * abs(stage[d]) + 1e-10 * big[d]
@@ -160,16 +165,16 @@ def _slopes(model, mode, i, big, stages):
 
 
 @compiled(**EXACT)
-def settle(model, mode, state, h, big, stages):
+def settle(implicit, mode, state, h, big, stages):
     """Newton's method for the stages, which hold the drive's signals and a guess: the last change, or infinity.
 
     Where rounding keeps it above the tolerance (a small velocity between large forces), the change tells by how much.
     """
-    matrix, physical, tolerance = model.scheme.matrix, model.physical, model.tolerance
+    matrix, physical, tolerance = implicit.scheme.matrix, implicit.physical, implicit.model.tolerance
     a, b, change, before = stages.matrix, stages.right, math.inf, math.inf
     for iteration in range(NEWTON):
         for i in range(STAGES):
-            _slopes(model, mode, i, big, stages)
+            _slopes(implicit, mode, i, big, stages)
         for i in range(STAGES):
             for j in range(physical):
                 row, total = i * physical + j, 0.0
@@ -247,21 +252,21 @@ def _faced(face, state):
 
 
 @compiled(**EXACT)
-def leap(model, mode, unit, state, big, h, poly, work):
+def leap(implicit, mode, unit, state, big, h, poly, work):
     """A step of length h [s] as polynomials of w, and the length of the next in units of h; 0 where it failed.
 
     `unit` is that of the Taylor series [s]: the drive's signals are polynomials, or tones.
     """
-    (step, stages), scheme = work, model.scheme
+    (step, stages), scheme, model = work, implicit.scheme, implicit.model
     for i in range(STAGES):
         advance(step.s, step.order, scheme.points[i] * h / unit, stages.values[i])
         turn(model.tones, state, scheme.points[i] * h, stages.values[i])
-        for j in range(model.physical):
+        for j in range(implicit.physical):
             stages.values[i, j] = state[j]
         # the slip of now, however fast the counter-face: friction may follow the logarithm of it
-        if model.follows >= 0:
-            stages.values[i, model.follows] += _faced(model.face, stages.values[i]) - _faced(model.face, state)
-    change = settle(model, mode, state, h, big, stages)
+        if implicit.follows >= 0:
+            stages.values[i, implicit.follows] += _faced(implicit.face, stages.values[i]) - _faced(implicit.face, state)
+    change = settle(implicit, mode, state, h, big, stages)
     if change == math.inf:
         return 0.0
     for j in range(len(state)):
@@ -277,9 +282,10 @@ def _fitted_node(node, size, fit, work):
 
 
 @compiled(**EXACT)
-def landing(model, mode, big, work):
+def landing(implicit, mode, big, work):
     """Where a leap ends, as w, and by which exit (-1 where by none): an exit, or a sleeping function that wakes."""
-    exits, guards, fit, step = model.exits, model.guards, model.scheme.fit, work[0]
+    model, fit, step = implicit.model, implicit.scheme.fit, work.step
+    exits, guards = model.exits, model.guards
     c, noise, size, asleep = step.c, step.noise, len(big), 4.0 - math.log(model.tolerance)
     end, leaving = 1.0, -1
     for g in range(guards.first[mode], guards.first[mode + 1]):

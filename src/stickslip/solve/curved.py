@@ -8,7 +8,7 @@ import math
 from collections.abc import Callable, Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
-from functools import lru_cache, partial
+from functools import cached_property, lru_cache
 from itertools import pairwise
 from typing import Any, NamedTuple
 
@@ -22,15 +22,15 @@ from stickslip.laws.curved import CurvedMode, lifted, symbol
 from stickslip.laws.time_delay import DELAYED, TimeDelay
 from stickslip.oscillator import Oscillator
 from stickslip.solve import collocation, march, taylor
-from stickslip.solve.collocation import Model
-from stickslip.solve.march import DONE, DUE, LAPS, TIME, TRY, Dense, Shown, Steps, Work
+from stickslip.solve.collocation import Implicit, Model
+from stickslip.solve.march import DONE, DUE, LAPS, TIME, TRY, Dense, Leaps, Shown, Steps, Work
 from stickslip.solve.refusal import Budget, chatter, held_back, named, require_numbers, unproved
 from stickslip.solve.tables import Stops, numbered
 from stickslip.solve.tape import Tape, tape
-from stickslip.solve.taylor import EXACT, GROWTH, Array, Index, coded, expansion, length
+from stickslip.solve.taylor import EXACT, GROWTH, Array, Index, Step, coded, expansion, length
 from stickslip.solve.trajectory import Trajectory
 
-March = Callable[..., tuple[int, int, int, int]]  # of clock, state and what follows in `march.march`
+March = Callable[..., tuple[int, int, int, int]]  # of clock, state, `big`, mode, end, steps and room for a series
 
 LOW, HIGH = 14, 18  # orders: few, since each is compiled, and near the best for any tolerance
 SHARE = 0.02  # of the tolerance is what a step may take: a hundred periods then stay within the tolerance
@@ -38,9 +38,6 @@ CHUNK, LEAPS = 4096, 256  # steps and leaps between two looks at the clock and t
 PATIENCE, STEPS = 200_000, 200_000_000  # steps before a run's number of steps is foretold, and the most there may be
 PAST = 2  # where the chain of the past stands in the state: behind x and v
 REACH = 4.0  # longest look ahead of a step of the past, in lags
-
-
-COLUMNS = 7  # of the steps, beside the leaps' own
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -107,36 +104,39 @@ def degree(rtol: float) -> int:
 
 
 @lru_cache(maxsize=32)
-def _code(table: Tape, order: int) -> tuple[int, Array, int]:
-    """The code of steps of an order, with its numbers, and that of the rates."""
-    rates, _ = expansion(table.nodes, table.kept, 1)
-    return *expansion(table.nodes, table.kept, order), rates
+def _code(table: Tape, order: int) -> tuple[int, Array]:
+    """The code of steps of an order, with its numbers."""
+    return expansion(table.nodes, table.kept, order)
 
 
 @lru_cache(maxsize=32)
 def _shown(table: Tape, order: int) -> Shown:
-    series, numbers, _ = _code(table, order)
-    return Shown(series, numbers, *expansion(table.watched, table.shown, 0), order)
+    return Shown(*_code(table, order), *expansion(table.watched, table.shown, 0), order)
 
 
 def model_of(table: Tape, rtol: float) -> Model:
     """A system as the march reads it."""
     order = degree(rtol)
+    series, numbers = _code(table, order)
     return Model(
-        *_code(table, order),
-        collocation.method(),
+        series,
+        numbers,
         table.sums,
         table.exits,
         table.guards,
         table.tones,
         table.motion.period,
-        table.outputs["face_rate"],
-        1 if isinstance(table.system, Oscillator) else -1,
-        table.degrees,
-        table.physical,
         SHARE * rtol,
         order,
     )
+
+
+def implicit_of(table: Tape, model: Model) -> Implicit:
+    """The system as leaps read it."""
+    rates, _ = _code(table, 1)
+    follows = 1 if isinstance(table.system, Oscillator) else -1
+    face = table.outputs["face_rate"]
+    return Implicit(model, rates, collocation.method(), face, follows, table.degrees, table.physical)
 
 
 def run_curved(
@@ -159,7 +159,10 @@ def run_curved(
             run.state[stops.places] = stops.values[0]
             outcome = march.FULL
             while outcome == march.FULL:
-                if run.heed is None and run.kept:  # the first call may compile for long
+                if run.fresh:  # the first call may compile for long
+                    holding.close()
+                    run.heed = None
+                elif run.heed is None:
                     run.heed = holding.enter_context(held_back())
                 outcome = run.chunk(stops, follow)
                 tell(run.share)
@@ -170,8 +173,12 @@ def run_curved(
         run.total = last.offsets[-1] + last.lengths[-1] + _lasting(last.laps[-1], table.motion.period)
     if status == "complete":
         tell(1.0)
-        status = "at rest" if march.rests(run.model, run.mode, run.state, run.work.step.s) else status
-    return _assembled(table, run.kept, float(run.total), status, run.model.order)
+        status = (
+            "at rest"
+            if march.rests(run.model.series, run.model.numbers, run.mode, run.state, run.work.step)
+            else status
+        )
+    return _assembled(table, run, status)
 
 
 def _lasting(laps: float, period: float) -> float:
@@ -191,17 +198,24 @@ class _Run:
         self.events = Budget(table, scale=self.scale, most=budget)
         self.clock = np.array([0.0, 0.0, 1e-6 * self.scale, 0.0, 0.0, march.PATIENCE])
         self.state, self.big = state.copy(), np.abs(state)
-        self.work = Work(taylor.room(count, self.model.order), collocation.room(count, size, table.physical))
+        self.work = Work(taylor.room(count, self.model.order, size), collocation.room(count, size, table.physical))
         self.kept: list[Steps] = []
+        self.leapt = [Leaps(np.empty((0, size, collocation.WIDTH)), np.empty(0))]
         self.room = room_for(CHUNK, size)
+        self.leaps = Leaps(np.empty((LEAPS, size, collocation.WIDTH)), np.empty(LEAPS))
         self.heed: Callable[[], None] | None = None  # lets a Ctrl-C through that came within a chunk
-        self.leapt = 0  # long steps among those kept
+        self.fresh, self.stiff = True, False  # whether the march was not called yet, and whether it leaps
 
     @property
     def ahead(self) -> float:
         """Time that is left [s]."""
         laps = self.clock[LAPS]
         return float(self.total - self.clock[TIME] - (laps * self.model.period if laps else 0.0))
+
+    @cached_property
+    def implicit(self) -> Implicit:
+        """The system as leaps read it."""
+        return implicit_of(self.table, self.model)
 
     @property
     def share(self) -> float:
@@ -210,21 +224,18 @@ class _Run:
 
     def chunk(self, stops: Stops, follow: March | None) -> int:
         """March for so many steps at the most, keep them, and say why it ended; refuse what gets nowhere."""
-        steps, before = self.room, self.clock.copy()
-        if follow is None and len(stops.ends) == 1:  # what leads from stop to stop takes seconds to compile
-            follow = partial(march.march, self.model)
-        outcome, written, leapt, self.mode, self.stop = (
-            self._to_stop(stops, follow)
-            if follow
-            else march.course(
-                self.model, self.clock, self.state, self.big, self.mode, stops, self.stop, self.scale, steps, self.work
-            )
-        )
+        steps, before, self.fresh = self.room, self.clock.copy(), False
+        if follow is None and len(stops.ends) > 1:
+            outcome, written, leapt, self.mode, self.stop = march.course(
+                self.implicit, self.clock, self.state, self.big, self.mode, stops, self.stop, self.scale,
+                steps, self.leaps, self.work,
+            )  # fmt: skip
+        else:
+            outcome, written, leapt, self.mode, self.stop = self._to_stop(stops, follow or self._freely)
         if written:
-            steps.leaps[:written][steps.leaps[:written] >= 0] += self.leapt
-            self.leapt += leapt
-            columns = [column[:written].copy() for column in steps[:-2]]
-            self.kept.append(Steps._make([*columns, steps.polys[:leapt].copy(), steps.reach[:leapt].copy()]))
+            steps.leaps[:written][steps.leaps[:written] >= 0] += sum(len(part.reach) for part in self.leapt)
+            self.kept.append(Steps._make(column[:written].copy() for column in steps))
+            self.leapt.append(Leaps._make(column[:leapt].copy() for column in self.leaps))
         if self.heed:
             self.heed()
         laps = self.clock[LAPS] - before[LAPS]
@@ -232,17 +243,30 @@ class _Run:
         if outcome != march.DONE or not np.isfinite(self.state).all():
             self._refuse(outcome, passed)
         self.events.spend(steps.ends[:written], passed=passed, state=self.state)
-        return outcome
+        return int(outcome)
 
     def _to_stop(self, stops: Stops, follow: March) -> tuple[int, int, int, int, int]:
         """As :func:`stickslip.solve.march.course`, by a march that ends at each stop."""
         until, stop = tuple(stops.ends[self.stop]), self.stop
-        outcome, *rest = follow(self.clock, self.state, self.big, self.mode, until, self.room, self.work)
+        outcome, *rest = follow(self.clock, self.state, self.big, self.mode, until, self.room, self.work.step)
         if outcome == march.DONE and stop + 1 < len(stops.ends):
             outcome, stop = march.FULL, stop + 1
             self.state[stops.places] = stops.values[stop]
             self.clock[TRY] = min(self.clock[TRY], self.scale)
         return outcome, *rest, stop  # type: ignore[return-value]
+
+    def _freely(
+        self, clock: Array, state: Array, big: Array, mode: int, until: tuple[float, float], steps: Steps, step: Step
+    ) -> tuple[int, int, int, int]:
+        """Taylor steps, until the contact turns out stiff: what leaps takes seconds to compile."""
+        if self.stiff:
+            return march.strides(  # type: ignore[no-any-return]
+                self.implicit, clock, state, big, mode, until, steps, 0, self.leaps, 0, self.work
+            )
+        outcome, written, mode = march.march(self.model, clock, state, big, mode, until, steps, 0, step)
+        if outcome == march.STIFF:
+            outcome, self.stiff, self.fresh = march.FULL, True, True
+        return outcome, written, 0, mode
 
     def _refuse(self, outcome: int, passed: float) -> None:
         laps, time = self.clock[LAPS], self.clock[TIME]
@@ -271,7 +295,7 @@ class _Run:
 
 
 def room_for(count: int, size: int) -> Steps:
-    """Room for steps, and for the leaps of a chunk among them."""
+    """Room for steps."""
     return Steps(
         laps=np.empty(count),
         offsets=np.empty(count),
@@ -280,14 +304,13 @@ def room_for(count: int, size: int) -> Steps:
         states=np.empty((count, size)),
         ends=np.empty(count, np.int16),
         leaps=np.empty(count, np.int64),
-        polys=np.empty((LEAPS, size, collocation.WIDTH)),
-        reach=np.empty(LEAPS),
     )
 
 
-def _assembled(table: Tape, kept: list[Steps], total: float, status: str, order: int) -> CurvedTrajectory:
+def _assembled(table: Tape, run: _Run, status: str) -> CurvedTrajectory:
     """Steps gathered, and pieces from event to event."""
-    steps = Steps._make(map(np.concatenate, zip(*kept, strict=True)))
+    steps = Steps._make(map(np.concatenate, zip(*run.kept, strict=True)))
+    leaps = Leaps._make(map(np.concatenate, zip(*run.leapt, strict=True)))
     first = np.flatnonzero(np.concatenate([[True], steps.ends[:-1] >= 0]))
     last = np.append(first[1:], len(steps.ends)) - 1
     period = table.motion.period
@@ -301,10 +324,10 @@ def _assembled(table: Tape, kept: list[Steps], total: float, status: str, order:
         durations=np.add.reduceat(steps.lengths, first),
         kept=steps.states[first],
         exits=steps.ends[last],
-        duration=total,
+        duration=float(run.total),
         status=status,
-        steps=Dense(starts, steps.lengths, steps.modes, steps.states, steps.leaps, steps.polys, steps.reach),
-        order=order,
+        steps=Dense(starts, steps.lengths, steps.modes, steps.states, steps.leaps, *leaps),
+        order=run.model.order,
     )
 
 
@@ -384,7 +407,7 @@ class _Past:
             np.array([0, 0]),
         )
         self.order, self.lows = degree(rtol), [low for low, _ in law.law.branches()]
-        self.columns: tuple[NDArray[Any], ...] = room_for(2 * CHUNK, len(table.names))[:COLUMNS]
+        self.columns = room_for(2 * CHUNK, len(table.names))
         self.known = 0
         self.model = model_of(table, rtol)
 
@@ -394,7 +417,7 @@ class _Past:
         return mode % 3 + 3 * (int(np.searchsorted(self.lows, state[PAST], side="right")) - 1)
 
     def __call__(
-        self, clock: Array, state: Array, big: Array, mode: int, until: tuple[float, float], steps: Steps, work: Work
+        self, clock: Array, state: Array, big: Array, mode: int, until: tuple[float, float], steps: Steps, step: Step
     ) -> tuple[int, int, int, int]:
         """As :func:`march`; without leaps, whose polynomials are no Taylor steps."""
         clock[DUE] = math.inf
@@ -402,12 +425,13 @@ class _Past:
         count = len(steps.laps)
         self._forget(count)
         before = self.known
-        known = Steps._make([*(column[: before + count] for column in self.columns), steps.polys, steps.reach])
+        known = Steps._make(column[: before + count] for column in self.columns)
         outcome, self.known, mode = _march(
-            self.model, self.recalled, clock, state, big, mode, np.array(until), known, before, work
+            self.model, self.recalled, clock, state, big, mode, np.array(until), known, before, step
         )
         written = self.known - before
-        for column, own in zip(steps[:COLUMNS], self.columns, strict=True):
+        columns: Any = zip(steps, self.columns, strict=True)
+        for column, own in columns:
             column[:written] = own[before : self.known]
         return outcome, written, 0, mode
 
@@ -417,8 +441,9 @@ class _Past:
             return
         first = int(self.recalled.cursor[0])
         kept = self.known - first
-        grown: tuple[NDArray[Any], ...] = room_for(2 * (kept + count), self.columns[4].shape[1])[:COLUMNS]
-        for new, old in zip(grown, self.columns, strict=True):
+        grown = room_for(2 * (kept + count), self.columns.states.shape[1])
+        columns: Any = zip(grown, self.columns, strict=True)
+        for new, old in columns:
             new[:kept] = old[first : self.known]
         self.columns, self.known = grown, kept
         self.recalled.cursor[0] = 0
@@ -503,34 +528,17 @@ def _recall(model, past, steps, count, clock, state, big, step):
 
 
 @compiled(**EXACT)
-def _march(model, past, clock, state, big, mode, until, steps, count, work):
+def _march(model, past, clock, state, big, mode, until, steps, count, step):
     """As `march`, from edge to edge of the past; `count` steps are known, and new ones are put behind them."""
-    edge, cursor, exits, modes, ends = past.edge, past.cursor, model.exits, steps.modes, steps.ends
+    edge, cursor = past.edge, past.cursor
     while True:
         if cursor[1]:
-            _recall(model, past, steps, count, clock, state, big, work.step)
+            _recall(model, past, steps, count, clock, state, big, step)
             cursor[1] = 0
         first = _apart((edge[0], edge[1]), (until[0], until[1]), model.period) <= 0.0
         aim = (edge[0], edge[1]) if first else (until[0], until[1])
         clock[TRY] = min(clock[TRY], past.lag)  # at rest steps would grow for ever
-        free = Steps(
-            steps.laps[count:],
-            steps.offsets[count:],
-            steps.lengths[count:],
-            modes[count:],
-            steps.states[count:],
-            ends[count:],
-            steps.leaps[count:],
-            steps.polys,
-            steps.reach,
-        )
-        outcome, written, _, mode = march.march(model, clock, state, big, mode, aim, free, work)
-        if count > 0 and written > 0 and modes[count] != modes[count - 1] and ends[count - 1] < 0:
-            before = modes[count - 1]
-            for e in range(exits.first[before], exits.first[before + 1]):  # an exit due at the edge itself
-                if exits.target[e] == modes[count] or ends[count - 1] < 0:
-                    ends[count - 1] = e
-        count += written
+        outcome, count, mode = march.march(model, clock, state, big, mode, aim, steps, count, step)
         if outcome != DONE:
             return outcome, count, mode
         if first:

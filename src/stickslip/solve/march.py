@@ -29,7 +29,7 @@ from stickslip.solve.taylor import (
     woken,
 )
 
-DONE, FULL, CHATTER, STALL, UNPROVED = range(5)
+DONE, FULL, CHATTER, STALL, UNPROVED, STIFF = range(6)
 CHAIN = 16  # most transitions without time between them
 BRIEFEST = 1e-19  # of the time: a step below its rounding is one of many while a velocity falls to nothing
 LEAP = 40.0  # Taylor steps that a leap replaces, at least half of them: it costs as much as about 40
@@ -42,7 +42,7 @@ LAPS, TIME, TRY, REACH, STEADY, DUE = range(6)
 
 class Steps(NamedTuple):
     """Steps as they are written: start, length [s], mode, state at the start, exit (-1: none), number among the leaps
-    (-1: a Taylor step); and of each leap its polynomials and the time that they span [s]."""
+    (-1: a Taylor step)."""
 
     laps: Array
     offsets: Array
@@ -51,6 +51,11 @@ class Steps(NamedTuple):
     states: Array
     ends: NDArray[np.int16]
     leaps: Index
+
+
+class Leaps(NamedTuple):
+    """Leaps as they are written: their polynomials and the time that they span [s]."""
+
     polys: Array
     reach: Array
 
@@ -136,28 +141,6 @@ def _explicit(model, mode, h, u, big, step):
 
 
 @compiled(**EXACT)
-def _attempt(model, clock, state, big, mode, full, remaining, poly, work):
-    """Try a leap: how far its polynomials reach [s], how far they are followed (0: it failed), and to which exit.
-
-    `full` is the Taylor step that it replaces, in units of the clock's. The clock takes what to try next, and when.
-    """
-    h = clock[TRY]
-    clock[REACH] = LEAP * full * h if clock[REACH] == 0.0 else clock[REACH]
-    reach, ahead, leaving = min(clock[REACH], remaining), 0.0, -1
-    grow = leap(model, mode, h, state, big, reach, poly, work)
-    if grow >= 0.9:
-        w, leaving = landing(model, mode, big, work)
-        ahead = 0.5 * (w + 1.0) * reach
-        if ahead > 0.0:
-            clock[DUE] = PATIENCE
-    if not grow >= 0.9 or reach == clock[REACH]:
-        clock[REACH] = reach * max(grow, 0.2)
-    if ahead == 0.0 and (grow >= 0.9 or clock[REACH] < 0.5 * LEAP * full * h):
-        clock[REACH], clock[STEADY], clock[DUE] = 0.0, 0.0, min(2.0 * clock[DUE], 64.0 * PATIENCE)
-    return reach, ahead, leaving
-
-
-@compiled(**EXACT)
 def _remaining(clock, until, period):
     """Time [s] to an end (laps, time)."""
     remaining = until[1] - clock[TIME]
@@ -195,6 +178,15 @@ def _write(steps, row, clock, state, mode, ahead, leaving, which):
 
 
 @compiled(**EXACT)
+def _passed(model, clock, until, remaining, ahead, leaving, before, state, big):
+    """What else a step changes: the drive's tones since the state before, the largest values, and the clock."""
+    turn(model.tones, before, ahead, state)
+    for i in range(len(state)):
+        big[i] = max(big[i], abs(state[i]))
+    _arrived(clock, until, model, remaining, ahead, leaving, state)
+
+
+@compiled(**EXACT)
 def _carry_over(reset, state, before):
     """The state behind an exit; `before` is scratch."""
     for i in range(len(state)):
@@ -207,16 +199,29 @@ def _carry_over(reset, state, before):
 
 
 @compiled(**EXACT)
-def march(model, clock, state, big, mode, until, steps, work):
-    """Steps from `clock` to `until` (laps, time): the outcome, the steps written, the leaps among them, the mode."""
-    series = coded(model.series)
-    exits, step = model.exits, work.step
-    size, written, leapt, chain, tried = len(state), 0, 0, 0, 0
+def _left(model, clock, state, mode, h, leaving, ahead, steps, row, step):
+    """Leave a mode by an exit, after a step in units of h in the row before: the mode behind it."""
+    exits = model.exits
+    if exits.polished[leaving] and ahead > 0.0:
+        delay = _polish(model, exits.node[leaving], mode, h, state, step)
+        steps.lengths[row - 1] += delay
+        clock[TIME] += delay
+    if exits.carried[leaving]:
+        _carry_over(exits.reset[leaving], state, step.before)
+    clock[REACH], clock[STEADY] = 0.0, 0.0
+    return exits.target[leaving]
+
+
+@compiled(**EXACT)
+def march(model, clock, state, big, mode, until, steps, row, step):
+    """Taylor steps from `clock` to `until` (laps, time), written from a row on: the outcome, the row behind them, the
+    mode. STIFF where after many steps without event a leap is due, see :func:`strides`."""
+    series, exits, chain = coded(model.series), model.exits, 0
     while True:
         # Due: what is left, the series of a step, and how far it holds.
         remaining = _remaining(clock, until, model.period)
         if remaining <= 4e-16 * (clock[TIME] + clock[TRY]):
-            return DONE, written, leapt, mode
+            return DONE, row, mode
         h = clock[TRY]
         series(model.numbers, mode, state, h, step.s)
         full = length(step.s, step.order, big, model.tolerance)
@@ -225,80 +230,99 @@ def march(model, clock, state, big, mode, until, steps, work):
             series(model.numbers, mode, state, h, step.s)
             full = length(step.s, step.order, big, model.tolerance)
         stalled = not (full * h > BRIEFEST * (clock[TIME] + 1e-300)) or full <= 0.0
-        over = due(model.sums, exits, mode, h, big, step) if stalled else -1
-        if stalled and over < 0:
-            return STALL, written, leapt, mode
+        leaving = due(model.sums, exits, mode, h, big, step) if stalled else -1
+        if stalled and leaving < 0:
+            return STALL, row, mode
         clock[TRY] = clock[TRY] if stalled else h  # a mode that is left at once tells nothing of the next one's steps
-        if written == len(steps.laps) or tried == len(steps.polys):
-            return FULL, written, leapt, mode
-        # Certify: a leap after many steps without event, else the Taylor step, to the first exit at the most.
-        which, reach, ahead, leaving = -1, 0.0, 0.0, over
-        if over < 0 and clock[STEADY] >= clock[DUE]:
-            reach, ahead, leaving = _attempt(model, clock, state, big, mode, full, remaining, steps.polys[leapt], work)
-            tried += 1
-            which, leapt = (leapt, leapt + 1) if ahead > 0.0 else (-1, leapt)
-        if (
-            which < 0 and over < 0
-        ):  # also after a leap that failed: whatever made it fail, every round brings the march on
+        if row == len(steps.laps):
+            return FULL, row, mode
+        # Certify: to the first exit at the most.
+        ahead = 0.0
+        if leaving < 0:
+            if clock[STEADY] >= clock[DUE]:
+                return STIFF, row, mode
             u, leaving = _explicit(model, mode, h, min(full, remaining / h), big, step)
             if u < 0.0:
-                return UNPROVED, written, leapt, mode
+                return UNPROVED, row, mode
             ahead = u * h
             clock[STEADY] += 1.0
         # Step: write it down and carry the state on.
         if ahead > 0.0:
             chain = 0
-            _write(steps, written, clock, state, mode, ahead, leaving, which)
-            written += 1
-            if which < 0:
-                advance(step.s, step.order, ahead / h, state)
-            else:
-                for i in range(size):
-                    state[i] = at(steps.polys[which, i], 2.0 * ahead / reach - 1.0)
-                steps.reach[which] = reach
-            turn(model.tones, steps.states[written - 1], ahead, state)
-            for i in range(size):
-                big[i] = max(big[i], abs(state[i]))
+            _write(steps, row, clock, state, mode, ahead, leaving, -1)
+            advance(step.s, step.order, ahead / h, state)
             clock[TRY] = full * h
-            _arrived(clock, until, model, remaining, ahead, leaving, state)
+            _passed(model, clock, until, remaining, ahead, leaving, steps.states[row], state, big)
+            row += 1
         else:
-            if written > 0 and steps.ends[written - 1] < 0:
-                steps.ends[written - 1] = leaving
+            if row > 0 and steps.ends[row - 1] < 0:
+                steps.ends[row - 1] = leaving
             chain += 1
             if chain > CHAIN:
-                return CHATTER, written, leapt, mode
-        # Leave the mode.
+                return CHATTER, row, mode
         if leaving >= 0:
-            if exits.polished[leaving] and ahead > 0.0:
-                delay = _polish(model, exits.node[leaving], mode, h, state, step)
-                steps.lengths[written - 1] += delay
-                clock[TIME] += delay
-            if exits.carried[leaving]:
-                _carry_over(exits.reset[leaving], state, work.stages.moved)
-            mode = exits.target[leaving]
-            clock[REACH], clock[STEADY] = 0.0, 0.0
+            mode = _left(model, clock, state, mode, h, leaving, ahead, steps, row, step)
 
 
 @compiled(**EXACT)
-def course(model, clock, state, big, mode, stops, stop, longest, steps, work):
-    """As :func:`march`, on the way to stop `stop` of several (:class:`~stickslip.solve.tables.Stops`) and to those
+def _attempt(implicit, clock, state, big, mode, remaining, poly, work):
+    """Try a leap: how far its polynomials reach [s], how far they are followed (0: it failed), and to which exit.
+
+    The clock takes what to try next, and when: whatever made a leap fail, a Taylor step brings the march on.
+    """
+    h, full = clock[TRY], length(work.step.s, work.step.order, big, implicit.model.tolerance)
+    clock[REACH] = LEAP * full * h if clock[REACH] == 0.0 else clock[REACH]
+    reach, ahead, leaving = min(clock[REACH], remaining), 0.0, -1
+    grow = leap(implicit, mode, h, state, big, reach, poly, work)
+    if grow >= 0.9:
+        w, leaving = landing(implicit, mode, big, work)
+        ahead = 0.5 * (w + 1.0) * reach
+        if ahead > 0.0:
+            clock[DUE] = PATIENCE
+    if not grow >= 0.9 or reach == clock[REACH]:
+        clock[REACH] = reach * max(grow, 0.2)
+    if ahead == 0.0 and (grow >= 0.9 or clock[REACH] < 0.5 * LEAP * full * h):
+        clock[REACH], clock[STEADY], clock[DUE] = 0.0, 0.0, min(2.0 * clock[DUE], 64.0 * PATIENCE)
+    elif ahead == 0.0:
+        clock[STEADY] = clock[DUE] - 1.0
+    return reach, ahead, leaving
+
+
+@compiled(**EXACT)
+def strides(implicit, clock, state, big, mode, until, steps, row, leaps, leapt, work):
+    """As :func:`march`, with a leap where one is due, if it can be: also the number behind those written."""
+    model = implicit.model
+    while True:
+        outcome, row, mode = march(model, clock, state, big, mode, until, steps, row, work.step)
+        if outcome != STIFF:
+            return outcome, row, leapt, mode
+        if leapt == len(leaps.polys):
+            return FULL, row, leapt, mode
+        h, remaining, poly = clock[TRY], _remaining(clock, until, model.period), leaps.polys[leapt]
+        reach, ahead, leaving = _attempt(implicit, clock, state, big, mode, remaining, poly, work)
+        if ahead > 0.0:
+            _write(steps, row, clock, state, mode, ahead, leaving, leapt)
+            for i in range(len(state)):
+                state[i] = at(poly[i], 2.0 * ahead / reach - 1.0)
+            leaps.reach[leapt] = reach
+            clock[TRY] = h * length(work.step.s, work.step.order, big, model.tolerance)
+            _passed(model, clock, until, remaining, ahead, leaving, steps.states[row], state, big)
+            row, leapt = row + 1, leapt + 1
+            if leaving >= 0:
+                mode = _left(model, clock, state, mode, h, leaving, ahead, steps, row, work.step)
+
+
+@compiled(**EXACT)
+def course(implicit, clock, state, big, mode, stops, stop, longest, steps, leaps, work):
+    """As :func:`strides`, on the way to stop `stop` of several (:class:`~stickslip.solve.tables.Stops`) and to those
     behind it; returns also the stop that it is on its way to. A Taylor step is at most `longest` [s] to begin with: at
     rest steps would grow for ever."""
-    written, leapt = 0, 0
+    row, leapt = 0, 0
     while True:
         until = (stops.ends[stop, 0], stops.ends[stop, 1])
-        rest = Steps(
-            steps.laps[written:], steps.offsets[written:], steps.lengths[written:], steps.modes[written:],
-            steps.states[written:], steps.ends[written:], steps.leaps[written:], steps.polys[leapt:],
-            steps.reach[leapt:],
-        )  # fmt: skip
-        outcome, count, leaps, mode = march(model, clock, state, big, mode, until, rest, work)
-        for row in range(written, written + count):
-            if steps.leaps[row] >= 0:
-                steps.leaps[row] += leapt
-        written, leapt = written + count, leapt + leaps
+        outcome, row, leapt, mode = strides(implicit, clock, state, big, mode, until, steps, row, leaps, leapt, work)
         if outcome != DONE or stop + 1 == stops.ends.shape[0]:
-            return outcome, written, leapt, mode, stop
+            return outcome, row, leapt, mode, stop
         stop += 1
         for j in range(stops.places.shape[0]):
             state[stops.places[j]] = stops.values[stop, j]
@@ -306,13 +330,13 @@ def course(model, clock, state, big, mode, stops, stop, longest, steps, work):
 
 
 @compiled(**EXACT)
-def rests(model, mode, state, s):
+def rests(series, numbers, mode, state, step):
     """Whether nothing moves."""
-    series = coded(model.series)
-    series(model.numbers, mode, state, 1.0, s)
+    code = coded(series)
+    code(numbers, mode, state, 1.0, step.s)
     most = 0.0
     for i in range(len(state)):
-        most = max(most, abs(s[i * (model.order + 1) + 1]))
+        most = max(most, abs(step.s[i * (step.order + 1) + 1]))
     return most == 0.0
 
 

@@ -101,17 +101,18 @@ class Guards(NamedTuple):
 
 class Step(NamedTuple):
     """The series of a Taylor step: coefficient k of node j stands at j (order + 1) + k of `s`; and room for the
-    polynomial of an exit with the noise of each coefficient."""
+    polynomial of an exit with the noise of each coefficient, and for a state."""
 
     s: Array
     c: Array
     noise: Array
+    before: Array
     order: int
 
 
-def room(nodes: int, order: int) -> Step:
-    """Room for the series of so many nodes."""
-    return Step(np.zeros(nodes * (order + 1)), np.zeros(order + 1), np.zeros(order + 1), order)
+def room(nodes: int, order: int, size: int) -> Step:
+    """Room for the series of so many nodes, of a state of so many entries."""
+    return Step(np.zeros(nodes * (order + 1)), np.zeros(order + 1), np.zeros(order + 1), np.zeros(size), order)
 
 
 @compiled(**EXACT)
@@ -194,7 +195,7 @@ def waking(kind, at, asleep):
 @compiled(**EXACT)
 def woken(kind, a, u, asleep, step):
     """The step, shortened to where a sleeping function wakes: its series does not know of it until then; -1: unsure."""
-    s, c, noise, order = step
+    s, c, noise, order = step.s, step.c, step.noise, step.order
     level, sign = waking(kind, s[a], asleep)
     if surely_below(s, a, order - 1, sign, -level, u):
         return u
@@ -250,7 +251,7 @@ def due(sums, exits, mode, h, big, step):
 @compiled(**EXACT)
 def rise(sums, exits, e, mode, h, u, big, step):
     """When an exit ends the mode, in units of h, up to u; infinite where it does not, -1 where nothing is proved."""
-    s, c, noise, order = step
+    s, c, noise, order = step.s, step.c, step.noise, step.order
     node, scale, size = exits.node[e], exits.factor[e], len(big)
     row, rates = len(sums.constant) - len(exits.node) + e, mode * size
     j, low = node * (order + 1), 0
