@@ -35,7 +35,6 @@ SIDES = ("sliding friction forward", "sliding friction back", "static friction f
 NAMES = (LEVEL, FALL, SHARE, STOPS, RATIO, *SIDES, OFFSET, ENERGY, GIVES)
 CLAIMS = ("dry friction", "static", "sticks", "gives way", "falls or rises with speed")
 UNTOLD = {  # what has no true value of its own
-    "Stribeck": (FALL,),
     "compliant": (SHARE, STOPS, ENERGY),
     "LuGre": (FALL, SHARE, STOPS, ENERGY),
     "state variable": (FALL, SHARE, STOPS, RATIO, *SIDES[2:], ENERGY),
@@ -80,7 +79,7 @@ def counted(findings: ss.answers.Findings, rig: stepped.Rig, tally: dict[str, li
         if estimate.name == LEVEL and low > 0:
             note("claim: dry friction", rig.kinetic > 0, estimate)
         if estimate.name == FALL and not low <= 0 <= high:
-            note("claim: falls or rises with speed", truth.get(FALL, 0.0) > 0 or rig.speed > 0, estimate)
+            note("claim: falls or rises with speed", findings.record.truth[FALL] * (low + high) > 0, estimate)
     return wrong
 
 

@@ -191,9 +191,11 @@ def record(rig: Rig, rng: np.random.Generator, *, noise: float = 1e-3, cycles: i
     }
     fast = np.abs(v)[np.abs(v) > 0.2 * np.abs(v).max()]
     level = rig.friction(float(fast.mean()))
+    about = fast - fast.mean()
+    slope = rig.slope + float(about @ [rig.friction(speed) for speed in fast] / (about @ about))
     power = [rig.friction(abs(one)) * abs(one) + rig.slope * one * one for one in v]
     truth: dict[str, Any] = {
-        "sliding friction": level, "slope of friction against speed": rig.slope,
+        "sliding friction": level, "slope of friction against speed": slope,
         "stuck share of the time": held * fs / samples, "stops per cycle": stops / cycles,
         "static over sliding friction": max(1.0, rig.static / level) if rig.kinetic else np.nan,
         "energy per cycle": float(np.mean(power)) / rig.frequency,

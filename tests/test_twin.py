@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import pickle
 import re
 from dataclasses import replace
@@ -30,6 +31,7 @@ STOPS = stepped.Rig("Coulomb", 2.0, 800.0, 1.0, 4e-3, 1.6, kinetic=0.5 * PULL)
 BEARS = stepped.Rig("static", 2.0, 800.0, 1.0, 4e-3, 1.6, kinetic=0.3 * PULL, static=0.45 * PULL)
 DAMPED = stepped.Rig("viscous", 2.0, 800.0, 1.0, 4e-3, 3.0, slope=12.0)
 FALLS = stepped.Rig("Stribeck", 2.0, 800.0, 1.0, 4e-3, 1.6, kinetic=0.3 * PULL, static=0.45 * PULL, speed=4e-3)
+FADES = replace(FALLS, frequency=3.9, kinetic=0.1 * PULL, static=0.2 * PULL, speed=0.04)  # never stops
 YIELDS = stepped.Rig("compliant", 2.0, 800.0, 1.0, 4e-3, 2.4, kinetic=0.3 * PULL, contact=8000.0)
 
 
@@ -127,6 +129,16 @@ def test_the_work_of_friction_is_that_of_the_rig(rig: stepped.Rig) -> None:
     _, tried = asked(rig)
     energy = tried.loops.energy_per_cycle
     assert energy.value == pytest.approx(tried.record.truth["energy per cycle"], rel=2e-3)
+
+
+def test_friction_that_falls_along_a_curve_has_the_slope_of_the_line_nearest_to_it() -> None:
+    """It was zero, within 0.04 and without a doubt: the curve was taken for no change with speed."""
+    _, tried = asked(FADES)
+    assert math.isfinite(tried.trial.belief.fall_speed)
+    slope, true = tried.loops.slope, tried.record.truth["slope of friction against speed"]
+    assert true < -0.4
+    assert slope.includes(true)
+    assert slope.interval[1] < 0.8 * true
 
 
 def test_a_slope_three_times_as_large_as_would_be_felt_is_found() -> None:

@@ -71,7 +71,8 @@ class Loops(Result):
     offset : Estimate
         Half of `forward` less `back`: a constant force in the record (a drift, a tilt), or an uneven contact.
     slope : Estimate
-        Change of the sliding friction's magnitude with speed; negative where friction falls with speed.
+        Change of the sliding friction's magnitude with speed, negative where friction falls with speed: along a curve,
+        the slope of the line nearest to it over the speeds at which it slides.
     energy_per_cycle : Estimate
         ``closed integral of f dx`` [J].
     frequency : Estimate

@@ -207,17 +207,17 @@ def _of_loops(findings: Findings) -> Iterator[str]:
             f"{value_of(findings.coefficient)}."
         )
     yield from _of_directions(loops.forward, loops.back)
+    low, high = loops.slope.interval
+    changes = loops.slope.status == "ok" and (low > 0 or high < 0)
     falls = findings.trial is not None and math.isfinite(findings.trial.belief.fall_speed)
     if falls:
         belief = findings.trial.belief
         static, speed = value_of(loops.level, belief.static), number(belief.fall_speed, 0.1 * belief.fall_speed, "m/s")
-        yield f"Friction falls from {static} at rest as it begins to slide, about a speed of {speed}."
-    low, high = loops.slope.interval
-    if loops.slope.status != "ok":
-        return
-    if low > 0 or high < 0:
+        line = f"; over the speeds at which it slides its slope is {value_of(loops.slope)}" if changes else ""
+        yield f"Friction falls from {static} at rest as it begins to slide, about a speed of {speed}{line}."
+    elif changes:
         yield f"Friction {'rises' if low > 0 else 'falls'} with speed, by {value_of(loops.slope)}."
-    elif math.isfinite(low + high):
+    if loops.slope.status == "ok" and not changes and math.isfinite(low + high):
         power = findings.trial and findings.trial.felt.get(loops.slope.name)
         seen = f": {value_of(loops.slope, power.felt)} would be" if power else ""
         yield f"No {'other ' if falls else ''}change of friction with speed is resolved{seen}."

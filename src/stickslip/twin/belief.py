@@ -140,14 +140,24 @@ class Belief:
         return self.values.get(SLOPE, 0.0)
 
     @property
+    def mean_slope(self) -> float:
+        """Of the line nearest to friction over the speeds at which it slides [N s/m]."""
+        speed = self._sliding_speeds
+        about = speed - speed.mean()
+        return self.slope + float(about @ self._fall(speed) / (about @ about))
+
+    @property
     def kinetic(self) -> float:
         """Friction at the mean speed at which it slides [N]; a slope that rises is a damper's and no dry friction."""
-        values, speed = self.values, self.sliding_speed
-        curve = 0.0
-        if SPEED in values:
-            exponent = math.exp(values[POWER]) if POWER in values else GAUSS
-            curve = values.get(EXCESS, 0.0) * math.exp(-((speed / math.exp(values[SPEED])) ** exponent))
-        return values.get(KINETIC, 0.0) + curve + min(0.0, self.slope) * speed
+        speed = self.sliding_speed
+        return self.values.get(KINETIC, 0.0) + float(self._fall(speed)) + min(0.0, self.slope) * speed
+
+    def _fall(self, speed: Array | float) -> Array | float:
+        """What is left of a Stribeck curve's static excess at a speed [N]."""
+        if SPEED not in self.values:
+            return 0.0 * speed
+        exponent = math.exp(self.values[POWER]) if POWER in self.values else GAUSS
+        return self.values.get(EXCESS, 0.0) * np.exp(-((speed / math.exp(self.values[SPEED])) ** exponent))
 
     @property
     def falls(self) -> bool:
@@ -196,8 +206,12 @@ class Belief:
     @property
     def sliding_speed(self) -> float:
         """The mean speed at which it slides [m/s]."""
+        return float(self._sliding_speeds.mean())
+
+    @property
+    def _sliding_speeds(self) -> Array:
         speed = np.abs(self.record["v"])
-        return float(speed[speed > SLIDES * speed.max()].mean())
+        return np.asarray(speed[speed > SLIDES * speed.max()])
 
     def at(self, **values: float) -> Belief:
         """The same with other values."""

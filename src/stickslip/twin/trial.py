@@ -33,7 +33,7 @@ OFFSET, ENERGY = "friction offset", "energy per cycle"
 # What the displacement tells through the equation of motion; below, what is asked of the twins as of the record.
 FITTED: dict[str, Callable[[Belief], float]] = {
     LEVEL: lambda rig: rig.kinetic,
-    FALL: lambda rig: rig.slope,
+    FALL: lambda rig: rig.mean_slope,
     STATIC[0]: lambda rig: rig.static,
     STATIC[1]: lambda rig: rig.static,
     RATIO: lambda rig: rig.ratio,
@@ -43,7 +43,7 @@ COMPLIANCE = "compliance"
 # What a part of friction is told by, what that is without it, and its value.
 PARTS: dict[str, tuple[str, float, Callable[[Belief], float]]] = {
     LEVEL: (KINETIC, 0.0, lambda rig: rig.kinetic),
-    FALL: (SLOPE, 0.0, lambda rig: rig.slope),
+    FALL: (SLOPE, 0.0, lambda rig: rig.slope),  # beside a curve: any other change with speed
     RATIO: (EXCESS, 1.0, lambda rig: rig.ratio),
     COMPLIANCE: (GIVE, 0.0, lambda rig: 1 / rig.contact),
 }
