@@ -21,12 +21,29 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 import joints
 import stickslip as ss
+from stickslip.cycle.joint_fit import SURELY
 
-TOLD = ("level", "forward", "back", "load", "viscous", "inertia", "damping", "backlash")
+TOLD = ("level", "forward", "back", "load", "viscous", "inertia", "damping", "backlash", "warming", "thinning")
 
 PLAYING = ("play", "play without gravity")
 ALONE = ("link alone", "motor alone")
-KINDS = ("torque", "controller", "torque alone", *PLAYING, *ALONE)
+IDLE = "idle temperature"  # of joints whose friction does not follow it
+KINDS = ("torque", "controller", "torque alone", "warming", IDLE, *PLAYING, *ALONE)
+
+
+ALSO = {"backlash": "play", "warming": "warming", "thinning": "thinning"}
+
+
+def idle(record: ss.Record, seed: int) -> np.ndarray:
+    """A temperature [K] that warms up, wanders, or swings, in counts of 0.1 K."""
+    chance, share = np.random.default_rng([seed, 9]), np.linspace(0, 1, len(record))
+    if seed % 3 == 0:
+        hot = chance.uniform(3, 25) * (1 - np.exp(-share / chance.uniform(0.2, 2)))
+    elif seed % 3 == 1:
+        hot = np.cumsum(chance.standard_normal(len(record))) * 5 / np.sqrt(len(record))
+    else:
+        hot = chance.uniform(2, 8) * np.sin(2 * np.pi * chance.uniform(0.5, 4) * share + chance.uniform(0, 6))
+    return np.round(hot / 0.1) * 0.1 + 300
 
 
 def truths(joint: joints.Joint, time: np.ndarray) -> dict[str, float]:
@@ -36,14 +53,14 @@ def truths(joint: joints.Joint, time: np.ndarray) -> dict[str, float]:
         **{name: true[name] for name in ("forward", "back", "load", "viscous", "inertia")},
         "damping": true["kd"] - true["kp"] * joints.PERIOD / 2,
         "level": joint.level(time),
-        "backlash": true.get("play", 0.0),
+        **{name: true.get(of, 0.0) for name, of in ALSO.items()},
     }  # fmt: skip
 
 
 Found = tuple[ss.cycle.JointFriction, ss.cycle.JointBacklash | None]
 
 
-def asked(joint: joints.Joint, kind: str) -> Found:
+def asked(joint: joints.Joint, kind: str, seed: int) -> Found:
     """What is said of one joint, and of its play."""
     record, written = joint.record, dict(joint.record.samples)
     if kind == "motor alone":
@@ -53,6 +70,8 @@ def asked(joint: joints.Joint, kind: str) -> Found:
         del written[left_out]
         units = {name: record.channels[name].unit for name in written}
         record = ss.Record.of(written, fs=record.fs, units=units).with_details("force", gain_sd=joints.GAIN)
+    if kind == IDLE:
+        record = record.with_channel("temperature", idle(record, seed), unit="K")
     regression = ss.cycle.regress_joint(record, **({"kp": joint.kp} if kind == "controller" else {}))
     if kind in PLAYING:
         with contextlib.suppress(ss.errors.EstimateError):
@@ -70,16 +89,21 @@ def main() -> None:
     for kind in options.kinds.split(","):
         held: dict[str, list[float]] = {name: [] for name in TOLD}
         wide: dict[str, list[float]] = {name: [] for name in TOLD}
+        changes: dict[str, list[tuple[bool, bool]]] = {"warming": [], "thinning": []}
         refused, spent, claims = 0, list[float](), list[tuple[bool, bool]]()
         for seed in range(options.first, options.first + options.draws):
             joint = joints.drawn(
-                seed, torque=kind != "controller", play=kind in PLAYING + ALONE, loaded=kind != "play without gravity"
+                seed,
+                torque=kind != "controller",
+                play=kind in PLAYING + ALONE,
+                loaded=kind != "play without gravity",
+                warming=kind == "warming",
             )
             if kind in ALONE and not joint.truth["play"]:
                 continue
             begun = time.process_time()
             try:
-                found, teeth = asked(joint, kind)
+                found, teeth = asked(joint, kind, seed)
             except ss.StickslipError as error:
                 refused += 1
                 if options.misses:
@@ -94,8 +118,10 @@ def main() -> None:
                 if estimate is None or not estimate.known or not ss.estimate.stands(estimate.status):
                     continue
                 held[name].append(estimate.includes(true[name]))
+                if name in changes:
+                    changes[name].append((true[name] != 0, abs(estimate.value) > SURELY * estimate.sd))
                 if true[name]:
-                    wide[name].append((estimate.interval[1] - estimate.interval[0]) / 2 / true[name])
+                    wide[name].append((estimate.interval[1] - estimate.interval[0]) / 2 / abs(true[name]))
                 if options.misses and not held[name][-1] and name in ("level", "load", "backlash"):
                     print(f"{seed} {joint.servo} {joint.record.fs:.0f} Hz: {true[name]:.4g}, {estimate}")
         print(f"{kind}: {len(spent)} of {len(spent) + refused} answered, {np.mean(spent):.2f} s each")
@@ -103,6 +129,14 @@ def main() -> None:
             if held[name]:
                 half = f", half width {np.median(wide[name]):.1%}" if wide[name] else ""
                 print(f"  {name:9} held {np.mean(held[name]):6.1%} of {len(held[name])}{half}")
+        for name in ("warming", "thinning"):
+            if changes[name]:
+                claimed = (
+                    [sure for there, sure in changes[name] if there],
+                    [s for there, s in changes[name] if not there],
+                )
+                print(f"  {name} claimed of {sum(claimed[0])} of {len(claimed[0])}, where there is none of "
+                      f"{sum(claimed[1])} of {len(claimed[1])}")  # fmt: skip
         for there in (True, False) if claims else ():
             rightly = [claimed for play, claimed in claims if play == there]
             print(f"  play claimed of {sum(rightly)} of {len(rightly)} joints with{'' if there else 'out'} any")

@@ -26,6 +26,8 @@ SERVOS = {
 }  # fmt: skip
 
 PLAY = np.radians([0.05, 1.5])  # of gears, from those of robots to those of toys
+COLD = np.zeros(1)  # a temperature that never changes
+WARMER = (3.0, 25.0)  # K, by which a joint warms up within its log
 PERIOD = 1e-3  # s, for which the controller holds its output
 
 
@@ -56,12 +58,21 @@ class Joint:
         """Mean of both directions' sliding friction [N m] at vanishing speed, under the mean load at some times."""
         place = self.record["theta"][np.rint(time * self.record.fs).astype(int)]
         load = np.abs(self.truth["sine"] * np.sin(place) + self.truth["cosine"] * np.cos(place))
-        return (self.truth["forward"] + self.truth["back"]) / 2 + self.truth["load"] * float(load.mean())
+        level = (self.truth["forward"] + self.truth["back"]) / 2 + self.truth["load"] * float(load.mean())
+        return level + self.truth.get("warming", 0.0) * self.warmer(time)
+
+    def warmer(self, time: np.ndarray) -> float:
+        """By how much it was warmer at some times than in the mean of the log [K], of which the truth is told."""
+        warm = self.record["temperature"] if "temperature" in self.record else np.zeros(len(self.record))
+        return float(warm[np.rint(time * self.record.fs).astype(int)].mean() - warm.mean())
 
 
 @numba.njit
-def march(p, reference, slope, steps, count, control):  # type: ignore[no-untyped-def]
-    """Angle and motor torque at each sample of a reference that is known at `steps` instants a sample."""
+def march(p, reference, slope, steps, count, control, warm=COLD, per_kelvin=(0.0, 0.0)):  # type: ignore[no-untyped-def]
+    """Angle and motor torque at each sample of a reference that is known at `steps` instants a sample.
+
+    `warm` is a temperature at each sample, less its mean; `per_kelvin` what Coulomb and viscous friction grow by.
+    """
     inertia, forward, back, share, viscous, sine, cosine, kp, kd, static, excess_speed = p
     samples = (reference.shape[0] - 1) // steps
     dt = 1.0 / (control * steps)
@@ -73,9 +84,10 @@ def march(p, reference, slope, steps, count, control):  # type: ignore[no-untype
         if i % steps == count // 2:  # in the middle of what the controller holds
             angle[i // steps], torque[i // steps] = q, motor
         load = sine * np.sin(q) + cosine * np.cos(q)
-        level = (forward if v > 0 or (v == 0 and motor > load) else back) + share * abs(load)
+        hot = warm[i // steps] if len(warm) > 1 else 0.0
+        level = (forward if v > 0 or (v == 0 and motor > load) else back) + share * abs(load) + per_kelvin[0] * hot
         level *= 1 + (static - 1) * np.exp(-((v / excess_speed) ** 2))
-        free = v + dt * (motor - load - viscous * v) / inertia
+        free = v + dt * (motor - load - (viscous + per_kelvin[1] * hot) * v) / inertia
         most = dt * level / inertia
         v = free - most if free > most else free + most if free < -most else 0.0
         q += dt * v
@@ -148,9 +160,14 @@ def _reference(kind: str, time: np.ndarray, chance: np.random.Generator) -> np.n
     return moved
 
 
-def drawn(seed: int, *, torque: bool, seconds: float = 30.0, loaded: bool = True, play: bool = False) -> Joint:
+def drawn(
+    seed: int, *, torque: bool, seconds: float = 30.0, loaded: bool = True, play: bool = False,
+    warming: bool = False,
+) -> Joint:  # fmt: skip
     """A joint by chance, about one of the seven servos; with the motor's torque logged, or positions alone.
 
+    With `warming` it warms up, as one does that is switched on: Coulomb friction falls by up to 1.5 % per kelvin,
+    viscous friction by up to 3 %, of a third of them neither; logged in counts of 0.1 or 1 K.
     With `play` its teeth have some (a third of them none), and both the motor and the link have an encoder.
     """
     chance = np.random.default_rng([seed, torque, loaded])
@@ -180,6 +197,14 @@ def drawn(seed: int, *, torque: bool, seconds: float = 30.0, loaded: bool = True
         turned, angle, motor = march_slack(p, slack, reference, way, steps, count, fs)
         size = 2 * np.pi / 2 ** int(chance.integers(10, 15))
         written["motor"] = np.round(truth["ratio"] * turned / size) * size
+    elif warming:
+        heat = np.random.default_rng([seed, 7])
+        at = np.arange(int(seconds * fs)) / fs
+        hot = heat.uniform(*WARMER) * -np.expm1(-at / (seconds * heat.uniform(0.2, 2.0)))
+        falls = heat.uniform(0, 1, 2) * (0.015 * coulomb, 0.03 * viscous) * heat.choice([0.0, 1.0, 1.0])
+        truth["warming"], truth["thinning"] = -falls
+        angle, motor = march(p, reference, way, steps, count, fs, hot - hot.mean(), (-falls[0], -falls[1]))
+        written["temperature"] = 298.15 + np.round(hot / (step := heat.choice([0.1, 0.1, 1.0]))) * step
     else:
         angle, motor = march(p, reference, way, steps, count, fs)
     size = 2 * np.pi / 2 ** int(chance.integers(8, 17))

@@ -13,7 +13,8 @@ import joints
 import stickslip as ss
 from stickslip.answers import analyze_joint, axis_record
 from stickslip.cli.program import main
-from stickslip.cycle import joint_backlash, joint_breakaway, regress_joint
+from stickslip.cycle import joint_backlash, joint_breakaway, regress_joint, regress_joint_logs
+from stickslip.cycle.joint_fit import SURELY
 from stickslip.errors import EstimateError, ModelError, RecordError
 from stickslip.estimate import kinds, stands
 from stickslip.figures.law import plot_joint
@@ -75,6 +76,76 @@ def test_intervals_hold_on_joints_of_another_integrator(kind, draws, least):
         held += [each.includes(value) for each, value in pairs if each is not None and stands(each.status)]
     assert len(held) > 2 * draws
     assert np.mean(held) >= least
+
+
+@pytest.mark.parametrize(("draws", "least"), [(12, 0.75), pytest.param(250, 0.91, marks=pytest.mark.soak)])
+def test_friction_over_the_temperature_is_told_or_left_alone(draws, least):
+    """Of joints that warm up, with friction that falls or does not; `least` is three binomial deviations below 95 %."""
+    held, claimed = [], []
+    for seed in range(draws):
+        joint = joints.drawn(seed, torque=True, warming=True)
+        try:
+            regression = regress_joint(joint.record)
+        except EstimateError:
+            continue
+        if regression.warming is None:
+            continue
+        for name in ("warming", "thinning"):
+            estimate, true = getattr(regression, name), joint.truth[name]
+            held.append(estimate.includes(true))
+            if not true:
+                claimed.append(abs(estimate.value) > SURELY * estimate.sd)
+    assert np.mean(held) > least
+    assert np.mean(claimed) <= 0.01
+
+
+def warmed(seed=0, *, falls=(0.0, 0.0), begins=25.0, ends=45.0, name="temperature", unit="degC"):
+    """A log whose joint warms up, its friction told at 35 degrees."""
+    q, v, a = motion()
+    hot = np.linspace(begins, ends, q.size)
+    force = torque(q, v, a) + (falls[0] * np.sign(v) + falls[1] * v) * (hot - 35.0)
+    force += 0.01 * np.random.default_rng(seed).standard_normal(q.size)
+    samples = {"theta": q, "force": force, name: np.round(hot, 1)}
+    return ss.Record.of(samples, fs=200.0, units={"force": "N m", **({name: unit} if unit else {})})
+
+
+def test_friction_over_a_temperature_in_degrees_celsius():
+    log = warmed(falls=(-0.001, -0.0004))
+    assert log.channels["temperature"].unit == "K"
+    regression = regress_joint(log)
+    assert regression.temperature == pytest.approx(308.15, abs=0.5)
+    assert regression.warming.unit == "N m/K"
+    assert regression.warming.includes(-0.001)
+    assert regression.thinning.includes(-0.0004)
+    assert regression.forward.includes(0.07)
+    assert regression.viscous.includes(0.03)
+    story = "\n".join(line for line in map(str, ss.summary(analyze_joint(log)).headline))
+    assert "With the temperature its Coulomb friction changes by -0.00097 N m/K" in story
+    steady = "\n".join(map(str, ss.summary(analyze_joint(warmed())).headline))
+    assert "No change of its Coulomb friction with the temperature is told" in steady
+
+
+def test_a_temperature_that_hardly_changes_tells_nothing():
+    assert regress_joint(warmed(begins=35.0, ends=35.1)).warming is None
+    assert regress_joint(warmed(begins=35.0, ends=35.0)).warming is None
+
+
+def test_a_cold_log_and_a_warm_one_tell_the_temperature_together():
+    cold, warm = (warmed(seed, falls=(-0.001, -0.0004), begins=at, ends=at) for seed, at in enumerate((20.0, 50.0)))
+    together = regress_joint_logs([cold, warm])
+    assert together.warming.includes(-0.001)
+    assert together.warming.sd < 1e-4
+    assert together.thinning.includes(-0.0004)
+
+
+def test_a_robots_temperature_is_in_degrees_celsius_unless_it_says():
+    q, v, a = motion()
+    samples = {"position": q, "effort": torque(q, v, a), "present_temperature": np.linspace(30, 40, q.size)}
+    written = axis_record(ss.Record.of(samples, fs=200.0, units={"position": "rad", "effort": "N m"}))
+    assert written["temperature"][0] == pytest.approx(303.15)
+    two = axis_record(ss.Record.of({**samples, "motor_temperature": np.linspace(30, 50, q.size)}, fs=200.0,
+                      units={"position": "rad", "effort": "N m"}))  # fmt: skip
+    assert "temperature" not in two
 
 
 def test_constants_that_are_stated_go_through():

@@ -42,7 +42,7 @@ _CONCISE = re.compile(r"([-+]?[0-9]+\.?([0-9]*))\(([0-9]*\.?[0-9]+)\)(?:[eE]([-+
 
 @dataclass(frozen=True)
 class Unit:
-    """A unit as written, and what turns its numbers into SI: ``si_value = scale * value``.
+    """A unit as written, and what turns its numbers into SI: ``si_value = scale * value + zero``.
 
     Attributes
     ----------
@@ -52,6 +52,8 @@ class Unit:
         Factor to SI.
     si : str
         Name of the SI unit, spelled in one way throughout ("m/s^2", "N s/m", "1").
+    zero : float
+        What a reading of nothing is in SI: of a temperature in Celsius 273.15 K.
 
     Raises
     ------
@@ -62,6 +64,7 @@ class Unit:
     text: str
     scale: float
     si: str
+    zero: float = 0.0
 
     def __post_init__(self) -> None:
         if not math.isfinite(self.scale) or self.scale == 0:
@@ -112,6 +115,12 @@ _TABLE: dict[str, tuple[float, str]] = {
     **_prefixed("V", "V", 1.0, "mu"), "volt": (1.0, "V"), "volts": (1.0, "V"), **_prefixed("A", "A", 1.0, "m"),
 }  # fmt: skip
 
+# Temperatures on scales of their own, where a temperature is wanted: elsewhere they are no multiple of an SI unit.
+_SCALES = {
+    **dict.fromkeys(("°C", "degC", "celsius", "Celsius"), (1.0, 273.15)),
+    **dict.fromkeys(("°F", "degF"), (5 / 9, 459.67 * 5 / 9)),
+}  # fmt: skip
+
 # What a bare symbol means depends on what is measured: pint reads "g" as gram, "G" as gauss, "lb" as mass.
 _BY_QUANTITY = {
     ("g", "m/s^2"): "g0", ("lb", "N"): "lbf", ("lbs", "N"): "lbf", ("kg", "N"): "kgf", ("lb", "kg"): "lbm",
@@ -150,7 +159,8 @@ def parse_unit(text: str, expect: str | None = None) -> Unit:
     Raises
     ------
     RecordError
-        The unit is unknown, is no multiple of an SI unit (degC, dB), or measures something else than expected.
+        The unit is unknown, is no multiple of an SI unit (dB; degC, unless "K" is expected), or measures
+        something else than expected.
 
     Examples
     --------
@@ -162,6 +172,8 @@ def parse_unit(text: str, expect: str | None = None) -> Unit:
         name = _BY_QUANTITY.get((name, expect), name)
     if name not in _TABLE and re.fullmatch(r"[A-Z][a-z]{2,}", name):  # a word: Volts, Newtons
         name = name.lower()
+    if expect == "K" and text.strip() in _SCALES:
+        return Unit(text, _SCALES[text.strip()][0], "K", _SCALES[text.strip()][1])
     known = _TABLE.get(name) or _by_pint(name)
     if known is None:
         raise RecordError(
@@ -212,7 +224,8 @@ def parse_value(text: str | float, expect: str) -> float:
             "a number is written with a point",
             f"write {stated.replace(',', '.', 1)}",
         )
-    value = float(match[1]) * (parse_unit(match[2], expect).scale if match[2] else 1.0) if match else math.nan
+    unit = parse_unit(match[2], expect) if match and match[2] else Unit(expect, 1.0, expect)
+    value = float(match[1]) * unit.scale + unit.zero if match else math.nan
     if not math.isfinite(value):
         raise RecordError(
             f"'{stated[:LONGEST_VALUE]}' is not a finite number",

@@ -28,6 +28,7 @@ from stickslip.settings import nearest
 from stickslip.signals.derivatives import differentiate
 from stickslip.signals.interpolate import without_delays
 from stickslip.statistics import mean_of_cycles
+from stickslip.units import parse_unit
 
 # A joint has no twins: swept through its turns without a rest it was told to stand still 1.0 to 2.3 % of the time.
 TURNS = Doubt("a joint that never rests may seem to stand still as well where it turns", UNTRIED)
@@ -44,17 +45,18 @@ NAMES = {
     ),
     "motor": ("motor position", "motor angle", "rotor position", "rotor angle"),
     "force": ("motor torque", "joint torque", "actuator force", "qfrc actuator", "effort", "torque", "tau", "force"),
+    "temperature": ("present temperature", "motor temperature", "joint temperature", "temperature"),
     "current": ("present current", "motor current", "actual current", "joint current", "current"),
 }  # fmt: skip
 OTHERS = {
-    "velocity", "velocities", "vel", "qvel", "speed", "acceleration", "accelerations", "acc", "temperature", "voltage",
+    "velocity", "velocities", "vel", "qvel", "speed", "acceleration", "accelerations", "acc", "voltage",
     "pwm", "load", "error",
 }  # fmt: skip
 WANTED = {
     "goal", "target", "desired", "command", "commands", "commanded", "cmd", "reference", "action", "output",
 }  # fmt: skip  # of a torque: not measured
 SOURCES = {"state", "states", "feedback"}  # who says it, not of which axis
-TURNING = {"theta": "rad", "reference": "rad", "motor": "rad", "force": "N m", "current": "A"}
+TURNING = {"theta": "rad", "reference": "rad", "motor": "rad", "force": "N m", "current": "A", "temperature": "K"}
 
 
 def analyze_joint(
@@ -124,7 +126,11 @@ def analyze_joint(
     sticks = inquiry.ask("Sticks and slips", partial(find_sticks, whole, method="speed"), aside=True)
     results = {"joint": joint, "breakaway": breakaway, "backlash": backlash}
     results["sticks"] = with_doubt(sticks, TURNS)
-    assumed = {key: channel.unit for key, channel in log.channels.items() if channel.assumed and key != "motor"}
+    assumed = {
+        key: channel.unit
+        for key, channel in log.channels.items()
+        if channel.assumed and key not in ("motor", "temperature")
+    }
     unstated = [f"{key} is read as {unit}" for key, unit in assumed.items()]
     if unstated:
         doubt = f"nobody stated a unit: {' and '.join(unstated)}"
@@ -330,6 +336,8 @@ def _renamed(record: Record, columns: list[_Column], axis: str) -> Record:
     straight = any(record.channels[column.channel].unit == "m" for column in columns)
     for kind in TURNING:
         fitting = [column for column in columns if column.kind == kind]
+        if kind == "temperature" and len(fitting) > 1:  # of what, nobody said: the friction is told without
+            continue
         if len(fitting) > 1:
             raise RecordError(
                 f"{' and '.join(called(record, column.channel) for column in fitting)} both tell the {kind}",
@@ -341,6 +349,11 @@ def _renamed(record: Record, columns: list[_Column], axis: str) -> Record:
             name = "x" if straight and kind == "theta" else kind
             usual = TURNING[kind].replace("rad", "m").replace("N m", "N") if straight else TURNING[kind]
             unit, unstated = (usual, True) if known.unit == "1" else (known.unit, known.assumed)
+            if kind == "temperature":  # robots write it in degrees Celsius, without a unit
+                scale = parse_unit("degC" if known.unit == "1" or known.assumed else known.unit, expect="K")
+                samples[name], titles[name] = record[column.channel] * scale.scale + scale.zero, name
+                channels[name] = replace(known, name=name, unit="K", quantity=VOCABULARY[name].words)
+                continue
             samples[name], titles[name] = record[column.channel], called(record, column.channel)
             quantity = VOCABULARY[name].words
             channels[name] = replace(known, name=name, unit=unit, quantity=quantity, assumed=unstated)

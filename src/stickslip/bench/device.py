@@ -526,6 +526,8 @@ def _input(name: str, wire: Wire, unit: str, count: float, limit: float) -> Inpu
     measured = parse_unit(spec.unit or unit) if spec.sensitivity else channel_unit(spec.unit or unit, name)
     final = apply_sensitivity(spec.sensitivity, measured, name) if spec.sensitivity else measured
     scale = final.scale * count
+    if final.zero:
+        raise ModelError(f"{name} in {final.text}", "an input is wired by a factor", "give K, or volts")
     if scale <= 0 or not math.isfinite(scale):
         raise ModelError(f"a sensitivity of {spec.sensitivity} of {name}", "it is positive and finite", "correct it")
     reading = parse_value(wire.range, measured.si) / measured.scale if wire.range else limit

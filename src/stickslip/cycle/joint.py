@@ -8,7 +8,18 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from stickslip.cycle.joint_fit import ADVICE, JointData, Telling, about_load, fitted, joint_data, pooled, turning
+from stickslip.cycle.joint_fit import (
+    ADVICE,
+    WARM,
+    JointData,
+    Telling,
+    about_load,
+    fitted,
+    joint_data,
+    pooled,
+    turning,
+    warmed,
+)
 from stickslip.errors import EstimateError, RecordError
 from stickslip.estimate import Constant, Doubt, Estimate, Result, Status
 from stickslip.record.record import Record
@@ -20,7 +31,7 @@ Array = NDArray[np.float64]
 BIASED = 0.01  # share of noise in the power of the acceleration above which the inertia is visibly low
 WAYS = ((1.0, "forward"), (-1.0, "back"))
 NOISY, LOADED = "noisy", "loaded"  # kinds of doubt
-RICHER = {"load", "uneven"}  # what Coulomb and viscous friction of both directions alike do not have
+RICHER = {"load", "uneven", *WARM}  # what Coulomb and viscous friction of both directions alike do not have
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -46,6 +57,11 @@ class JointFriction(Result):
     damping : Estimate or None
         Of the control loop [N m s/rad], where it was neither stated nor in the torque: a controller that holds its
         output for a time h damps by kp h / 2 less than its kd says.
+    warming, thinning : Estimate or None
+        By how much Coulomb friction [N m/K] and viscous friction [N m s/rad/K] grow per kelvin, negative where they
+        fall; None where no temperature was logged, or it hardly changes.
+    temperature : float or None
+        Mean of the log while it slides [K], at which all friction is told.
     torque : ndarray, shape (n,)
         The motor's torque [N m] at each sample.
     gain : float
@@ -80,6 +96,9 @@ class JointFriction(Result):
     sine: Estimate | None
     cosine: Estimate | None
     damping: Estimate | None
+    warming: Estimate | None
+    thinning: Estimate | None
+    temperature: float | None
     torque: Array
     gain: float
     carried: float
@@ -131,14 +150,16 @@ def regress_joint(
     (Gautier, Janot and Vandanjon 2013), so that the noise of the encoder pulls nothing towards zero.
     Intervals hold for correlated residuals, and hold the stated constants' uncertainty. Where the motor has an encoder
     of its own, inertia and viscous friction go with the mean of both motions, :math:`(q_m/N + q)/2`, which part where
-    teeth with play change sides; that nobody knows which share of them is the motor's is in the intervals.
+    teeth with play change sides; that nobody knows which share of them is the motor's is in the intervals. Where the
+    temperature T of the joint was logged, Coulomb and viscous friction are straight lines over it,
+    :math:`F_c + b (T - \bar T)` and :math:`F_v + b_v (T - \bar T)`.
 
     Parameters
     ----------
     record : Record
         With ``theta`` [rad] (or ``x`` [m], of an axis that moves straight: its force is then in N) and one of
         ``force``, ``current`` [A] or ``reference``; with ``motor``, the angle before the gear in any unit, it is that
-        of the link. Delays stated for them are taken out first.
+        of the link; with ``temperature`` [K], friction is told over it. Delays stated for them are taken out first.
     inertia : float, str, tuple or Estimate, optional
         Moment of inertia [kg m^2]; regressed where it is not stated.
     kp, kd : float, str, tuple or Estimate, optional
@@ -173,6 +194,7 @@ def regress_joint(
     (True, True, 0.02)
     """
     record, data = joint_data(record, gravity, inertia=inertia, kp=kp, kd=kd, torque_constant=torque_constant)
+    (data,) = warmed([data])
     fit, terms, pull, left_out = fitted(data)
     return _answer(record, data, fit, terms, pull, left_out)
 
@@ -203,7 +225,9 @@ def _answer(
         level=level.within(0.0), forward=forward, back=back, viscous=known["viscous"], viscous_forward=ways[0],
         viscous_back=ways[1], load=known.get("load"),
         inertia=inertia.within(0.0), sine=known.get("sine"), cosine=known.get("cosine"), damping=known.get("damping"),
-        torque=data.raw + damped, gain=data.stated["kp"].value if data.source == "reference" else 0.0,
+        warming=known.get("warming"), thinning=known.get("thinning"),
+        temperature=data.logs[0].about if "warming" in known else None, torque=data.raw + damped,
+        gain=data.stated["kp"].value if data.source == "reference" else 0.0,
         carried=carried, residual=float(np.linalg.norm(fit.residual) / np.linalg.norm(data.torque)),
         condition=fit.condition, time=record.start + rows / record.fs, speed=speed, measured=data.torque,
         explained=data.torque - fit.residual,
@@ -289,7 +313,7 @@ class JointLogs(Result):
 
     Attributes
     ----------
-    forward, back, viscous, load, inertia, sine, cosine, damping : Estimate or None
+    forward, back, viscous, load, inertia, sine, cosine, damping, warming, thinning : Estimate or None
         As of :class:`JointFriction`, of all logs at once; None where they do not tell it, or where it was stated.
     predictions : tuple of JointPrediction
         Of each log by the others.
@@ -307,6 +331,8 @@ class JointLogs(Result):
     sine: Estimate | None
     cosine: Estimate | None
     damping: Estimate | None
+    warming: Estimate | None
+    thinning: Estimate | None
     predictions: tuple[JointPrediction, ...]
     left_out: tuple[str, ...]
     status: str = "ok"
@@ -363,7 +389,7 @@ def regress_joint_logs(
     >>> [bool(one.error < one.plain) for one in together.predictions]
     [True, True, True]
     """
-    data = [joint_data(record, gravity, **constants)[1] for record in records]
+    data = warmed([joint_data(record, gravity, **constants)[1] for record in records])
     if len(data) < 2 or len({(one.source, one.terms) for one in data}) > 1:
         raise RecordError(
             f"{len(data)} log{'s' * (len(data) != 1)}, with torque by {', '.join(one.source for one in data)}",
@@ -380,7 +406,8 @@ def regress_joint_logs(
     return JointLogs(
         known["forward"].within(0.0), known["back"].within(0.0), known["viscous"],
         load=known.get("load"), inertia=known.get("inertia"), sine=known.get("sine"), cosine=known.get("cosine"),
-        damping=known.get("damping"), predictions=tuple(predictions), left_out=left_out,
+        damping=known.get("damping"), warming=known.get("warming"), thinning=known.get("thinning"),
+        predictions=tuple(predictions), left_out=left_out,
     )  # fmt: skip
 
 

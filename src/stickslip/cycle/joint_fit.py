@@ -19,7 +19,7 @@ from stickslip.estimate import NORMAL_95, Constant, Doubt, Estimate, Status
 from stickslip.record.record import Record, Step, require_record
 from stickslip.signals.derivatives import differentiate, five_point_difference, smooth
 from stickslip.signals.interpolate import without_delays
-from stickslip.signals.noise import quantisation_step
+from stickslip.signals.noise import noise_level, quantisation_step
 from stickslip.statistics import LeastSquares, least_squares
 
 Array = NDArray[np.float64]
@@ -45,6 +45,7 @@ WORDS = {
     "inertia": "inertia", "viscous": "viscous friction", "uneven": "uneven viscous friction",
     "forward": "Coulomb friction forward", "back": "Coulomb friction back",
     "coulomb": "Coulomb friction", "load": "friction per load",
+    "warming": "friction per kelvin", "thinning": "viscous friction per kelvin",
     "sine": "gravity, sine part", "cosine": "gravity, cosine part", "damping": "damping of the control loop",
 }  # fmt: skip
 ADVICE = {
@@ -53,12 +54,18 @@ ADVICE = {
     "uneven": "slide at several speeds either way, slow ones and fast ones",
     "forward": "pass the same places both ways, slowly and fast",
     "back": "pass the same places both ways, slowly and fast",
+    "warming": "log it from cold to warm, without a change of its motion",
+    "thinning": "log it from cold to warm, without a change of its motion",
     "load": "carry another payload, or turn farther, so that gravity's torque changes",
     "sine": "turn farther, a quarter turn at least",
     "cosine": "turn farther, a quarter turn at least",
     "damping": "log the torque or the motor's current, or state kd",
 }
+WARM = ("warming", "thinning")
+# Of the variance of a temperature, its counts' and its noise's: a regression on it is low by as much.
+ROUGHLY = 0.02
 OPTIONAL: tuple[tuple[str, ...], ...] = (
+    WARM,
     ("load",),
     ("sine", "cosine"),
 )  # left out in this order where the motion can not tell all of them apart
@@ -165,12 +172,18 @@ class Log:
         When it slides.
     lead : ndarray
         By how much the motor is ahead of the link; zeros where one encoder tells of both.
+    temperature : ndarray or None
+        Of the joint [K], where it was logged.
+    about : float
+        Temperature at which the friction is told [K].
     """
 
     position: Array
     reference: Array | None
     sliding: Sliding
     lead: Array
+    temperature: Array | None = None
+    about: float = 0.0
 
     @property
     def turned(self) -> Array:
@@ -183,12 +196,14 @@ class Log:
         r"""The balance's columns at the rows.
 
         Of :math:`\tau = J \ddot q + F_v \dot q + F_u |\dot q| \pm F_c + g_s \sin q + g_c \cos q +
-        \mathrm{sgn}(\dot q) \mu |g| - k_d \dot e`, linear about a load part `load` and gravity's torque `pull`.
+        \mathrm{sgn}(\dot q) \mu |g| - k_d \dot e + (\pm b + b_v \dot q)(T - \bar T)`,
+        linear about a load part `load` and gravity's torque `pull`.
 
         Parameters
         ----------
         terms : tuple of str
-            Of inertia, viscous, uneven, forward, back, coulomb (both alike), sine, cosine, load, damping.
+            Of inertia, viscous, uneven, forward, back, coulomb (both alike), sine, cosine, load, damping, warming and
+            thinning (Coulomb and viscous friction per kelvin).
         load : float
             The load part about which gravity's columns are linear.
         pull : (float, float)
@@ -201,6 +216,7 @@ class Log:
             position = turned = self.reference
         side, window = self.sliding.side, self.sliding.window
         carried = pull[0] * np.sin(position) + pull[1] * np.cos(position)
+        warmer = 0.0 if self.temperature is None else self.temperature - self.about
         stronger = 1 + load * side * np.sign(carried)
         made = {
             "inertia": lambda: window.apply(turned, 2),
@@ -213,6 +229,8 @@ class Log:
             "cosine": lambda: window.apply(np.cos(position) * stronger),
             "load": lambda: window.apply(side * np.abs(carried)),
             "damping": lambda: self._error_rate(steered),
+            "warming": lambda: window.apply(side * warmer),
+            "thinning": lambda: window.apply(five_point_difference(turned, 1) * window.fs * warmer),
         }
         return np.column_stack([made[term]()[self.sliding.rows] for term in terms])
 
@@ -295,6 +313,29 @@ def coefficient(fit: LeastSquares, terms: Sequence[str], term: str) -> float:
     return float(fit.coefficients[terms.index(term)]) if term in terms else 0.0
 
 
+def warmed(data: Sequence[JointData]) -> list[JointData]:
+    """Logs whose friction is told over the temperature, about the mean of all, where it changes by enough."""
+    logs = [log for one in data for log in one.logs]
+    known = [log.temperature for log in logs if log.temperature is not None]
+    if len(known) < len(logs):
+        return list(data)
+    error = max(_error_of(warm, log.sliding.window.fs) for warm, log in zip(known, logs, strict=True))
+    while_sliding = np.concatenate([warm[log.sliding.rows] for warm, log in zip(known, logs, strict=True)])
+    if np.ptp(while_sliding) == 0 or error**2 > ROUGHLY * np.var(while_sliding):
+        return list(data)
+    about = float(np.mean(while_sliding))
+    return [
+        replace(one, terms=(*one.terms, *WARM), logs=tuple(replace(log, about=about) for log in one.logs))
+        for one in data
+    ]
+
+
+def _error_of(temperature: Array, fs: float) -> float:
+    """Standard deviation of its noise, or of its counts, of which it may show a few only."""
+    count = np.ptp(temperature) / max(len(np.unique(temperature)) - 1, 1)
+    return max(noise_level(temperature, fs), float(count) / math.sqrt(12))
+
+
 def pooled(data: Sequence[JointData]) -> JointData:
     """Several logs as one."""
     first = data[0]
@@ -365,8 +406,10 @@ def _data_of(record: Record, constants: dict[str, Estimate], gravity: bool) -> J
     slides = sliding(position, record.fs)
     _refuse_still(slides, record)
     lead = motor_lead(position, record["motor"]) if "motor" in record else None
-    log = Log(position, reference, slides, np.zeros(len(position)) if lead is None else lead)
     window, rows = slides.window, slides.rows
+    logged = "temperature" in record and bool(np.all(np.isfinite(record["temperature"])))
+    warm = record["temperature"] if logged else None
+    log = Log(position, reference, slides, np.zeros(len(position)) if lead is None else lead, warm)
     terms = ["viscous", "forward", "back", *(("sine", "cosine", "load") if gravity else ())]
     known, unsure = np.zeros(len(rows)), []
     if "inertia" in constants:
@@ -527,7 +570,12 @@ class Telling:
         """A sum of coefficients."""
         row = np.array([weights.get(term, 0.0) for term in self.terms])
         beside = math.hypot(*(float(row @ self.fit.projection @ column) for column in self.unsure), 0.0)
-        units = {**(TURNING if self.turning else UNITS), "load": "1"}
+        heat = (
+            {"warming": "N m/K", "thinning": "N m s/rad/K"}
+            if self.turning
+            else {"warming": "N/K", "thinning": "N s/m/K"}
+        )
+        units = {**(TURNING if self.turning else UNITS), "load": "1", **heat}
         kind = {"forward": "coulomb", "back": "coulomb", "sine": "coulomb", "cosine": "coulomb", "damping": "viscous"}
         unit = units[kind.get(next(iter(weights)), next(iter(weights)))]
         how = "instruments of the reference" if self.data.followed else "least squares"

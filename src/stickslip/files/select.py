@@ -232,7 +232,8 @@ class Columns:
             stated = spec.unit if spec.unit is not None else self.units.get(name)
             if stated is None and plain:
                 stated = self.unit_of(plain) or unit_in_name(plain[1], name)
-            wanted.append(Wanted(*self._channel(checked_name(name), spec, stated), scales, weights.offset))
+            channel, unit = self._channel(checked_name(name), spec, stated)
+            wanted.append(Wanted(channel, unit.scale, scales, weights.offset + unit.zero / unit.scale))
         return wanted
 
     def every(self, times: Mapping[int, TimeColumn]) -> tuple[list[Wanted], list[str]]:
@@ -247,9 +248,8 @@ class Columns:
         for name, key in zip(titles, kept, strict=True):
             column = self.columns[key]
             stated = self.units.get(name, self.unit_of(key))
-            wanted.append(
-                Wanted(*self._channel(name, Spec(column.name, column.name, None, ""), stated), {key: 1.0}, 0.0)
-            )
+            channel, unit = self._channel(name, Spec(column.name, column.name, None, ""), stated)
+            wanted.append(Wanted(channel, unit.scale, {key: 1.0}, unit.zero / unit.scale))
         return wanted, notes
 
     def _on_one_clock(self, keys: Sequence[Key], times: Mapping[int, TimeColumn]) -> list[Key]:
@@ -279,8 +279,8 @@ class Columns:
         name = _word_of(last)
         return f"{name}_" if name in VOCABULARY else name
 
-    def _channel(self, name: str, spec: Spec, stated: str | None) -> tuple[Channel, float]:
-        """The channel's description, and the factor to SI."""
+    def _channel(self, name: str, spec: Spec, stated: str | None) -> tuple[Channel, Unit]:
+        """The channel's description, and its unit, which leads to SI."""
         source = spec.text.strip()
         if spec.sensitivity:
             if stated is None:
@@ -302,7 +302,7 @@ class Columns:
             self.notes.append(f"{name}: {weighed[1]} read as a mass; call the channel a or acc if it is gravity")
         assumed = stated is None and unit.si != "1"
         quantity, sensitivity = described(name, unit.si), spec.sensitivity
-        return Channel(name, unit.si, quantity, source, sensitivity, gain_sd=spec.gain_sd, assumed=assumed), unit.scale
+        return Channel(name, unit.si, quantity, source, sensitivity, gain_sd=spec.gain_sd, assumed=assumed), unit
 
     def _unit(self, name: str, stated: str) -> Unit:
         try:

@@ -30,7 +30,6 @@ if TYPE_CHECKING:
     from stickslip.record.record import Record
 
 ZERO_CELSIUS = 273.15  # K
-CELSIUS = ("°C", "degC", "celsius")
 NUMBERS = {"run_in": "1", "temperature": "K", "humidity": "1", "normal": "N"}  # unit of those that are no words
 TITLES = {
     "surface": "Surfaces", "lubrication": "Lubrication", "run_in": "Run-in cycles", "cleaning": "Cleaning",
@@ -135,20 +134,11 @@ def _number(name: str, value: Any) -> float:
     step = f"correct {name} of the log"
     if isinstance(value, bool) or not isinstance(value, (int, float, str)):
         raise RecordError(f"{name} = {value!r} in the log", "it is a number, or a text with its unit", step)
-    number = _kelvin(value) if name == "temperature" else parse_value(value, NUMBERS[name])
+    number = parse_value(value, NUMBERS[name])
     if not (math.isfinite(number) and number >= 0 and (name != "humidity" or number <= 1)):
         rule = "relative humidity is from 0 to 100 %" if name == "humidity" else "it is finite and not below zero"
         raise RecordError(f"{name} = {value!r} in the log", rule, step)
     return number
-
-
-def _kelvin(value: float | str) -> float:
-    """A temperature in K; on its own scale where Celsius is written behind it."""
-    text = str(value).strip()
-    for unit in CELSIUS:
-        if text.endswith(unit):
-            return parse_value(text.removesuffix(unit).strip(), "1") + ZERO_CELSIUS
-    return parse_value(value, "K")
 
 
 def _text(name: str, value: Any) -> str:

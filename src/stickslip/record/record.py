@@ -243,7 +243,7 @@ class Record:
                 units.get(name, usual),
                 expect=usual if name in VOCABULARY and len(VOCABULARY[name].units) == 1 else None,
             )
-            arrays[name] = np.asarray(values, dtype=float) * unit.scale
+            arrays[name] = np.asarray(values, dtype=float) * unit.scale + unit.zero
             channels[name] = Channel(name, unit.si, described(name, unit.si), source="array")
         step = Step(
             "Record.of",

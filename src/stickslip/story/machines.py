@@ -11,6 +11,7 @@ import numpy as np
 
 from stickslip.answers.findings import Comparison, Findings
 from stickslip.cycle.joint import JointFriction, JointLogs
+from stickslip.cycle.joint_fit import SURELY
 from stickslip.cycle.tribometer import DEFINITIONS
 from stickslip.errors import ModelError
 from stickslip.estimate import Estimate, stands
@@ -22,6 +23,7 @@ from stickslip.laws.export import export_fmu, export_law, urdf_dynamics
 from stickslip.story.fit import ALONE, FILES
 from stickslip.story.story import Story, Table
 from stickslip.story.words import Caution, cautions, interval_of, number, value_of
+from stickslip.units import parse_unit
 
 APART = 0.05  # of a level, by which directions or definitions must differ to be worth a sentence
 RARELY = 0.005  # of the time
@@ -152,6 +154,7 @@ def _of_one_joint(findings: Findings) -> Iterator[str]:
     fastest = float(np.abs(joint.speed).max())
     rate = f"{fastest:.3g} rad/s" if unit == "N m" else f"{fastest:.3g} m/s"
     yield f"To that come {' and '.join(parts)}; it was moved at up to {rate}."
+    yield from _warmth(findings)
     sources = {"reference": "its controller's gains make", "current": "its current makes"}
     torque = "the torque that" if unit == "N m" else "the force that"
     source = sources.get(joint.source, "was measured")
@@ -172,6 +175,22 @@ def _of_one_joint(findings: Findings) -> Iterator[str]:
         )
     if findings.sticks is not None and findings.sticks.share.value > RARELY and stands(findings.sticks.share.status):
         yield f"It stands still up to {value_of(findings.sticks.share)} of the time."
+
+
+def _warmth(findings: Findings) -> Iterator[str]:
+    """What the temperature makes of the friction: claimed where chance would hardly make as much."""
+    joint = findings.joint
+    if joint.temperature is None:
+        return
+    if not findings.record.channels["temperature"].assumed:
+        mean = joint.temperature - parse_unit("degC", expect="K").zero
+        yield f"All of this is told at {mean:.3g} °C, the mean of the log."
+    for change, what in ((joint.warming, "Coulomb friction"), (joint.thinning, "viscous friction")):
+        spread = f"(95 %: {interval_of(change)})"
+        if abs(change.value) > SURELY * change.sd:
+            yield f"With the temperature its {what} changes by {value_of(change)} {spread}."
+        else:
+            yield f"No change of its {what} with the temperature is told {spread}."
 
 
 def _directions(joint: JointFriction) -> Iterator[str]:
