@@ -14,17 +14,21 @@ JOINT = {"inertia": 0.02, "kp": 18.0}
 
 
 @numba.njit
-def rests(loop, kinetic, static, start, dt, steps):  # type: ignore[no-untyped-def]
-    """Times and places at which a loop comes to rest, by short steps in which friction takes off what it can."""
+def rests(loop, kinetic, static, start, dt, steps, most=np.inf, fastest=np.inf):  # type: ignore[no-untyped-def]
+    """Times and places at which a loop comes to rest, by short steps in which friction takes off what it can.
+
+    Its drive saturates, and its torque follows what the controller asks for at a limited rate.
+    """
     inertia, kp, ki, kd = loop
     times, places = [0.0], [start]
-    x, v, integral, held = start, 0.0, 0.0, True
+    x, v, integral, held, torque = start, 0.0, 0.0, True, -loop[1] * start
     for i in range(steps):
         integral += dt * x
-        torque = -kp * x - ki * integral - kd * v
-        most = static if held else kinetic
+        asked = min(max(-kp * x - ki * integral - kd * v, -most), most)
+        torque += min(max(asked - torque, -fastest * dt), fastest * dt)
+        level = static if held else kinetic
         free = v + dt * torque / inertia
-        taken = dt * most / inertia
+        taken = dt * level / inertia
         v = free - taken if free > taken else free + taken if free < -taken else 0.0
         x += dt * v
         if v == 0.0 and not held:
@@ -43,6 +47,23 @@ def test_an_integrator_of_another_kind_hunts_alike(static, ki, kd) -> None:
     assert np.abs(places[-2:]) == pytest.approx(found.amplitude, rel=0.02)
     assert places[-1] * places[-2] < 0
     assert times[-1] - times[-3] == pytest.approx(1 / found.frequency, rel=0.02)
+
+
+def test_a_drive_with_limits_hunts_the_same_until_it_can_not_break_away() -> None:
+    law, gains = Coulomb(0.06, static=0.08), {**JOINT, "ki": 60.0, "kd": 0.1}
+    free = hunting(law, **gains)
+    assert free.torque == pytest.approx(0.08, rel=1e-6)  # static friction, as it breaks away
+    limits = {"most": 1.02 * free.torque, "fastest": 1.05 * free.torque_rate}
+    assert hunting(law, **gains, **limits) == free
+    settings = ((*JOINT.values(), 60.0, 0.1), 0.06, 0.08, 1.2 * free.amplitude, 2e-6, round(40 / 2e-6))
+    times, places = rests(*settings, *limits.values())
+    assert np.abs(places[-2:]) == pytest.approx(free.amplitude, rel=0.02)
+    assert times[-1] - times[-3] == pytest.approx(1 / free.frequency, rel=0.02)
+    weak = 0.99 * 0.08
+    assert not hunting(law, **gains, most=weak).lasts
+    assert rests(*settings, weak)[1] == [1.2 * free.amplitude]  # where it began
+    with pytest.raises(ModelError, match=r"fastest = .* simulate the drive"):
+        hunting(law, **gains, fastest=0.5 * free.torque_rate)
 
 
 def test_without_damping_a_slip_has_a_closed_form() -> None:
