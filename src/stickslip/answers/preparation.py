@@ -64,14 +64,14 @@ def is_long(files: Sequence[Path]) -> bool:
 
 
 def read_mended(files: Sequence[Path], *, rig: RigSettings, names: Sequence[str] = ()) -> Record:
-    """Read a record as its rig's settings say, mended.
+    """Read a record as its rig's settings say, mended, with what they state of its sensors.
 
     Parameters
     ----------
     files : sequence of Path
         Those of the record.
     rig : RigSettings
-        How they are read, which rows, which repairs, and the log.
+        How they are read, which rows, which repairs, the sensors and the log.
     names : sequence of str
         What the history calls the files; their own names where left out.
 
@@ -94,7 +94,7 @@ def read_mended(files: Sequence[Path], *, rig: RigSettings, names: Sequence[str]
     [2.0, 3.0, 4.0, 5.0]
     """
     record = read_record(files, rows=rig.row_range(), **rig.reading())
-    return rig.logged(mend(_called(record, files, names), repairs=rig.repair))
+    return with_sensors(mend(_called(record, files, names), repairs=rig.repair), rig)
 
 
 def read_parts(
@@ -131,7 +131,7 @@ def read_parts(
         yield read_mended(files, rig=rig, names=names)
         return
     for part in read_blocks(files, size=size, **rig.reading()):
-        yield rig.logged(_called(part, files, names))
+        yield with_sensors(_called(part, files, names), rig)
 
 
 def _called(record: Record, files: Sequence[Path], names: Sequence[str]) -> Record:
@@ -258,11 +258,12 @@ def ready(record: Record, rig: RigSettings, method: str, inquiry: Inquiry) -> Re
 
 
 def with_sensors(record: Record, rig: RigSettings) -> Record:
-    """The record with what the settings state of its sensors, and with their log."""
+    """The record with what the settings state of its sensors, and with their log; once, however often it is asked."""
     record = rig.logged(record)
     for name, sensor in rig.sensors.items():
         if name in record:
-            record = record.with_details(name, **sensor.model_dump(exclude_unset=True))
+            described = record.with_details(name, **sensor.model_dump(exclude_unset=True))
+            record = record if described.channels[name] == record.channels[name] else described
     return record
 
 
