@@ -41,8 +41,7 @@ from numba.extending import intrinsic
 
 OPTIONS = {"error_model": "numpy", "_nrt": False}
 FAST = {**OPTIONS, "fastmath": {"contract", "nsz", "arcp"}}
-PYTHON = {"no_cfunc_wrapper": True}  # an entrance for Python, none for C
-BARE = {"no_cpython_wrapper": True, **PYTHON}
+BARE = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 PACKAGE = Path(__file__).parent
 HOLDS_KERNELS = "@compiled("
 IMPORT = re.compile(r"^from (stickslip[\w.]*) import (\([^)]*\)|[^\n]+)", re.MULTILINE)
@@ -111,10 +110,12 @@ class _Flags(compiler.Flags):  # type: ignore[misc]  # numba tells no types
 
 
 class _Shown(compiler.Compiler):  # type: ignore[misc]
-    """Compiles what Python calls, with all that it calls."""
+    """Compiles what Python calls, with all that it calls: for C it needs no entrance."""
 
     def __init__(self, typing: Any, target: Any, library: Any, args: Any, result: Any, flags: Any, names: Any) -> None:
-        super().__init__(typing, target, library, args, result, _Flags(flags), names)
+        flags = _Flags(flags)
+        flags.no_cfunc_wrapper = True
+        super().__init__(typing, target, library, args, result, flags, names)
 
 
 class _Called(_Shown):
@@ -151,7 +152,7 @@ def compiled(**options: Any) -> Callable[[Callable[..., Any]], Any]:
     """
 
     def compile_(function: Callable[..., Any]) -> Any:
-        shown = _keeping(njit, {"pipeline_class": _Shown, **options, **PYTHON})(function)
+        shown = _keeping(njit, {"pipeline_class": _Shown, **options})(function)
         if not config.DISABLE_JIT:
             called = _keeping(njit, {"pipeline_class": _Called, **options, **BARE})(function)
             shown.get_call_template = lambda given, named: called.get_call_template(map(types.unliteral, given), named)

@@ -13,7 +13,7 @@ import numpy as np
 
 from stickslip.errors import ModelError
 from stickslip.laws.base import Exit, Mode, Rigid, Row
-from stickslip.laws.curved import CurvedMode, Expression, Sliding, asinh, either_side, exp, log, symbol, tanh
+from stickslip.laws.curved import CurvedMode, Expression, Sliding, asinh, either_side, exp, lifted, log, symbol, tanh
 from stickslip.laws.guessing import GRID, Family, Hypothesis, Observed, share
 from stickslip.parameters import finite, parameter, parametric
 
@@ -24,6 +24,9 @@ RATES = (2.0, 80.0)  # of a guess, over the oscillation's angular frequency
 STEEPEST = 60.0  # of a guess, over the largest speed
 
 STILLEST = 1e-12  # of the speed at which friction turns: a logarithm of the speed wants one that is not zero
+LOGARITHMIC = (
+    100.0  # friction over direct effect from which asinh is a logarithm: its argument is above e^60, or nothing
+)
 
 
 @parametric
@@ -259,7 +262,7 @@ class RateState(Sliding):
         """Slip on either side; they meet where the velocity turns."""
         v = symbol("v")
         return tuple(
-            CurvedMode(name, "slip", side, self._force(v), (turn,), {"age": self._ageing(v * float(side))})
+            CurvedMode(name, "slip", side, self._force(v, side), (turn,), {"age": self._ageing(v * float(side))})
             for name, side, turn in either_side()
         )
 
@@ -291,7 +294,9 @@ class RateState(Sliding):
         renewed = log(symbol("age") * (self.reference / self.distance))
         return (self.friction + self.evolution * renewed) / self.direct
 
-    def _force(self, speed: Expression | float) -> Expression:
+    def _force(self, speed: Expression | float, side: int = 1) -> Expression:
+        if self.friction > LOGARITHMIC * self.direct:  # the cube of asinh's argument would be no number
+            return side * self.direct * self.normal * (self._grip() + log(speed * lifted(side / self.reference)))
         return self.direct * self.normal * asinh(exp(self._grip()) * speed / (2 * self.reference))
 
     def _ageing(self, speed: Expression) -> Expression:

@@ -281,8 +281,7 @@ class _Run:
             raise SolveError(
                 f"a step of no length, {place}",
                 "friction and its rates are finite and smooth within a mode",
-                "check the law there (a logarithm or a power of nothing; of rate and state, direct= so small beside "
-                "friction= that their ratio's exponential outgrows the numbers; in series, damping= too small)",
+                "check the law there (a logarithm or a power of nothing; in series, damping= too small)",
             )
         long = CHUNK * len(self.kept) >= PATIENCE and passed * STEPS < CHUNK * self.ahead
         if outcome == march.FULL and long:
