@@ -21,10 +21,11 @@ STILL = 1e-4  # of the base's velocity: where the state variable's backbone turn
 
 @dataclass(frozen=True)
 class Rig:
-    """A mass on a spring, shaken at its base: (kinetic + drop exp(-|v|/speed)) sgn v + slope v, a spring, or a memory.
+    """A mass on a spring, shaken at its base: (kinetic + drop exp(-(|v|/speed)^exponent)) sgn v + slope v, a spring, or
+    a memory.
 
-    LuGre's bristles have the stiffness `contact` and fall as Stribeck's curve of exponent 2; the state variable's force
-    follows Coulomb's at the `rate` [1/s].
+    LuGre's bristles have the stiffness `contact` and fall along the same curve; the state variable's force follows
+    Coulomb's at the `rate` [1/s]. The forces of a rigid contact stray by a share `rough` along the surface.
     """
 
     kind: str
@@ -39,14 +40,14 @@ class Rig:
     speed: float = 0.0
     contact: float = 0.0
     rate: float = 0.0
+    exponent: float = 1.0
+    rough: float = 0.0
 
     def friction(self, speed: float) -> float:
         """At a steady speed, the slope left out: what "sliding friction" is at the mean speed at which it slides."""
         if not self.speed:
             return self.kinetic
-        return self.kinetic + (self.static - self.kinetic) * np.exp(
-            -((speed / self.speed) ** (2 if self.contact else 1))
-        )
+        return self.kinetic + (self.static - self.kinetic) * np.exp(-((speed / self.speed) ** self.exponent))
 
     @property
     def stated(self) -> dict[str, float]:
@@ -55,10 +56,23 @@ class Rig:
 
 
 @numba.njit
+def along(x, amplitude, rough):  # type: ignore[no-untyped-def]
+    """Friction at a place over its mean, which strays by a share: three waves along the surface."""
+    place = x / amplitude
+    return 1 + rough * np.sqrt(2 / 3) * (np.sin(7 * place) + np.sin(17 * place + 1) + np.sin(29 * place + 2))
+
+
+def passed(x: np.ndarray, rig: Rig) -> float:
+    """Mean of the friction over its level along the way that a rig went."""
+    return float(np.average(along((x[1:] + x[:-1]) / 2, rig.amplitude, rig.rough), weights=np.abs(np.diff(x))))
+
+
+@numba.njit
 def _accelerated(t, x, v, way, p):  # type: ignore[no-untyped-def]
     m, k, c, amplitude, w, kinetic, static, slope, speed = p[:9]
-    drop = (static - kinetic) * np.exp(-abs(v) / speed) if speed > 0 else 0.0
-    return (k * (amplitude * np.sin(w * t) - x) - c * v - way * (kinetic + drop) - slope * v) / m
+    drop = (static - kinetic) * np.exp(-((abs(v) / speed) ** p[11])) if speed > 0 else 0.0
+    dry = (kinetic + drop) * along(x, amplitude, p[12])
+    return (k * (amplitude * np.sin(w * t) - x) - c * v - way * dry - slope * v) / m
 
 
 @numba.njit
@@ -84,15 +98,15 @@ def _rigid(p, samples, settle, h, steps):  # type: ignore[no-untyped-def]
         left = h
         while left > 1e-15 * h:
             if stuck:
-                pull = k * (amplitude * np.sin(w * (t + left)) - x)
-                if abs(pull) <= static:
+                pull, bears = k * (amplitude * np.sin(w * (t + left)) - x), static * along(x, amplitude, p[12])
+                if abs(pull) <= bears:
                     held += left if row >= 0 else 0.0
                     t, left = t + left, 0.0
                     continue
                 low, high = 0.0, left  # the instant at which the pull passes what the contact bears
                 for _ in range(60):
                     middle = (low + high) / 2
-                    over = abs(k * (amplitude * np.sin(w * (t + middle)) - x)) > static
+                    over = abs(k * (amplitude * np.sin(w * (t + middle)) - x)) > bears
                     low, high = (low, middle) if over else (middle, high)
                 held += high if row >= 0 else 0.0
                 t, left, stuck, way = t + high, left - high, False, 1 if pull > 0 else -1
@@ -109,7 +123,7 @@ def _rigid(p, samples, settle, h, steps):  # type: ignore[no-untyped-def]
             x, v = _step(t, x, v, way, high, p)[0], 0.0
             t, left = t + high, left - high
             pull = k * (amplitude * np.sin(w * t) - x)
-            stuck = abs(pull) <= static
+            stuck = abs(pull) <= static * along(x, amplitude, p[12])
             stops += 1 if stuck and row >= 0 else 0
             way = way if stuck else (1 if pull > 0 else -1)
     return out, held, stops
@@ -137,7 +151,7 @@ def _compliant(p, samples, settle, h, steps):  # type: ignore[no-untyped-def]
 @numba.njit
 def _remembering(p, samples, settle, h, steps):  # type: ignore[no-untyped-def]
     """The same of a friction that remembers: its own equation solved exactly in each step, at the step's velocity."""
-    m, k, c, amplitude, w, kinetic, static, _, speed, stiffness, rate = p
+    m, k, c, amplitude, w, kinetic, static, _, speed, stiffness, rate, exponent = p[:12]
     out = np.zeros((3, samples))
     x, v, t, f = 0.0, 0.0, 0.0, 0.0
     for number in range((settle + samples - 1) * steps + 1):
@@ -149,7 +163,7 @@ def _remembering(p, samples, settle, h, steps):  # type: ignore[no-untyped-def]
         x += h * half_v
         t += h
         if stiffness > 0:  # f' = stiffness (v - |v| f / level)
-            level = kinetic + (static - kinetic) * np.exp(-((half_v / speed) ** 2))
+            level = kinetic + (static - kinetic) * np.exp(-((abs(half_v) / speed) ** exponent))
             towards, quick = level * np.sign(half_v), stiffness * abs(half_v) / level
         else:
             towards, quick = kinetic * np.tanh(half_v / (STILL * amplitude * w)), rate
@@ -169,25 +183,41 @@ def _written(values: np.ndarray, gain: float, level: float, rng: np.random.Gener
     return count * np.round(own / count)
 
 
-def record(rig: Rig, rng: np.random.Generator, *, noise: float = 1e-3, cycles: int = 10, off: float = 0.0) -> ss.Record:
-    """What its sensors write of it: x and z with noise (a share of the base's amplitude), dirty where gains are off."""
+def record(
+    rig: Rig,
+    rng: np.random.Generator,
+    *,
+    noise: float = 1e-3,
+    cycles: int = 10,
+    off: float = 0.0,
+    felt: bool = False,
+    dirty: bool | None = None,
+) -> ss.Record:
+    """What its sensors write of it: x and z with noise (a share of the base's amplitude), dirty where gains are off
+    and nothing else is said; `felt`, an accelerometer and a load cell beside them."""
     fs = float(np.clip(400 * rig.frequency, 200, 5000))
     cycle = fs / rig.frequency
     samples, settle = round(cycles * cycle), round(30 * cycle)
     p = np.array([
         rig.mass, rig.stiffness, rig.damping, rig.amplitude, 2 * np.pi * rig.frequency, rig.kinetic,
         max(rig.static, rig.kinetic), rig.slope, rig.speed, rig.contact, rig.rate,
+        rig.exponent, rig.rough,
     ])  # fmt: skip
     march = {"compliant": _compliant, "LuGre": _remembering, "state variable": _remembering}.get(rig.kind, _rigid)
     steps = 20 * STEPS if rig.kind in SOFT else STEPS
-    (x, v, _), held, stops = march(p, samples, settle, 1 / (fs * steps), steps)
+    (x, v, a), held, stops = march(p, samples, settle, 1 / (fs * steps), steps)
     time = (settle + np.arange(samples)) / fs
     z = rig.amplitude * np.sin(2 * np.pi * rig.frequency * time)
-    gains = 1 + off * rng.standard_normal(2)
-    level = noise * rig.amplitude
+    true = {"x": x, "z": z}
+    levels = dict.fromkeys("xz", noise * rig.amplitude)
+    if felt:
+        true |= {"a": a, "load": rig.stiffness * (z - x) - rig.damping * v - rig.mass * a}
+        levels |= {name: noise * float(np.ptp(true[name])) for name in ("a", "load")}
+    gains = 1 + off * rng.standard_normal(len(true))
+    dirt = off > 0 if dirty is None else dirty
     written = {
-        name: _written(values, gain, level, rng, dirty=off > 0)
-        for name, gain, values in zip("xz", gains, (x, z), strict=True)
+        name: _written(values, gain, levels[name], rng, dirty=dirt)
+        for gain, (name, values) in zip(gains, true.items(), strict=True)
     }
     fast = np.abs(v)[np.abs(v) > 0.2 * np.abs(v).max()]
     level = rig.friction(float(fast.mean()))
@@ -216,6 +246,8 @@ def drawn(kind: str, rng: np.random.Generator) -> Rig:
         kinetic = {"kinetic": pull * rng.uniform(0.1, 0.6)}
     if kind in ("static", "Stribeck", "LuGre"):
         more["static"] = kinetic["kinetic"] * rng.uniform(1.1, 1.6)
+    if kind == "LuGre":
+        more["exponent"] = 2.0
     if kind in ("Stribeck", "LuGre"):
         more["speed"] = rng.uniform(0.05, 0.3) * amplitude * 2 * np.pi * frequency
     if kind == "viscous":

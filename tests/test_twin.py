@@ -192,7 +192,9 @@ def test_a_friction_that_lags_is_no_contact_that_gives_way() -> None:
 @cache
 def bristled() -> ss.answers.Findings:
     """What is found of a contact of bristles."""
-    rig = stepped.Rig("LuGre", 2.0, 800.0, 1.0, 4e-3, 2.4, kinetic=0.96, static=1.3, speed=8e-3, contact=8000.0)
+    rig = stepped.Rig("LuGre", 2.0, 800.0, 1.0, 4e-3, 2.4, kinetic=0.96, static=1.3, speed=8e-3, contact=8000.0,
+        exponent=2.0,
+    )  # fmt: skip
     record = stepped.record(rig, np.random.default_rng(11), noise=1e-4)
     return ss.tried(ss.analyze(record, **rig.stated), twins=8)
 

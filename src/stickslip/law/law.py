@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stickslip.errors import ModelError
-from stickslip.estimate import Estimate, Result, Status
+from stickslip.estimate import Doubt, Estimate, Result, Status, doubts_of
 from stickslip.law.search import (
     OF_MOUNTS,
     OF_SENSORS,
@@ -40,6 +40,7 @@ from stickslip.statistics import mean_uncertainty, student
 
 Array = NDArray[np.float64]
 
+REMAINDER = "remainder"  # the kind of doubt where a law leaves more than noise
 MISFIT = 1.2  # times its noise that a law may leave of any channel and yet explain it: readings alone stray by 1 or 2 %
 METHOD = "least squares of what the sensors read, the motion simulated"
 UNSURE = 0.25  # of a coordinate: a wider deviation is looked at by the likelihood itself
@@ -129,6 +130,11 @@ class LawFit(Result):
         """Residual of each channel over its noise; 1 where the law explains everything but the noise."""
         return {name: self.residual[name] / self.noise[name] for name in self.residual}
 
+    def doubted(self, *reasons: Doubt | str) -> LawFit:
+        """The fit with what speaks against its parameters, each that bears no doubt yet."""
+        status = Status(*reasons)
+        return replace(self, parameters={key: one.doubted(status) for key, one in self.parameters.items()})
+
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON."""
         return {
@@ -155,8 +161,14 @@ def teller(progress: Callable[[float], object] | None, expected: float) -> Calla
     return tell
 
 
-def answered(problem: Problem, point: Point, sure: Surety | None, shown: Sequence[Shown]) -> LawFit:
-    """What a search has found, as it is told."""
+def answered(
+    problem: Problem,
+    point: Point,
+    sure: Surety | None,
+    shown: Sequence[Shown],
+    noise_of: Callable[[str], float] | None = None,
+) -> LawFit:
+    """What a search has found, as it is told; `noise_of` a channel, where it was weighed by more."""
     system = replace(problem, profile=None).system(point.u)
     traces, sums, counts, noise = [], dict[str, float](), dict[str, int](), dict[str, float]()
     for j in range(len(problem.stretches)):
@@ -173,7 +185,7 @@ def answered(problem: Problem, point: Point, sure: Surety | None, shown: Sequenc
             noise[name] = math.hypot(noise.get(name, 0.0), sensor.noise * math.sqrt(len(left)))
         traces.append(Traces(time, measured, fitted))
     residual = {name: math.sqrt(sums[name] / counts[name]) for name in sums}
-    noise = {name: noise[name] / math.sqrt(counts[name]) for name in sums}
+    noise = {name: noise_of(name) if noise_of else noise[name] / math.sqrt(counts[name]) for name in sums}
     parameters = _parameters(problem, point, sure, system)
     if problem.profile:
         level = _mean_friction(problem, point, value_of(system, "kinetic"))
@@ -181,17 +193,25 @@ def answered(problem: Problem, point: Point, sure: Surety | None, shown: Sequenc
         system = system.having(kinetic=level.value)
     over = {name: residual[name] / noise[name] for name in residual}
     checks = tuple(f"{name} is left with {times:.3g} times its noise" for name, times in over.items())
-    worries = [too_few(shown, sum(math.isinf(knob.prior) for knob in problem.knobs))]
+    worries: list[Doubt | str] = [too_few(shown, sum(math.isinf(knob.prior) for knob in problem.knobs))]
     if not explained(over.values()):
         worst = max(over, key=lambda name: over[name])
         worries.append(
-            f"{worst} is left with {over[worst]:.3g} times its noise: the law is not the whole of it, or mass=, "
-            "stiffness= or a unit is wrong"
+            Doubt(
+                f"{worst} is left with {over[worst]:.3g} times its noise: the law is not the whole of it, or mass=, "
+                "stiffness= or a unit is wrong",
+                REMAINDER,
+            )
         )
     system, surface = replace(system, drive=problem.oscillator.drive), "rough" if problem.profile else "even"
     size, count, correlations = sum(counts.values()), len(problem.knobs), _between(problem, sure)
     fit = LawFit(system, parameters, correlations, noise, residual, point.chi2, size, count, tuple(traces), surface)
     return replace(fit, status=Status(*worries), checks=checks)
+
+
+def remainders(status: str) -> list[Doubt]:
+    """Of the doubts behind a status those of what a law leaves."""
+    return [doubt for doubt in doubts_of(status) if doubt.kind == REMAINDER]
 
 
 def explained(over: Iterable[float]) -> bool:

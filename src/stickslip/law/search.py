@@ -38,16 +38,17 @@ class Knob(NamedTuple):
     """A parameter that is turned: its name, how a coordinate makes its value, and from where."""
 
     name: str
-    kind: str  # "log", "linear", "positive", "above" (the kinetic level), one OF_SENSORS, or "profile"
+    kind: str  # "log", "within" (its bounds), "linear", "positive", "above" (the kinetic), one OF_SENSORS, or "profile"
     origin: float
     scale: float = 1.0
     most: float = math.inf  # of a coordinate
     prior: float = math.inf  # standard deviation of a coordinate, as far as it is known beforehand
     stretch: int | None = None  # the one that it holds for; all where left out
+    mean: float = 0.0  # of a coordinate, as it is known beforehand
 
     def value(self, u: float) -> float:
         """The parameter at a coordinate; of an "above" the excess over the kinetic level, as a share of it."""
-        if self.kind in ("log", *OF_MOUNTS):
+        if self.kind in ("log", "within", *OF_MOUNTS):
             return self.origin * math.exp(max(-200.0, min(200.0, self.scale * u)))
         moved = self.origin + self.scale * u
         return max(0.0, moved) if self.kind in ("above", "positive") else moved
@@ -60,8 +61,8 @@ class Knob(NamedTuple):
     @property
     def least(self) -> float:
         """The least coordinate that has a meaning."""
-        if self.kind in OF_MOUNTS:
-            return -self.most
+        if self.kind in ("within", *OF_MOUNTS):
+            return 2 * self.mean - self.most
         return -self.origin / self.scale if self.kind in ("above", "positive") else -math.inf
 
 
@@ -225,7 +226,7 @@ class Problem:
                 for sensor, values in zip(stretch.sensors, raw[-1], strict=True)
             ]
             residuals.append(np.concatenate([*left, -off / stretch.drive.unsure]))
-        residuals[0] = np.append(residuals[0], -self._trust() @ u)
+        residuals[0] = np.append(residuals[0], self._trust() @ ([knob.mean for knob in self.knobs] - u))
         chi2 = sum(float(r @ r) for r in residuals)
         chi2 = chi2 if math.isfinite(chi2) else math.inf
         return Point(u, starts, tuple(raw), tuple(pieces), tuple(runs), tuple(residuals), chi2)
@@ -276,11 +277,11 @@ class Problem:
         knob, raw = self.knobs[k], point.raw[j][s]
         if knob.kind == "gain":
             return sensor.freed(knob.scale * raw)
-        if knob.kind == "delay":
-            scale = knob.scale if knob.channel in DRIVES else -knob.scale
-            return sensor.freed(scale * gain * _rate(raw, point.pieces[j][s], sensor.time))
-        near = self.mounted(point.u + STEP * np.eye(len(self.knobs))[k], j).sensors[s]
-        read, _ = near.predicted(motion, self.delays(point.u, j)[sensor.channel.name])
+        moved = point.u + STEP * np.eye(len(self.knobs))[k]
+        near = self.mounted(moved, j).sensors[s]
+        read, piece = near.predicted(motion, self.delays(moved, j)[sensor.channel.name])
+        if piece is not None:  # a jump that has crossed a sample has no slope
+            read = np.where(piece == point.pieces[j][s], read, raw)
         left, beside = sensor.freed(sensor.readings - gain * raw), near.freed(sensor.readings - gain * read)
         return np.asarray((left - beside) / STEP)
 
@@ -335,12 +336,6 @@ class Problem:
                 ]
             )
         return [np.column_stack(parts) for parts in zip(*columns, strict=True)]
-
-
-def _rate(values: Array, piece: NDArray[np.int64] | None, time: Array) -> Array:
-    """The slope of a reading over time, where it does not jump."""
-    slope = np.gradient(values, time)
-    return slope if piece is None else np.where(np.gradient(piece) == 0, slope, 0.0)
 
 
 def descend(
@@ -428,7 +423,7 @@ def _inside(knobs: Sequence[Knob], u: Array, step: Array) -> Array:
     """Where a step leads, no further than is sensible, and no further than a parameter's own limit."""
     least = np.array([-FURTHEST if k.kind == "log" else k.least for k in knobs])
     most = np.array([min(k.most, FURTHEST) if k.kind == "log" else k.most for k in knobs])
-    bold = np.array([{"log": BOLDEST, "above": BOLDER}.get(k.kind, np.inf) for k in knobs])
+    bold = np.array([{"log": BOLDEST, "within": BOLDEST, "above": BOLDER}.get(k.kind, np.inf) for k in knobs])
     return np.asarray(np.clip(u + np.clip(step, -bold, bold), least, most))
 
 

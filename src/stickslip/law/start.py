@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from typing import Any
 
@@ -33,6 +33,7 @@ CALIBRATION = 0.005  # by which gains and springs are wrong, if nothing is known
 DELAYED = 5e-5  # s by which a stated delay is wrong
 MOUNTED = {"frequency": 0.01, "damping": 0.1}  # parts by which what is stated of a mount is wrong: it is hard to tap
 FARTHEST = 10.0  # times that: a law that does not fit turned a mount by e^5, and to follow its swing took 6 GB
+EXPONENT = "exponent"  # of the fall with speed: where nobody has stated it, it is fitted within what its law says
 VISCOUS = {"viscous", "slope"}  # parameters of laws that a viscous damper can not be told from
 GRID = {"stiffness": (0.25, 1.0, 4.0, 64.0), "rate": (0.4, 1.0, 2.5), "steepness": (1.0,), "lag": (0.3, 1.0, 3.0)}
 EXCESS = (0.04, 0.15, 0.25, 0.4)  # of static over kinetic friction
@@ -320,6 +321,11 @@ def nuisance_knob(
     if _of_sensor(name):
         calibrated = Knob(name, tail, 1.0, 0.01, prior=max(calibration, 1e-9) / 0.01)
         return calibrated if tail == "gain" else Knob(name, tail, 0.0, 1e-4, prior=DELAYED / 1e-4)
+    if name == EXPONENT and name in _between(oscillator):
+        low, high = _between(oscillator)[name]
+        value = value_of(oscillator, name)
+        middle, most = math.log(math.sqrt(low * high) / value), math.log(high / value)
+        return Knob(name, "within", value, most=most, prior=(most - middle) / 2, mean=middle)
     if name == "damping":
         fastest = max(float(stretch.scales[1]) for stretch in stretches)
         return Knob(name, "positive", oscillator.damping, _level_of(oscillator) / fastest)
@@ -331,12 +337,18 @@ def nuisance_knobs(
     oscillator: Oscillator, names: Sequence[str], stretches: Sequence[Stretch], calibration: float = CALIBRATION
 ) -> list[Knob]:
     """Those of what is not known well; an amplifier is set anew for each record, so that each has gains of its own."""
+    names = [name for name in names if name != EXPONENT or name in _between(oscillator)]
     knobs = [nuisance_knob(oscillator, name, stretches, calibration) for name in names]
     if len(stretches) == 1:
         return knobs
     gains = [turned for turned in knobs if turned.kind == "gain"]
     own = [turned._replace(stretch=j) for turned in gains for j in range(len(stretches))]
     return [turned for turned in knobs if turned.kind != "gain"] + own
+
+
+def _between(oscillator: Oscillator) -> Mapping[str, tuple[float, float]]:
+    """Of the law's numbers that are chosen, between which values they are known to be."""
+    return getattr(oscillator.law, "between", {})
 
 
 def _level_of(oscillator: Oscillator) -> float:

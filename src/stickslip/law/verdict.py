@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from stickslip.estimate import Doubt, Estimate, Result, Status
 from stickslip.law.data import told
-from stickslip.law.law import LawFit, explained
+from stickslip.law.law import REMAINDER, LawFit, explained
 from stickslip.laws.guessing import family_of
 from stickslip.oscillator import Oscillator
 from stickslip.record.record import Record, Step
@@ -33,7 +33,6 @@ DRAWN = 189
 LOWEST = (0.0079, 0.105, 0.124, 0.127, 0.221, 0.231, 0.25, 0.279)  # the lowest odds of their true laws
 CERTAIN = 1 - 1 / (1 + DRAWN)  # the most that is said
 BAD = 0.3  # of a channel's own size: a law that leaves more beyond the noise describes little
-REMAINDER = "remainder"  # the kind of doubt where the best law leaves more than noise
 LEFT = 0.05  # of it: so much comes of more than the chance that an interval knows
 FAR = 6.0  # of how unsure a gain or a spring is, beyond which it is no calibration's error: 5 came of 3 % of roughness
 
@@ -295,6 +294,11 @@ class Remainder(NamedTuple):
         """Whether no more is left than noise."""
         return self.share <= LEFT and explained([self.over])
 
+    @property
+    def words(self) -> str:
+        """What is left, and where that is small, how many times the noise."""
+        return f"{self}{'' if self.share > LEFT else f', {times(self.over)} its noise'}"
+
     def __str__(self) -> str:
         return f"leaves {100 * self.share:.{0 if self.share > LEFT else 2}f} % of {self.channel}"
 
@@ -501,8 +505,7 @@ def _sentences(
             )
         rivalry = "; ".join(clauses) or "no law of another family was tried"
         fits = f"{kept[0][:1].upper()}{kept[0][1:]} fits best: the" if len(kept) == 1 else "The"
-        many = f", {times(remainder.over)} its noise" if remainder.share <= LEFT else ""
-        lead = fits if remainder.explained else f"The best of those tried {remainder}{many}. Among them the"
+        lead = fits if remainder.explained else f"The best of those tried {remainder.words}. Among them the"
         yield f"{lead} friction is {family_of(best.name).said}: {rivalry}."
     if best.family == "rigid" and len(families) == 1 and excess_ is not None:
         low, high = excess_.interval
@@ -543,11 +546,11 @@ def _either(names: Sequence[str]) -> str:
 
 
 def unexplained_part(fit: LawFit) -> Doubt | str:
-    """What even the best law leaves, where that is more than calibrations and noise are."""
+    """What even the best law leaves, where that is more than noise."""
     remainder = Remainder.of_fit(fit)
-    if remainder.share <= LEFT:
+    if remainder.explained:
         return ""
-    return Doubt(f"the best of those tried {remainder}: the friction may follow none of them", REMAINDER)
+    return Doubt(f"the best of those tried {remainder.words}: the friction may follow none of them", REMAINDER)
 
 
 def damper_found(fit: LawFit, stated: float) -> Iterator[str]:

@@ -12,10 +12,11 @@ from numpy.typing import NDArray
 
 from stickslip.errors import EstimateError, ModelError
 from stickslip.estimate import NORMAL_95, Doubt, Estimate
-from stickslip.law.law import LawFit, answered, explained, keyed, surety, teller, valued
+from stickslip.law.law import LawFit, answered, explained, keyed, remainders, surety, teller, valued
 from stickslip.law.search import Knob, Point, Problem, Profile, descend, rows_of
 from stickslip.law.start import (
     CALIBRATION,
+    EXPONENT,
     Shown,
     best_start,
     better_start,
@@ -48,7 +49,6 @@ from stickslip.law.trials import (
 )
 from stickslip.law.verdict import (
     CALIBRATIONS,
-    LEFT,
     SUPPORTED,
     Candidate,
     LawComparison,
@@ -172,6 +172,8 @@ def fit_law(
     if nuisance is None:
         nuisance = usual_nuisance(begun[0], names, shown) if names else ()
     require_apart(begun[0], names, nuisance, shown)
+    if isinstance(law, str | type) and EXPONENT not in (*names, *nuisance):
+        nuisance = (*nuisance, EXPONENT)
     stretches = [_sliding_stretch(motion, number) for number, motion in enumerate(shown)]
     start = better_start(begun[0], names, shown)
     if names:
@@ -187,7 +189,8 @@ def fit_law(
     sure = surety(problem, point, tell) if intervals else None
     if progress:
         progress(1.0)
-    return answered(problem, point, sure, shown)
+    fit = answered(problem, point, sure, shown)
+    return fit.doubted(*remainders(fit.status))
 
 
 def _begun(law: Any, oscillator: Oscillator, records: Sequence[Record]) -> list[Oscillator]:
@@ -363,7 +366,9 @@ def compare_laws(
     require_apart(oscillator, (), nuisance or (), shown)
     known = tuple(nuisance) if nuisance is not None else usual_nuisance(oscillator, (), shown)
     systems = [oscillator, *([seen_damping(oscillator, shown)] if "damping" in known else [])]
-    search = _Search(kinds, seen_by(records, systems), known, calibration, teller(progress, CALLS * len(kinds)))
+    search = _Search(
+        kinds, seen_by(records, systems), (*known, EXPONENT), calibration, teller(progress, CALLS * len(kinds))
+    )
     trials, looked = search.trials(shown)
     rests = search.seen[-1][1].rests  # of the balance with the likelier damper
     misfits = [
@@ -379,7 +384,8 @@ def compare_laws(
     doubt, confidence = doubt_of(fit, oscillator, calibration), min(confidence, supported)
     if doubt:
         ranking, confidence = undescribed(ranking), 0.0
-        fit = _flagged(fit, "none of the laws tried describes these records")
+    unexplained_ = unexplained_part(fit)
+    fit = fit.doubted(doubt or unexplained_)
     rigid = _excess(fit) if best.name == "Stribeck" and fit.parameters["speed"].interval[0] > 0 else rests.fall
     if not doubt:
         fit = _whichever(fit, [trials[one.name] for one in ranking[1:] if one.kept])
@@ -390,7 +396,7 @@ def compare_laws(
     if not doubt:
         candidates = tuple(one.worded(fit, first=one is candidates[0]) for one in candidates)
     worries: list[Doubt | str] = [*looked.worries]
-    worries += filter(None, [too_few(looked.shown, best.count), unexplained_part(fit)])
+    worries += [too_few(looked.shown, best.count), unexplained_]
     answer = concluded(candidates, confidence, fit, rigid, calibration, records, doubt, worries)
     damper = () if doubt else damper_found(fit, oscillator.damping)
     return replace(answer, verdict=" ".join([answer.verdict, *damper]))
@@ -477,23 +483,12 @@ def _fit(trial: Trial, shown: Sequence[Shown], stretches: Sequence[Stretch], tel
     begun = problem.at(trial.point.u, problem.own(trial.point.starts))
     # channels counted by their calibration leave a sum of squares that is small, and by far more than it can settle
     point = descend(problem, begun, passes=PASSES, settled=0.0, tell=tell)
+
+    def noise(name: str) -> float:
+        return max(motion.noise(name) for motion in shown if name in motion.channels)
+
     with np.errstate(all="ignore"):  # of a parameter without effect
-        fit = answered(problem, point, surety(problem, point, tell), shown)
-    noise = {name: max(motion.noise(name) for motion in shown if name in motion.channels) for name in fit.residual}
-    checks = tuple(
-        f"{name} is left with {left / noise[name]:.3g} times its noise" for name, left in fit.residual.items()
-    )
-    fit = replace(fit, noise=noise, checks=checks)
-    remainder = Remainder.of_fit(fit)
-    if remainder.share > LEFT:
-        doubt = f"the interval does not count that the law misses {100 * remainder.share:.0f} % of {remainder.channel}"
-        fit = _flagged(fit, doubt)
-    return fit
-
-
-def _flagged(fit: LawFit, status: str) -> LawFit:
-    """The fit with a reason why its parameters should not be trusted, where none is told yet."""
-    return replace(fit, parameters={key: one.doubted(status) for key, one in fit.parameters.items()})
+        return answered(problem, point, surety(problem, point, tell), shown, noise)
 
 
 def _whichever(fit: LawFit, others: Sequence[Trial]) -> LawFit:

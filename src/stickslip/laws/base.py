@@ -76,7 +76,8 @@ class Law(Protocol):
 
     What others ask, its class says where it has an answer: `label` and `formula` (how it is called and written),
     `hypotheses` (how records are asked for it), `loads` (by which parameters of a Contact it may be pressed: all its
-    forces are proportional to them), `chosen` (numbers that are not fitted), `memory_units`.
+    forces are proportional to them), `chosen` (numbers that are not fitted), `between` (where those of them that are
+    fitted without values lie), `memory_units`.
     """
 
     @property

@@ -26,7 +26,7 @@ from stickslip.laws.guessing import (
     Observed,
     Searched,
 )
-from stickslip.laws.stribeck import require_static_above, stribeck_curve
+from stickslip.laws.stribeck import EXPONENTS, require_static_above, stribeck_curve
 from stickslip.parameters import parameter, parametric
 
 
@@ -57,6 +57,7 @@ class LuGre(Sliding):
     loads = ("preload", "normal")  # of a contact: it may be told as a coefficient of friction
     memory_units: ClassVar[Mapping[str, str]] = {"bristle": "m"}
     chosen = ("exponent",)  # not fitted where nothing else is said
+    between: ClassVar = EXPONENTS
 
     kinetic: float = parameter("N", "sliding friction", positive=True, note="f_k, of fast sliding")
     static: float = parameter("N", "static friction", positive=True, note="f_s, of slowest sliding")
@@ -150,7 +151,8 @@ def _next_to(simpler: Mapping[str, Searched]) -> list[LuGre]:
     law = curve.law
     stiffness = law.kinetic / (STIFFEST * float(curve.scales[:, 0].min()))
     damping = 0.2 * math.sqrt(stiffness * curve.mass)
-    return [LuGre(law.kinetic, law.static, speed=law.speed, stiffness=stiffness, damping=damping)]
+    shape = {"speed": law.speed, "exponent": law.exponent}
+    return [LuGre(law.kinetic, law.static, stiffness=stiffness, damping=damping, **shape)]
 
 
 def _bristles(seen: Observed, stiffness: Array, speed: Array, excess: Array) -> Array:

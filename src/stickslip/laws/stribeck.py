@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from itertools import pairwise
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
@@ -24,6 +24,8 @@ if TYPE_CHECKING:
     from stickslip.laws.lugre import LuGre
 
 Curve = Callable[[Expression], Expression]
+EXPONENTS: Mapping[str, tuple[float, float]] = {"exponent": (0.5, 4.0)}  # most are 0.5 to 2: Armstrong-Helouvry (1994)
+SHARPER = (0.5, 1.0)  # exponents of curves that a search begins at, beside 2
 LOWEST = 0.1  # of the level, that a guess has in fast sliding
 SLIDING = 0.01  # of the largest speed, above which friction tells the curve
 
@@ -77,6 +79,7 @@ class Stribeck(Rigid):
     )
     loads = ("preload", "normal")  # of a contact: it may be told as a coefficient of friction
     chosen = ("exponent",)  # not fitted where nothing else is said
+    between: ClassVar = EXPONENTS
 
     kinetic: float = parameter("N", "sliding friction", note="f_k, at high speed")
     static: float = parameter("N", "static friction", note="f_s, the level at rest")
@@ -127,19 +130,32 @@ class Stribeck(Rigid):
 
 
 def _guesses(seen: Observed) -> list[Stribeck]:
-    """The curves that the sliding friction fits best, of three falls that differ: its likelihood has several tops."""
+    """The curves that the sliding friction fits best: the likelihood has several tops over fall and exponent."""
+    sharp = [_fitting(seen, exponent) for exponent in SHARPER]
+    tried = _fitting(seen, 2.0)
+    best = _nearest(tried)
+    apart = dict.fromkeys((best, max(0, best - GRID // 3), min(GRID - 1, best + GRID // 3)))
+    return [tried[i][1] for i in apart] + [curves[_nearest(curves)][1] for curves in sharp]
+
+
+def _nearest(tried: Sequence[tuple[float, Stribeck]]) -> int:
+    """Which of the curves leaves least."""
+    return min(range(len(tried)), key=lambda i: tried[i][0])
+
+
+def _fitting(seen: Observed, exponent: float) -> list[tuple[float, Stribeck]]:
+    """Curves of an exponent, one for each fall, and the sum of squares that each leaves of the sliding friction."""
     sliding = np.abs(seen.speed) > SLIDING * seen.fastest
     speed, friction = np.abs(seen.speed[sliding]), (seen.friction * np.sign(seen.speed))[sliding]
     tried = []
     for fall in seen.fastest * np.geomspace(*SPEEDS, GRID):
-        columns = np.column_stack([np.ones(len(speed)), np.exp(-((speed / fall) ** 2))])
+        columns = np.column_stack([np.ones(len(speed)), np.exp(-((speed / fall) ** exponent))])
         (level, excess), left, *_ = np.linalg.lstsq(columns, friction, rcond=None)
         level = max(float(level), LOWEST * seen.level)
         static = float(level + max(LEAST_EXCESS * level, excess))
-        tried.append((float(left[0]) if len(left) else np.inf, Stribeck(float(level), static, speed=float(fall))))
-    best = min(range(GRID), key=lambda i: tried[i][0])
-    apart = dict.fromkeys((best, max(0, best - GRID // 3), min(GRID - 1, best + GRID // 3)))
-    return [tried[i][1] for i in apart]
+        law = Stribeck(float(level), static, speed=float(fall), exponent=exponent)
+        tried.append((float(left[0]) if len(left) else np.inf, law))
+    return tried
 
 
 def _from_static(simpler: Mapping[str, Searched]) -> list[Stribeck]:

@@ -91,7 +91,9 @@ def _story(fit: Fit, record: Records, headline: list[str], **content: Any) -> St
     """What all fits tell of their parameters and of the records that they were made to."""
     records = [record] if isinstance(record, Record) else list(record)
     units = list(dict.fromkeys(caution for record in records for caution in leading(record.check())))
-    cautions = [*map(Caution, (doubt.words for doubt in doubts_of(fit.status))), *doubts(fit.estimates)]
+    own = doubts(fit.estimates)
+    said = {caution.reason for caution in own}
+    cautions = [*(Caution(doubt.words) for doubt in doubts_of(fit.status) if doubt.words not in said), *own]
     if records:
         first = records[0]
         content = {"channels": list(first.channels.values()), "history": first.history, **content}
