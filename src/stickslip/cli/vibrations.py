@@ -63,7 +63,7 @@ def joint(
     episodes, are told together too, and each is predicted by the others.
 
     Results go into a folder: report.html to open in a browser, results.json, the figures, and the joint for MuJoCo,
-    URDF, Modelica, Simulink and C.
+    URDF, Modelica, Simulink, C and as an FMU. A logged temperature tells the friction over it, per kelvin.
 
     \b
     stickslip joint shoulder.csv --torque-constant "0.87 N m/A"
