@@ -38,7 +38,7 @@ from stickslip.solve.poincare import carry_tangents
 from stickslip.solve.refusal import Budget
 from stickslip.solve.tables import Array
 
-TIRELESS = np.int64(2**62)  # cells: a march of many motions is not interrupted (a plain 2**62 is a type of its own)
+TIRELESS = 2**62  # cells: a march of many motions is not interrupted
 LAP = 64  # pieces remembered of a motion, a power of two; a lap of the drive with more has no fast path
 ROOM = 16  # pieces written before they are counted
 BUDGET = 10_000  # events in a period; more is taken for chatter
@@ -172,7 +172,7 @@ def watch_one(i, s, given, out, rooms):
         tangent[0, k] = (1.0 - 0.5 * k / max(1, physical - 1)) / given.weights[i, k] if k < physical else 0.0
     out.growths[i] = 0.0
     _unmarked(marks, math.ceil(total / PARTS) if driven and not growing else 0.0)
-    lap, last, lasted = np.int64(0), 0, 0.0  # a plain 0 is a type of its own: all below would be compiled for it, too
+    lap, last, lasted = 0, 0, 0.0
     while lap < total and mode >= 0:
         until = total - max(0, rows - 1)
         if growing or lap >= until:

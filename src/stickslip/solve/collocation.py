@@ -257,7 +257,7 @@ def leap(implicit, mode, unit, state, big, h, poly, work):
 
     `unit` is that of the Taylor series [s]: the drive's signals are polynomials, or tones.
     """
-    (step, stages), scheme, model = work, implicit.scheme, implicit.model
+    step, stages, scheme, model = work.step, work.stages, implicit.scheme, implicit.model
     for i in range(STAGES):
         advance(step.s, step.order, scheme.points[i] * h / unit, stages.values[i])
         turn(model.tones, state, scheme.points[i] * h, stages.values[i])
@@ -277,7 +277,7 @@ def leap(implicit, mode, unit, state, big, h, poly, work):
 @compiled(**EXACT)
 def _fitted_node(node, size, fit, work):
     """Powers of w of any kept node, in the room for an exit."""
-    step, stages = work
+    step, stages = work.step, work.stages
     fitted(stages.values if node < size else stages.nodes, node, step.s[node * (step.order + 1)], fit, step.c)
 
 

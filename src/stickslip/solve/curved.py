@@ -198,11 +198,14 @@ class _Run:
         self.events = Budget(table, scale=self.scale, most=budget)
         self.clock = np.array([0.0, 0.0, 1e-6 * self.scale, 0.0, 0.0, march.PATIENCE])
         self.state, self.big = state.copy(), np.abs(state)
-        self.work = Work(taylor.room(count, self.model.order, size), collocation.room(count, size, table.physical))
         self.kept: list[Steps] = []
         self.leapt = [Leaps(np.empty((0, size, collocation.WIDTH)), np.empty(0))]
         self.room = room_for(CHUNK, size)
-        self.leaps = Leaps(np.empty((LEAPS, size, collocation.WIDTH)), np.empty(LEAPS))
+        self.work = Work(
+            taylor.room(count, self.model.order, size),
+            collocation.room(count, size, table.physical),
+            Leaps(np.empty((LEAPS, size, collocation.WIDTH)), np.empty(LEAPS)),
+        )
         self.heed: Callable[[], None] | None = None  # lets a Ctrl-C through that came within a chunk
         self.fresh, self.stiff = True, False  # whether the march was not called yet, and whether it leaps
 
@@ -228,14 +231,14 @@ class _Run:
         if follow is None and len(stops.ends) > 1:
             outcome, written, leapt, self.mode, self.stop = march.course(
                 self.implicit, self.clock, self.state, self.big, self.mode, stops, self.stop, self.scale,
-                steps, self.leaps, self.work,
+                steps, self.work,
             )  # fmt: skip
         else:
             outcome, written, leapt, self.mode, self.stop = self._to_stop(stops, follow or self._freely)
         if written:
             steps.leaps[:written][steps.leaps[:written] >= 0] += sum(len(part.reach) for part in self.leapt)
             self.kept.append(Steps._make(column[:written].copy() for column in steps))
-            self.leapt.append(Leaps._make(column[:leapt].copy() for column in self.leaps))
+            self.leapt.append(Leaps._make(column[:leapt].copy() for column in self.work.leaps))
         if self.heed:
             self.heed()
         laps = self.clock[LAPS] - before[LAPS]
@@ -261,7 +264,7 @@ class _Run:
         """Taylor steps, until the contact turns out stiff: what leaps takes seconds to compile."""
         if self.stiff:
             return march.strides(  # type: ignore[no-any-return]
-                self.implicit, clock, state, big, mode, until, steps, 0, self.leaps, 0, self.work
+                self.implicit, clock, state, big, mode, until, steps, 0, 0, self.work
             )
         outcome, written, mode = march.march(self.model, clock, state, big, mode, until, steps, 0, step)
         if outcome == march.STIFF:

@@ -315,7 +315,7 @@ def march(model, clock, state, mode, limit, past, out, work, patience):
         Status, number of pieces, mode, and the clock.
     """
     n, linear, spent = state.shape[0], model.linear, 0
-    count = np.int64(0)  # a plain 0 is a type of its own to numba: what it is handed to would be compiled once more
+    count = 0
     room, moving = parts_of(work, n), parts_of(work, n).moving
     capacity, quick = out.laps.shape[0], model.fast.nodes.shape[0] > 0
     while True:
@@ -373,7 +373,7 @@ def march(model, clock, state, mode, limit, past, out, work, patience):
 def course(model, clock, state, mode, stops, stop, past, out, work, patience):
     """As :func:`march`, on the way to stop `stop` of several (:class:`~stickslip.solve.tables.Stops`) and to those
     behind it; returns also the stop that it is on its way to."""
-    done = np.int64(0)
+    done = 0
     last = Clock(stops.ends[-1, 0], stops.ends[-1, 1], 0.0)
     while True:
         end = Clock(stops.ends[stop, 0], stops.ends[stop, 1], 0.0)

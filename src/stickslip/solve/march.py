@@ -61,10 +61,11 @@ class Leaps(NamedTuple):
 
 
 class Work(NamedTuple):
-    """What a march writes on: the series of a step, and the stages of a leap."""
+    """What a march writes on: the series of a step, the stages of a leap, and the leaps."""
 
     step: Step
     stages: Stages
+    leaps: Leaps
 
 
 class Dense(NamedTuple):
@@ -289,9 +290,9 @@ def _attempt(implicit, clock, state, big, mode, remaining, poly, work):
 
 
 @compiled(**EXACT)
-def strides(implicit, clock, state, big, mode, until, steps, row, leaps, leapt, work):
+def strides(implicit, clock, state, big, mode, until, steps, row, leapt, work):
     """As :func:`march`, with a leap where one is due, if it can be: also the number behind those written."""
-    model = implicit.model
+    model, leaps = implicit.model, work.leaps
     while True:
         outcome, row, mode = march(model, clock, state, big, mode, until, steps, row, work.step)
         if outcome != STIFF:
@@ -313,14 +314,14 @@ def strides(implicit, clock, state, big, mode, until, steps, row, leaps, leapt, 
 
 
 @compiled(**EXACT)
-def course(implicit, clock, state, big, mode, stops, stop, longest, steps, leaps, work):
+def course(implicit, clock, state, big, mode, stops, stop, longest, steps, work):
     """As :func:`strides`, on the way to stop `stop` of several (:class:`~stickslip.solve.tables.Stops`) and to those
     behind it; returns also the stop that it is on its way to. A Taylor step is at most `longest` [s] to begin with: at
     rest steps would grow for ever."""
     row, leapt = 0, 0
     while True:
         until = (stops.ends[stop, 0], stops.ends[stop, 1])
-        outcome, row, leapt, mode = strides(implicit, clock, state, big, mode, until, steps, row, leaps, leapt, work)
+        outcome, row, leapt, mode = strides(implicit, clock, state, big, mode, until, steps, row, leapt, work)
         if outcome != DONE or stop + 1 == stops.ends.shape[0]:
             return outcome, row, leapt, mode, stop
         stop += 1
