@@ -2,16 +2,23 @@
 
 from __future__ import annotations
 
+import math
 from functools import cache
 from pathlib import Path
 
 import numpy as np
 import pytest
+import scipy.integrate
 from click.testing import CliRunner
+from numpy.typing import NDArray
 
 import stickslip as ss
 from null_decays import NOISES, let_go, null_decay
+from stickslip.answers.findings import BY_DECREMENTS
 from stickslip.cli.program import main
+from stickslip.estimate import stands
+
+Array = NDArray[np.float64]
 
 
 @cache
@@ -35,7 +42,10 @@ def test_dry_friction_that_is_there_is_told() -> None:
     assert findings.decay.rubs
     told = " ".join(ss.summary(findings).headline)
     assert "dies away by viscous and dry friction" in told
-    assert "if the dry friction stays the same. If it rises by 1 % over the decay, the damping ratio is read" in told
+    assert (
+        "if the dry friction stays the same. If the dry friction rises by 1 % over the decay, the damping ratio is read"
+        in told
+    )
     assert "dry friction force of" in told
 
 
@@ -87,3 +97,27 @@ def test_of_many_decays_without_dry_friction_hardly_any_is_said_to_have_some(noi
         without = choose_motion(record, candidates=("viscous", "both")).choice.candidate("viscous").p_value
         told += without < CHANCE and ss.fit_decay(record).dry_displacement.interval[0] > 0
     assert told <= 4  # 1.7 of 170 are meant; more than 4 come once in thirty
+
+
+def test_bristles_that_the_decrements_know_nothing_of_leave_them_in_doubt() -> None:
+    """The decay of a LuGre contact: the decrements were sure, and off by fifty standard deviations."""
+    k, c, level, static, fall, bristles, loss = 400.0, 0.6, 0.1, 0.13, 0.01, 2e4, 20.0
+
+    def rates(_: float, state: Array) -> list[float]:
+        x, v, bend = state
+        rate = v - abs(v) * bristles * bend / (level + (static - level) * math.exp(-((v / fall) ** 2)))
+        return [v, -k * x - c * v - bristles * bend - loss * rate, rate]
+
+    times = np.arange(4000) / 500
+    motion = scipy.integrate.solve_ivp(rates, (0, times[-1]), [8e-3, 0.0, 0.0], "LSODA", times, rtol=1e-8, atol=1e-12)
+    noisy = motion.y[0] + np.random.default_rng(3).normal(0, 5e-6, len(times))
+    findings = ss.analyze_decay(ss.Record.of({"x": noisy}, fs=500.0), mass=1.0, stiffness=k)
+    decay, truth = findings.decay, {"damping ratio": c / (2 * math.sqrt(k)), "dry friction displacement": level / k}
+    for estimate in decay.estimates:
+        name = estimate.name.removesuffix(BY_DECREMENTS).removesuffix(", whichever motion")
+        if stands(estimate.status) and name in truth:
+            assert estimate.includes(truth[name]), str(estimate)
+    headline = " ".join(ss.summary(findings).headline)
+    assert "weakly" not in headline
+    assert "Whichever of" in headline
+    assert "If the dry friction rises by 1 %" in headline

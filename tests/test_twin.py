@@ -167,6 +167,18 @@ def test_stuck_time_is_counted_without_the_bias_of_a_threshold() -> None:
     assert "not yet corrected by twins" in captions["record"]  # the grey is the quick one's, beside a corrected share
 
 
+def test_a_stick_that_was_there_before_the_record_is_no_stop_of_it() -> None:
+    """Twins began with a stop of their own in every record that begins in a stick: 4.2 a cycle where 4 are."""
+    record = stepped.record(STOPS, np.random.default_rng(11))
+    at_rest = np.abs(np.gradient(record["x"])) < 1e-2 * np.ptp(np.gradient(record["x"]))
+    begin = int(np.flatnonzero(at_rest & np.roll(at_rest, -10) & np.roll(at_rest, 10))[0])
+    cycle = round(record.fs / STOPS.frequency)
+    quick = ss.analyze(record.rows(begin, begin + 5 * cycle), **STOPS.stated)
+    assert quick.sticks.events[0].kind == "stick"
+    assert not quick.sticks.events[0].whole
+    assert ss.tried(quick, twins=8).sticks.per_cycle.value == pytest.approx(2.0)
+
+
 def test_a_contact_that_gives_way_is_found_with_its_stiffness() -> None:
     quick, tried = asked(YIELDS)
     assert quick.presliding.verdict != "gives way"

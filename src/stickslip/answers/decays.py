@@ -15,13 +15,13 @@ from stickslip.answers.mistakes import mistakes_of_decay
 from stickslip.decay.answer import DecayFit, rig_units
 from stickslip.decay.decrement import Decrement, decrement
 from stickslip.decay.extremes import EnvelopeDecay, extreme_decay, hilbert_decay, linear_decrement, log_decrement
-from stickslip.decay.fit_decay import fit_decay
+from stickslip.decay.fit_decay import LEFT_OVER, fit_decay
 from stickslip.decay.motions import Restoring
 from stickslip.decay.release import Releases, find_releases
 from stickslip.decay.start import SEEN
 from stickslip.decay.which_motion import PLAIN, DecayMotion, choose_motion, whichever
 from stickslip.errors import EstimateError, StickslipError
-from stickslip.estimate import Constant, Doubt, Estimate, Result, Status
+from stickslip.estimate import Constant, Doubt, Estimate, Result, Status, kinds
 from stickslip.record.record import Record, require_record
 from stickslip.statistics import disagreement, weighted_mean
 from stickslip.units import parse_constant
@@ -178,7 +178,15 @@ class Decay(Result):
     def denied(self) -> bool:
         """Whether the record speaks against viscous and dry friction, and for none of the other motions."""
         negative = self.best.dry_displacement.interval[1] < 0
-        return self.best is not self.motion and (self.against < CLEAR or negative)
+        return self.best is not self.motion and (self.against < CLEAR or negative or self.strays)
+
+    @property
+    def strays(self) -> bool:
+        """Whether viscous and dry friction leave much more than the record's own noise.
+
+        What is left is then the noise of every motion tried, and speaks weakly against each.
+        """
+        return self.waveform is not None and LEFT_OVER in kinds(self.waveform.status)
 
     @property
     def estimates(self) -> tuple[Estimate, ...]:
@@ -207,7 +215,9 @@ class Decay(Result):
             self._other_ratio,
             () if self.thesis is None or self.best is self.thesis else self.thesis.estimates,
         )
-        denied = [DENIED] if self.against < CLEAR else []  # of another motion they may be off by ten deviations
+        denied = (
+            [DENIED] if self.against < CLEAR or self.strays else []
+        )  # of another motion they may be off by ten deviations
         estimates = [
             replace(estimate, name=f"{estimate.name}{BY_DECREMENTS}", status=Status(estimate.status, *denied))
             for estimate in more

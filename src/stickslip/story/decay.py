@@ -178,7 +178,7 @@ def _frictions(findings: Findings) -> Iterator[str]:
     decay = findings.decay
     yield _dying(decay)
     yield from _steady(decay)
-    if CLEAR <= decay.against < SIZE:
+    if CLEAR <= decay.against < SIZE and not decay.strays:
         yield (
             f"The motions tried speak against viscous and dry friction, but weakly (p = {decay.against:.1g}): of "
             "true ones too one in twenty does so."
@@ -202,7 +202,9 @@ def _dying(decay: Decay) -> str:
     if decay.denied and decay.whichever:
         ratio, dry = decay.whichever
         reach = f"the damping ratio is {_reach(ratio)} and the dry friction displacement {_reach(dry)}"
-        return f"Whichever motion it was, {reach}: read as viscous and dry friction, which the record speaks against."
+        tried = len(decay.motion.candidates) if decay.motion is not None else 0
+        which = f"Whichever of {tried} motions it was" if tried else "Whichever motion it was"
+        return f"{which}, {reach}: read as viscous and dry friction, which the record speaks against."
     if decay.denied or curved:
         return f"Read as viscous and dry friction, which the record speaks against, it shows {shown}."
     if viscous and rubs:
@@ -219,17 +221,15 @@ def _dying(decay: Decay) -> str:
 
 def _steady(decay: Decay) -> Iterator[str]:
     """What of the damping ratio a dry friction that changes on the way would be: no record tells the two well apart."""
-    ratio = decay.best.damping_ratio
-    if decay.motion is None or decay.best is not decay.waveform or decay.denied:
-        return
-    if not (decay.rubs and ratio.interval[0] > 0):
+    ratio = decay.whichever[0] if decay.denied and decay.whichever else decay.best.damping_ratio
+    if decay.motion is None or decay.best is not decay.waveform or not (decay.rubs and ratio.interval[0] > 0):
         return
     per_drift = decay.motion.choice.candidate("both").damping_per_drift
     fall = -100 * ratio.value / per_drift if per_drift else math.inf
     all_of_it = f"; a fall by about {fall:.0f} % would pass for all of it" if 0 < fall < 100 else ""
     moved = "small" if per_drift < 0 else "large"
     yield (
-        f"If it rises by 1 % over the decay, the damping ratio is read {abs(per_drift) / 100:.2g} too "
+        f"If the dry friction rises by 1 % over the decay, the damping ratio is read {abs(per_drift) / 100:.2g} too "
         f"{moved}{all_of_it}."
     )
 

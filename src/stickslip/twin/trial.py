@@ -286,13 +286,15 @@ def _asked(
 def _truth(rig: Belief, record: Record, frequency: float) -> dict[str, float]:
     """What is true of a twin, by the name of the answer."""
     cycles = math.floor(record.duration * frequency) if frequency > 0 else 0
-    stops = sum(kind in STICKS and time * frequency < cycles for time, kind in record.truth["events"])
+    # a twin of a record that begins in a stick is not quite at rest there, and comes to a stop that the record has not
+    begin = 1 if cycles > 1 else 0
+    stops = sum(kind in STICKS and begin <= time * frequency < cycles for time, kind in record.truth["events"])
     return {
         **dict.fromkeys(DIRECTIONS, rig.kinetic),
         OFFSET: 0.0,
         ENERGY: rig.work(cycles / frequency) / cycles if cycles else math.nan,
         SHARE: float(record.truth[SHARE]),
-        STOPS: stops / cycles if cycles else math.nan,
+        STOPS: stops / (cycles - begin) if cycles else math.nan,
     }
 
 
