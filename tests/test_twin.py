@@ -20,7 +20,7 @@ import stickslip as ss
 from stickslip.answers.on_twins import _yields
 from stickslip.cli.program import main
 from stickslip.estimate import UNTRIED, kinds, stands
-from stickslip.twin.belief import EXCESS, HELD, LATE, SLOPE, SPRING
+from stickslip.twin.belief import EXCESS, GAIN, HELD, LATE, SLOPE, SPRING
 from stickslip.twin.search import _left, _linearised, _step, _towards, believe
 from stickslip.twin.trial import ASTRAY, _Misfit
 
@@ -350,6 +350,16 @@ def test_a_slip_is_named_once_and_by_the_nearest_rig() -> None:
     off = [(LATE, -2e-4), (SPRING, 2e-3), (SPRING, 1e-3)]
     slips = replace(belief.at(**{LATE: -1e-4}), rivals=tuple(belief.at(**{name: value}) for name, value in off))
     assert _Misfit.of(slips, 1.0).slip == "x 0.1 ms early or a spring 0.1 % larger than stated"
+
+
+def test_a_slip_is_named_with_what_looks_like_it() -> None:
+    """Who is told to correct x, and has the damper on the base or z miscalibrated, is led astray."""
+    belief = asked(STOPS)[1].trial.belief
+    shift = STOPS.damping / STOPS.stiffness
+    assert belief.at(**{LATE: -shift}).slip == "x 1.2 ms early, or the damper on the base"
+    assert belief.at(**{LATE: shift}).slip == "x 1.2 ms late"
+    slip = belief.at(**{GAIN: -5e-3}).slip
+    assert slip == "a gain of x 0.5 % smaller than stated, or that of z as much the other way"
 
 
 def test_what_is_taken_off_has_the_sign_that_is_said() -> None:

@@ -50,6 +50,7 @@ POWERS = (math.log(0.5), math.log(4.0))  # between which the logarithm of the ex
 FALLS = (3e-3, 10.0)  # Stribeck speed over the largest speed: below it is static friction, above a line
 STEEP = 1e-3  # of the largest speed, at which the backbone of a friction that lags has turned over: as good as a jump
 GAUSS = 2.0  # exponent of the bristles' curve
+ALIKE = 0.25  # of c/k, within which a late x is what a damper on the base does
 SLIDES = 0.2  # of the largest speed, above which friction is that of sliding: below, sticks and smoothing are in it
 FALL = 0.02  # of friction, over the speeds at which it slides
 EVENTS = 1000  # in a cycle, beyond which a rig that is tried is given up
@@ -254,12 +255,21 @@ class Belief:
 
     @property
     def slip(self) -> str:
-        """The same in words, with by how much."""
+        """The same in words, with by how much, and what would look alike."""
         name = self.slipped
         if name == LATE:
-            return f"x {1e3 * abs(self.late):.2g} ms {'late' if self.late > 0 else 'early'}"
-        off = 100 * math.expm1(self.values[name]) if name else 0.0
-        return f"a {name} {abs(off):.2g} % {'larger' if off > 0 else 'smaller'} than stated" if name else ""
+            words = f"x {1e3 * abs(self.late):.2g} ms {'late' if self.late > 0 else 'early'}"
+            rig = self.stated
+            # a damper that ends on the base moves the spring's end by c/k times its velocity: as a clock would
+            base, shift = rig.damper == "base", rig.damping / rig.stiffness
+            alike = shift > 0 and abs(self.late - (shift if base else -shift)) < ALIKE * shift
+            return f"{words}, or the damper on the {'ground' if base else 'base'}" if alike else words
+        if not name:
+            return ""
+        off = 100 * math.expm1(self.values[name])
+        words = f"a {name} {abs(off):.2g} % {'larger' if off > 0 else 'smaller'} than stated"
+        moves = driving(self.record)
+        return f"{words}, or that of {moves} as much the other way" if name == GAIN and moves else words
 
     @property
     def strain(self) -> float:
