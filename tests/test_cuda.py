@@ -7,13 +7,17 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
+import numba
 import numpy as np
 import pytest
 
 import stickslip as ss
 from batches import Batch, simulate_batch
 from stickslip.errors import ModelError
+from stickslip.maps.crowd import rooms
 
 MASS, SPRING = 2.42, 2310.0
 RIGID = ss.Oscillator(
@@ -88,6 +92,28 @@ def test_a_gpu_gives_the_same_events_and_states(name: str, simulated: dict[str, 
         scale = np.max(np.abs(mine), axis=tuple(range(mine.ndim - 1)))
         scale[:2] = np.maximum(scale[:2], DRIVEN)  # a motion out of a graze is small beside what moves it
         assert np.all(np.abs(mine - theirs) <= 1e-13 * scale), key
+
+
+def test_the_kernel_is_typed_and_lowered_for_a_gpu(monkeypatch: pytest.MonkeyPatch) -> None:
+    """By numba-cuda's own compiler, as far as NVIDIA's, which needs no card: the simulated GPU runs plain Python."""
+    compiler = pytest.importorskip("numba.cuda.compiler", reason='numba has no CUDA target: pip install ".[gpu]"')
+    from stickslip.maps import cuda
+
+    blocks: list[tuple[Any, ...]] = []
+
+    def refused(given: Any, out: Any, size: int, physical: int) -> None:
+        blocks.append((given, out, rooms(len(given.states), size, physical)))
+        raise KeyboardInterrupt
+
+    card = SimpleNamespace(compute_capability=(9, 0))
+    monkeypatch.setattr("numba.cuda.dispatcher.get_current_device", lambda: card)
+    monkeypatch.setattr(cuda, "_require_gpu", lambda: None)
+    monkeypatch.setattr(cuda, "_watch", refused)
+    with pytest.raises(KeyboardInterrupt):
+        ss.sweep(RIGID, {"kinetic": [0.5, 1.0]}, engine="cuda", settle=1, cycles=1)
+    kernel, types = cuda._watch_thread.py_func, tuple(map(numba.typeof, blocks[0]))
+    compiled = compiler.compile_cuda(kernel, numba.types.void, types, cc=card.compute_capability)
+    assert "double" in compiled.library.get_llvm_str()
 
 
 @pytest.mark.parametrize("name", CASES)
