@@ -104,6 +104,11 @@ def test_what_a_unit_can_not_hold_is_refused(tmp_path: Path, monkeypatch: pytest
     assert not [*tmp_path.iterdir()]
 
 
+def test_a_file_without_the_ending_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(ModelError, match=r"no FILE\.fmu"):
+        ss.laws.export_fmu(ss.laws.Coulomb(1.0), tmp_path / "unit", mass=1.0, sources_only=True)
+
+
 def test_the_same_law_gives_the_same_sources(tmp_path: Path) -> None:
     """A name that C can not bear becomes one; nothing in the file tells when it was written."""
     paths = [tmp_path / place / "3 sliders.fmu" for place in "ab"]

@@ -144,7 +144,7 @@ def export_fmu(
     Raises
     ------
     ModelError
-        The law has no such form, a value has no meaning, or no C compiler is there.
+        The law has no such form, a value has no meaning, the file does not end in .fmu, or no C compiler is there.
 
     Examples
     --------
@@ -160,6 +160,8 @@ def export_fmu(
     if damper not in ("ground", "base"):
         raise ModelError(f"damper = '{damper}'", "it is fixed to the ground or the base", "give one of them")
     path = Path(path)
+    if path.suffix != ".fmu":
+        raise ModelError(f"'{path}' is no FILE.fmu", "tools know a unit by this ending", "give it a name that ends so")
     name = re.sub(r"\W", "_", path.stem, flags=re.ASCII)
     name = name if name[:1].isalpha() else f"model_{name}"
     begins = (0.0, 0.0, 0.0, 0.0, mass, stiffness, damping, 0.0, 0.0, 0.0)
