@@ -343,6 +343,14 @@ def test_wrong_use_ends_in_one_sentence_and_exit_code_2(arguments: list[str]) ->
     assert sorted(Path().rglob("*")) == before
 
 
+@pytest.mark.parametrize("command", ["analyze", "decay", "joint"])
+def test_a_sensor_that_the_record_does_not_have_is_named(command: str) -> None:
+    slide("run.csv", rows=1000)
+    result = run(command, "run.csv", *MAP, "--sensor", "banana.delay=15 ms")
+    refused(result, code=2)
+    assert "'banana' is no channel of the record, which has x, friction" in result.stderr
+
+
 def test_a_load_that_is_none_is_named_by_its_option() -> None:
     slide("run.csv", rows=1000)
     for load in ("-3", "run*=heavy"):

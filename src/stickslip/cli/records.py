@@ -209,6 +209,8 @@ def answers(
                 results.append(of_parts(ss.answers.read_parts(group, rig=rig, names=names), say))
                 continue
             record = (reader or ss.answers.read_mended)(group, rig=rig, names=names)
+            if len(groups) == 1:
+                _require_described(record)
             tell(f"checking and analysing {name}", 2 * number + 1)
             results.append(ask(record))
     if results:
@@ -219,6 +221,17 @@ def answers(
     raise type(refused[0])(
         f"none of {len(refused)} records answers", "each has its own reason, told above", "mend them, or give others"
     )
+
+
+def _require_described(record: Record) -> None:
+    """Refuse a sensor that the command line describes and the only record does not have."""
+    for text in click.get_current_context().params.get("sensors", ()):
+        name = text.partition(".")[0]
+        if name not in record:
+            raise click.BadParameter(
+                f"'{name}' is no channel of the record, which has {', '.join(record)}; name one of them",
+                param_hint="--sensor",
+            )
 
 
 def answer_together(
