@@ -21,7 +21,7 @@ from stickslip.decay.release import Releases, find_releases
 from stickslip.decay.start import SEEN
 from stickslip.decay.which_motion import PLAIN, DecayMotion, choose_motion, whichever
 from stickslip.errors import EstimateError, StickslipError
-from stickslip.estimate import Constant, Doubt, Estimate, Result, Status, kinds
+from stickslip.estimate import Constant, Doubt, Estimate, Result, Status, doubts_of
 from stickslip.record.record import Record, require_record
 from stickslip.statistics import disagreement, weighted_mean
 from stickslip.units import parse_constant
@@ -178,15 +178,16 @@ class Decay(Result):
     def denied(self) -> bool:
         """Whether the record speaks against viscous and dry friction, and for none of the other motions."""
         negative = self.best.dry_displacement.interval[1] < 0
-        return self.best is not self.motion and (self.against < CLEAR or negative or self.strays)
+        return self.best is not self.motion and (self.against < CLEAR or negative)
 
     @property
-    def strays(self) -> bool:
-        """Whether viscous and dry friction leave much more than the record's own noise.
+    def strays(self) -> tuple[Doubt, ...]:
+        """That viscous and dry friction leave much more than the record's own noise, where they do.
 
         What is left is then the noise of every motion tried, and speaks weakly against each.
         """
-        return self.waveform is not None and LEFT_OVER in kinds(self.waveform.status)
+        status = "ok" if self.waveform is None else self.waveform.status
+        return tuple(doubt for doubt in doubts_of(status) if doubt.kind == LEFT_OVER)
 
     @property
     def estimates(self) -> tuple[Estimate, ...]:

@@ -178,7 +178,10 @@ def _frictions(findings: Findings) -> Iterator[str]:
     decay = findings.decay
     yield _dying(decay)
     yield from _steady(decay)
-    if CLEAR <= decay.against < SIZE and not decay.strays:
+    if decay.strays and decay.against >= CLEAR:
+        words = decay.strays[0].words
+        yield f"{words[0].upper()}{words[1:]}."
+    elif CLEAR <= decay.against < SIZE:
         yield (
             f"The motions tried speak against viscous and dry friction, but weakly (p = {decay.against:.1g}): of "
             "true ones too one in twenty does so."
