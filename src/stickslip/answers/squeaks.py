@@ -14,8 +14,9 @@ from stickslip.cycle.loops import NO_SLOPE, friction_loops
 from stickslip.errors import EstimateError
 from stickslip.estimate import Estimate, kinds
 from stickslip.record.record import Record, require_record
-from stickslip.squeak.bursts import HEARD, Squeaks, find_squeaks
+from stickslip.squeak.bursts import Squeaks, find_squeaks
 from stickslip.squeak.couplings import coupling
+from stickslip.squeak.hearing import HEARD
 from stickslip.squeak.quality import SoundQuality, impulsiveness, sound_quality
 from stickslip.squeak.spectra import burst_spectra
 from stickslip.units import parse_constant, parse_range, parse_value

@@ -329,9 +329,16 @@ def lab(port: int, config: Path | None, records: Path | None, no_browser: bool) 
     stickslip lab
     stickslip lab --port 9000 --no-browser
     """
-    from stickslip.lab import serving  # the server is imported where it is wanted
+    try:
+        from stickslip.lab import server  # its packages are imported where it is wanted
+    except ImportError as error:
+        raise ss.errors.ModelError(
+            f"the lab needs the package {error.name}",
+            "it comes with the extra [lab]",
+            'pip install ".[lab]" in the checkout',
+        ) from error
 
-    with serving.listening(port) as door:
+    with server.listening(port) as door:
         token = secrets.token_urlsafe(24)
         address = f"http://127.0.0.1:{door.getsockname()[1]}/?token={token}"
 
@@ -341,6 +348,6 @@ def lab(port: int, config: Path | None, records: Path | None, no_browser: bool) 
                 webbrowser.open(doorway(address).as_uri())
 
         try:
-            serving.serve(door, token=token, opened=opened, rig=config, records=records)
+            server.serve(door, token=token, opened=opened, rig=config, records=records)
         except KeyboardInterrupt:  # the server has shut down by then, and hands the signal on
             say("The lab has ended.")

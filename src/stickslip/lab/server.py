@@ -10,12 +10,16 @@ from __future__ import annotations
 import asyncio
 import os
 import secrets
-from collections.abc import AsyncIterator
+import signal
+import socket
+from collections.abc import AsyncIterator, Callable
 from contextlib import AsyncExitStack, asynccontextmanager
+from functools import partial
 from pathlib import Path
 from typing import Any, ClassVar
 from urllib.parse import parse_qs
 
+import uvicorn
 from starlette.applications import Starlette
 from starlette.datastructures import Headers, MutableHeaders
 from starlette.exceptions import HTTPException
@@ -34,7 +38,9 @@ from stickslip.lab.data import LARGEST
 from stickslip.lab.openapi import described, document
 from stickslip.lab.workers import Workers
 
-HOSTS = ("127.0.0.1", "localhost")
+HOST = "127.0.0.1"
+HOSTS = (HOST, "localhost")
+LARGEST_MESSAGE = 2**20  # bytes on a socket
 LIMIT = 2**20  # bytes of a request
 LIMITS = {"/files": LARGEST}  # by how the path begins: records are large
 SILENCE = 60.0  # seconds without a byte of a body after which its sender is given up
@@ -314,3 +320,66 @@ class PatientProtocol(H11Protocol):
     def _give_up(self) -> None:
         self._leave()
         self.transport.abort()
+
+
+def listening(port: int) -> socket.socket:
+    """The port, taken; 0 takes any that is free.
+
+    Raises
+    ------
+    ModelError
+        Another program has it, or it is for the administrator alone.
+    """
+    door = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
+    door.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    try:
+        door.bind((HOST, port))
+    except PermissionError as error:
+        door.close()
+        raise ss.errors.ModelError(
+            f"port {port} may not be used",
+            "the lowest ports are for the administrator",
+            "choose one above 1023 with --port",
+        ) from error
+    except OSError as error:
+        door.close()
+        raise ss.errors.ModelError(
+            f"port {port} is taken ({error.strerror})", "the lab needs one of its own", "choose another with --port"
+        ) from error
+    return door
+
+
+def serve(
+    door: socket.socket,
+    *,
+    token: str,
+    opened: Callable[[Callable[[str], Path]], None],
+    rig: Path | None = None,
+    records: Path | None = None,
+) -> None:
+    """Answer at the door until Ctrl-C; `opened` is called when it does, with what writes a page that leads a browser
+    to an address. `rig` is the file of the rig whose devices may be watched, and `records` the folder of recordings.
+    """
+
+    class Server(uvicorn.Server):
+        async def startup(self, sockets: list[socket.socket] | None = None) -> None:
+            await super().startup(sockets)
+            if self.started:
+                opened(partial(doorway, app.state.data.folder))
+
+    app = lab_app(token=token, port=door.getsockname()[1], place=live.place_of(rig, records))
+    settings = uvicorn.Config(
+        app,
+        http=PatientProtocol,
+        log_level="warning",
+        access_log=False,
+        ws_max_size=LARGEST_MESSAGE,
+        server_header=False,
+        date_header=False,
+        timeout_graceful_shutdown=2,
+        ws_per_message_deflate=False,
+    )
+    listener = Server(settings)
+    if hasattr(signal, "SIGHUP"):
+        signal.signal(signal.SIGHUP, listener.handle_exit)  # a terminal that closes leaves no files behind either
+    listener.run(sockets=[door])

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from stickslip.errors import EstimateError, RecordError
 from stickslip.estimate import Estimate, Plain, Result, Status, plain
 from stickslip.record.record import Record, require_record
-from stickslip.squeak.hearing import LASTS, PARTIALS, Hearing, Span, clipped_rows, filtered
-from stickslip.squeak.sound import REFERENCES, level
+from stickslip.squeak.hearing import LASTS, PARTIALS, Hearing, Span, chosen_channel, clipped_rows, filtered
+from stickslip.squeak.sound import REFERENCES, level, reference_of
 from stickslip.statistics import mean_of_cycles
 
 WORDS = {
@@ -24,7 +24,6 @@ WORDS = {
 OF_MEDIAN = math.sqrt(math.pi / 2)  # its standard deviation over that of the mean
 Array = NDArray[np.float64]
 
-HEARD = ("sound", "normal_acceleration", "a", "friction", "ch1")  # the first of these, unless told
 LOWEST = 50.0  # Hz
 GROWN = 12.0  # cycles of growth to the peak: what is struck is there within fewer
 EVEN = 0.35  # of a burst's length at which half of its energy has come: a ring that dies away has it earlier
@@ -302,7 +301,9 @@ def find_squeaks(
         if listener.clipped
         else 10 * math.log10(max(hearing.threshold, 1e-300) / REFERENCES.get(unit, 1.0) ** 2)
     )
-    return Squeaks(tuple(bursts), name, _reference(unit), motion.frequency, record, notes, (low, high), cautions, heard)
+    return Squeaks(
+        tuple(bursts), name, reference_of(unit), motion.frequency, record, notes, (low, high), cautions, heard
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -594,16 +595,3 @@ def _unlike_a_contact(bursts: list[Squeak], claimed: list[Squeak]) -> str:
     if len(gaps) > 1 and np.ptp(gaps) < EVENLY:
         return "its bursts come at even intervals, as those of a signal do"
     return ""
-
-
-def chosen_channel(record: Record, channel: str | None) -> str:
-    """The channel asked for, or the first that is usual."""
-    if channel is not None:
-        record.require(channel, question="hearing squeaks")
-        return channel
-    return next((name for name in HEARD if name in record), next(iter(record)))
-
-
-def _reference(unit: str) -> str:
-    named = {"Pa": "20 uPa", "m/s^2": "1 um/s^2", "m/s": "1 nm/s", "N": "1 uN", "1": "1"}
-    return named.get(unit, f"1 {unit}")

@@ -17,6 +17,7 @@ Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 Waves = NDArray[np.complex128]
 
+HEARD = ("sound", "normal_acceleration", "a", "friction", "ch1")  # the first of these, unless told
 WINDOW = 0.0232  # s
 OVERLAP = 4  # windows that share a sample
 STANDS_OUT = 18.0  # dB of a line over the median of its neighbours: noise alone has 10
@@ -46,6 +47,14 @@ STILL = 0.4  # s: the window in which steady partials are told from each other
 FORCES = ("N", "N m")
 HELD, LEAP = 3, 1e-3  # samples at the extreme, how often, and the jump beside them, of the span
 TONAL = 0.5  # of a stretch that tones fill
+
+
+def chosen_channel(record: Record, channel: str | None) -> str:
+    """The channel asked for, or the first that is usual."""
+    if channel is not None:
+        record.require(channel, question="hearing squeaks")
+        return channel
+    return next((name for name in HEARD if name in record), next(iter(record)))
 
 
 @dataclass(frozen=True)

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from stickslip.errors import FormatError, RecordError
 from stickslip.estimate import Plain, plain
 from stickslip.record.record import Record
-from stickslip.squeak.bursts import LOWEST, chosen_channel
-from stickslip.squeak.hearing import PULSE, clipped_rows, filtered, short_time_level
+from stickslip.squeak.bursts import LOWEST
+from stickslip.squeak.hearing import PULSE, chosen_channel, clipped_rows, filtered, short_time_level
 
 Array = NDArray[np.float64]
 

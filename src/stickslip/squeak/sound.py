@@ -228,6 +228,12 @@ def level(values: Array, reference: float, *, fs: float, weighted: bool = False)
     return 10 * math.log10(max(power, np.finfo(float).tiny) / reference**2)
 
 
+def reference_of(unit: str) -> str:
+    """What a level of this unit is told against."""
+    named = {"Pa": "20 uPa", "m/s^2": "1 um/s^2", "m/s": "1 nm/s", "N": "1 uN", "1": "1"}
+    return named.get(unit, f"1 {unit}")
+
+
 def _share(run: Trajectory, normal: ArrayLike | str | None) -> Array:
     size = run.rows("a").shape[1]
     share = np.zeros(size)

@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 from stickslip.errors import EstimateError, FormatError, RecordError
 from stickslip.files.write import require_free, whole
 from stickslip.record.record import Record
-from stickslip.squeak.bursts import Squeak, Squeaks, chosen_channel, find_squeaks
-from stickslip.squeak.hearing import filtered
+from stickslip.squeak.bursts import Squeak, Squeaks, find_squeaks
+from stickslip.squeak.hearing import chosen_channel, filtered
 
 Array = NDArray[np.float64]
 Waves = NDArray[np.complex128]
