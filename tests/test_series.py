@@ -16,8 +16,7 @@ from stickslip.laws.compliant import CompliantContact, InertialContact
 from stickslip.laws.coulomb import Coulomb, LinearSlope, PositionLoad
 from stickslip.laws.series import ElastoSlip, InSeries
 from stickslip.laws.state_variable import StateVariable
-from stickslip.laws.stribeck import Tabulated
-from stickslip.laws.time_delay import TimeDelay
+from stickslip.laws.stribeck import Tabulated, TimeDelay
 from stickslip.oscillator import Oscillator
 from stickslip.solve.energies import energy
 from stickslip.solve.simulate import simulate

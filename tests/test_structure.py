@@ -18,7 +18,7 @@ from stickslip.laws.compliant import CompliantContact, InertialContact
 from stickslip.laws.coulomb import Coulomb, LinearSlope
 from stickslip.laws.series import ElastoSlip
 from stickslip.laws.state_variable import StateVariable
-from stickslip.laws.time_delay import TimeDelay
+from stickslip.laws.stribeck import TimeDelay
 from stickslip.oscillator import Contact, Oscillator, Structure
 from stickslip.solve.energies import energy
 from stickslip.solve.periodic import steady_state

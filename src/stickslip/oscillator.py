@@ -20,8 +20,7 @@ from stickslip.laws.coulomb import LinearSlope
 from stickslip.laws.curved import Creeping, CurvedLaw, CurvedMode, lifted
 from stickslip.laws.filippov import curved_modes, with_sliding_modes
 from stickslip.laws.guessing import registered
-from stickslip.laws.stribeck import Tabulated
-from stickslip.laws.time_delay import TimeDelay
+from stickslip.laws.stribeck import Tabulated, TimeDelay
 from stickslip.parameters import changed, finite, parameter, parametric
 
 Array = NDArray[np.float64]

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from stickslip.drives.kinds import Drive, Motion
 from stickslip.errors import ModelError
 from stickslip.laws.curved import CurvedLaw
-from stickslip.laws.time_delay import TimeDelay
+from stickslip.laws.stribeck import TimeDelay
 from stickslip.oscillator import Oscillator
 from stickslip.solve.assembly import table_of
 from stickslip.solve.curved import run_curved

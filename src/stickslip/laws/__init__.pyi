@@ -19,6 +19,6 @@ from stickslip.laws.state_variable import StateVariable as StateVariable
 from stickslip.laws.stribeck import FrictionCurve as FrictionCurve
 from stickslip.laws.stribeck import Stribeck as Stribeck
 from stickslip.laws.stribeck import Tabulated as Tabulated
-from stickslip.laws.time_delay import TimeDelay as TimeDelay
+from stickslip.laws.stribeck import TimeDelay as TimeDelay
 
 __all__: list[str]

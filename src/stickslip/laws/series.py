@@ -20,7 +20,7 @@ from stickslip.errors import ModelError
 from stickslip.laws.base import Exit, Law, Mode, Row
 from stickslip.laws.curved import Creeping, CurvedLaw, CurvedMode, Expression, lifted, symbol
 from stickslip.laws.filippov import differs
-from stickslip.laws.time_delay import TimeDelay
+from stickslip.laws.stribeck import TimeDelay
 from stickslip.parameters import finite, parameter, parametric
 
 SPEED, FORCE = "slider_speed", "contact_force"

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from stickslip.errors import ModelError, SolveError
-from stickslip.laws.time_delay import TimeDelay
+from stickslip.laws.stribeck import TimeDelay
 from stickslip.maps.engines import read_engine
 from stickslip.maps.grid import Grid, apart, read_grid
 from stickslip.maps.measures import EVENTS, FAILED, REPEATS, Measure, Variable, read_measures, variables

@@ -19,7 +19,7 @@ from stickslip.compiled import compiled
 from stickslip.errors import ModelError, SolveError
 from stickslip.laws.base import Rigid, Row
 from stickslip.laws.curved import CurvedMode, lifted, symbol
-from stickslip.laws.time_delay import DELAYED, TimeDelay
+from stickslip.laws.stribeck import DELAYED, TimeDelay
 from stickslip.oscillator import Oscillator
 from stickslip.solve import collocation, march, taylor
 from stickslip.solve.collocation import Implicit, Model

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from stickslip.compiled import OPTIONS, compiled
 from stickslip.errors import ModelError, SolveError
 from stickslip.estimate import Estimate
-from stickslip.laws.time_delay import TimeDelay
+from stickslip.laws.stribeck import TimeDelay
 from stickslip.oscillator import Structure
 from stickslip.solve.assembly import table_of
 from stickslip.solve.curved import CurvedTrajectory, run_curved

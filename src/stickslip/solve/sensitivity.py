@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 
 from stickslip.compiled import OPTIONS, compiled
 from stickslip.errors import ModelError
-from stickslip.laws.time_delay import TimeDelay
+from stickslip.laws.stribeck import TimeDelay
 from stickslip.oscillator import Oscillator
 from stickslip.parameters import find, places
 from stickslip.solve.assembly import tables_of

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from stickslip.errors import ModelError, SolveError
-from stickslip.laws.time_delay import TimeDelay
+from stickslip.laws.stribeck import TimeDelay
 from stickslip.oscillator import Oscillator
 from stickslip.parameters import finite
 from stickslip.solve import kernel

@@ -22,8 +22,7 @@ from stickslip.files.read import read_record
 from stickslip.laws.base import Law
 from stickslip.laws.curved import CurvedLaw
 from stickslip.laws.formula import Formula
-from stickslip.laws.stribeck import Curve
-from stickslip.laws.time_delay import SpeedCurve
+from stickslip.laws.stribeck import Curve, SpeedCurve
 from stickslip.oscillator import Contact, Oscillator, Structure
 from stickslip.parameters import PARTS, changed, declared, find, places, unit
 from stickslip.scenarios import DRIVES, LAWS
