@@ -1,4 +1,5 @@
-"""What moves: one mass on a spring, and several degrees of freedom that rub at several contacts.
+"""What moves: one mass on a spring, along a line or in a plane, and several degrees of freedom that rub at several
+contacts.
 
 Each has what moves it and what it rubs on; the loads of a structure may follow its motion.
 """
@@ -14,13 +15,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from stickslip.drives.kinds import Drive, Release, require_drive
+from stickslip.drives.on_another import Both
 from stickslip.errors import ModelError
 from stickslip.laws.base import Exit, Law, Mode, Row
-from stickslip.laws.coulomb import LinearSlope
-from stickslip.laws.curved import Creeping, CurvedLaw, CurvedMode, lifted
+from stickslip.laws.coulomb import Coulomb, LinearSlope
+from stickslip.laws.curved import Creeping, CurvedLaw, CurvedMode, Expression, lifted, symbol
 from stickslip.laws.filippov import curved_modes, with_sliding_modes
 from stickslip.laws.guessing import registered
-from stickslip.laws.stribeck import Tabulated, TimeDelay
+from stickslip.laws.stribeck import SpeedCurve, Tabulated, TimeDelay
 from stickslip.parameters import changed, finite, parameter, parametric
 
 Array = NDArray[np.float64]
@@ -465,4 +467,131 @@ def _require_given_way(law: Any) -> None:
             f"{name} under an imposed motion",
             "a rigid contact would hold the mass against it",
             "put a spring before it: CompliantContact(), or InSeries() of this law",
+        ).of("law")
+
+
+@parametric(eq=False)
+class PlanarOscillator:
+    r"""One mass that rubs in a plane: friction lies on a disc, and couples the two directions.
+
+    .. math:: m\ddot x_i + c_i\,(\dot x_i - \dot d_i) + k_i\,(x_i - z_i) + f_i = P_i(t), \qquad i = 1, 2
+
+    While it slides :math:`f = F(|u|)\,u/|u|`, u the velocity against the counter-face; at rest whatever holds it, up to
+    :math:`|f| \le f_s`: a point whose friction is alike in all directions (Goyal, Ruina and Papadopoulos, Wear 143,
+    1991).
+
+    Raises
+    ------
+    ModelError
+        A value has no meaning, or friction does not follow the sliding speed alone by one smooth curve.
+
+    Examples
+    --------
+    A block on a conveyor, given a small velocity across it, drifts as if friction were viscous:
+
+    >>> from stickslip.drives.kinds import Belt
+    >>> from stickslip.solve.simulate import simulate
+    >>> block = PlanarOscillator(1.0, (100.0, 0.0), Coulomb(2.0), drives=(Belt(1.0), Release()))
+    >>> run = simulate(block, duration=2.0, start={"x1": 0.02, "v1": 0.0, "v2": 1e-3})
+    >>> round(run.state(0.5)["v2"] / 1e-3, 4), round(math.exp(-2.0 * 0.5), 4)  # of 2 N over 1 m/s and 1 kg
+    (0.3679, 0.3679)
+    """
+
+    mass: float = parameter("kg", "mass", positive=True, note="m")
+    stiffness: ArrayLike = parameter(
+        "N/m", "stiffness", size="array", note="k along both axes, or one for either; zero: no spring"
+    )
+    law: Coulomb | SpeedCurve = parameter(
+        "", "friction law", note="Coulomb, LinearSlope, Stribeck or FrictionCurve: its magnitude over the sliding speed"
+    )
+    drives: Sequence[Drive] = parameter(
+        "", "what moves along either axis", default=(Release(), Release()), note="two; nothing where left out"
+    )
+    damping: ArrayLike = parameter("N s/m", "damping", default=0.0, size="array", note="c, as the stiffness")
+    damper: str = parameter("", "what the dampers are fixed to", default="ground", choices=("ground", "base"))
+
+    def __post_init__(self) -> None:
+        for name in ("stiffness", "damping"):
+            object.__setattr__(self, name, _pair(name, getattr(self, name)))
+        if len(tuple(self.drives)) != 2:
+            raise ModelError(
+                f"{len(tuple(self.drives))} drives of a mass in a plane",
+                "each of the two axes has its own",
+                "give two, as drives=(HarmonicBase(1e-3, frequency=2.5), Release())",
+            ).of("drives")
+        object.__setattr__(self, "drives", tuple(self.drives))
+        self.drive.motion()
+        _require_disc(self.friction, self.breakaway)
+
+    @property
+    def friction(self) -> Expression:
+        """Magnitude of the friction [N] over the sliding speed "v"."""
+        if isinstance(self.law, Coulomb):
+            return lifted(self.law.kinetic)
+        branches = self.law.branches() if isinstance(self.law, SpeedCurve) else ()
+        if len(branches) != 1:
+            raise ModelError(
+                f"{type(self.law).__name__} in a plane",
+                "friction in a plane follows the sliding speed alone, by one smooth curve",
+                "use Coulomb, LinearSlope, Stribeck or FrictionCurve",
+            ).of("law")
+        return lifted(branches[0][1](symbol("v")))
+
+    @property
+    def breakaway(self) -> float:
+        """Largest friction force while stuck [N]: the radius of the disc."""
+        return float(self.law.breakaway)
+
+    @property
+    def drive(self) -> Both:
+        """Both drives as one."""
+        return Both(*self.drives)
+
+    @property
+    def frequency(self) -> float:
+        """Lower natural frequency above zero, without friction and damping [Hz]; 0 where there is none."""
+        stiffness = np.asarray(self.stiffness)
+        springs = stiffness[stiffness > 0]
+        return math.sqrt(float(springs.min()) / self.mass) / (2 * math.pi) if len(springs) else 0.0
+
+    def having(self, **changes: Any) -> PlanarOscillator:
+        """The same with other values; a name is looked for in the oscillator, its law, then its drives.
+
+        Parameters
+        ----------
+        **changes
+            New values by name, or by name and place (``**{"drives.2.amplitude": 1e-3}``).
+
+        Returns
+        -------
+        PlanarOscillator
+        """
+        return changed(self, changes)
+
+
+def _pair(name: str, values: ArrayLike) -> tuple[float, float]:
+    """A number for each of the two axes."""
+    row = np.atleast_1d(_numbers(name, values))
+    if row.shape not in ((1,), (2,)) or not np.all(np.isfinite(row)) or (name == "stiffness" and np.any(row < 0)):
+        raise ModelError(
+            f"{name} = {values!r}",
+            f"{name} in a plane is one finite number for both axes or two, of springs none negative",
+            f"give {name}=(first, second)",
+        ).of(name)
+    first, second = np.broadcast_to(row, 2).tolist()
+    return first, second
+
+
+def _require_disc(friction: Expression, breakaway: float) -> None:
+    """Refuse friction of no force at rest, or whose slope there has no number."""
+    rest = friction.at(v=0.0)
+    try:
+        smooth = math.isfinite(friction.slope("v").at(v=0.0))
+    except ModelError:
+        smooth = False
+    if not (rest > 0 and math.isfinite(breakaway) and smooth):
+        raise ModelError(
+            f"friction of {rest:g} N at rest, {'smooth' if smooth else 'of no finite slope'} there",
+            "sliding in a plane begins and ends on a disc of some radius, along a smooth curve",
+            "give a law with friction at rest, a Stribeck of exponent= 1 or more; without friction take Structure",
         ).of("law")

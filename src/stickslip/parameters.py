@@ -19,7 +19,8 @@ from stickslip.settings import nearest
 
 Path = tuple[str, ...]
 Part = TypeVar("Part")
-PARTS = ("law", "drive", "contacts")  # what holds parameters of its own
+PARTS = ("law", "drive", "drives", "contacts")  # what holds parameters of its own
+NUMBERED = ("drives", "contacts")  # of them, those of which there are several
 SECTION = re.compile(r"^\S.*\n-{3,}$", re.MULTILINE)  # the heading of a numpydoc section
 
 
@@ -197,7 +198,7 @@ def places(part: Any, within: Path = ()) -> dict[Path, Any]:
     parts = {(*within, field.name): part for field in fields(part)}
     for name in PARTS:
         inner = getattr(part, name, None)
-        if name == "contacts" and inner is not None:
+        if name in NUMBERED and inner is not None:
             for number, contact in enumerate(inner, start=1):
                 parts |= places(contact, (*within, name, str(number)))
         elif is_dataclass(inner):
@@ -260,7 +261,7 @@ def _rebuilt(part: Any, values: Mapping[Path, Any]) -> Any:
     for name in {path[0] for path in values if len(path) > 1}:
         below = {path[1:]: value for path, value in values.items() if path[0] == name and len(path) > 1}
         inner = getattr(part, name)
-        if name != "contacts":
+        if name not in NUMBERED:
             own[name] = _rebuilt(inner, below)
             continue
         numbered = {n: {p[1:]: v for p, v in below.items() if p[0] == str(n)} for n in range(1, len(inner) + 1)}

@@ -1,15 +1,17 @@
-"""A drive on another one: a fast tone on top of it, its motion imposed on the mass, or the same from later on."""
+"""A drive on another one: a fast tone on top of it, its motion imposed on the mass, the same from later on, or one
+across it."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from stickslip.drives.kinds import Drive, Motion, Row, check_frequency, require, require_drive
+from stickslip.drives.kinds import Drive, Motion, Row, check_frequency, common_period, require, require_drive
 from stickslip.errors import ModelError
 from stickslip.parameters import parameter, parametric
 
@@ -173,6 +175,70 @@ class Later:
             ahead = knots[last + 1 :] - np.append(self.time, np.zeros(len(own.knotted)))
             knots = np.vstack([[0.0, *(now[name] for name in own.knotted)], ahead])
         return replace(own, start=start, tones=tones, knots=knots, end=own.end - self.time)
+
+
+class Both(NamedTuple):
+    """Two drives at once, along the first axis of a plane and along the second.
+
+    Raises
+    ------
+    ModelError
+        One of them is none, imposes a motion, or both are recorded.
+    """
+
+    first: Drive
+    second: Drive
+
+    @property
+    def motions(self) -> tuple[Motion, Motion]:
+        """The signals of either, which bear the number of their axis."""
+        for drive in self:
+            require_drive(drive)
+        return _numbered(self.first.motion(), 1), _numbered(self.second.motion(), 2)
+
+    def motion(self) -> Motion:
+        """The signals of both as one motion's."""
+        first, second = self.motions
+        require(
+            not (first.imposed or second.imposed or (first.knots is not None and second.knots is not None)),
+            f"drives = {tuple(self)}",
+            "in a plane no motion is imposed on the mass, and what is recorded moves it along one axis",
+            "give a drive of tones, or a belt",
+            of="drives",
+        )
+        periods = [motion.period for motion in (first, second) if motion.rates]
+        endless = not all(map(math.isfinite, periods)) or not periods
+        known = second if first.knots is None else first
+        return Motion(
+            rates={**first.rates, **second.rates},
+            start={**first.start, **second.start},
+            tones=(*first.tones, *second.tones),
+            period=math.inf if endless else common_period([1 / period for period in periods]),
+            force={**first.force, **second.force},
+            base={**first.base, **second.base},
+            face={**first.face, **second.face},
+            knots=known.knots,
+            knotted=known.knotted,
+            end=min(first.end, second.end),
+        )
+
+
+def _numbered(motion: Motion, axis: int) -> Motion:
+    """A motion whose signals bear the number of their axis."""
+
+    def of(row: Row) -> dict[str, float]:
+        return {name if name == "1" else f"{name} {axis}": value for name, value in row.items()}
+
+    return replace(
+        motion,
+        rates={f"{name} {axis}": of(row) for name, row in motion.rates.items()},
+        start=of(motion.start),
+        tones=tuple((f"{c} {axis}", f"{s} {axis}", omega, phase) for c, s, omega, phase in motion.tones),
+        force=of(motion.force),
+        base=of(motion.base),
+        face=of(motion.face),
+        knotted=tuple(f"{name} {axis}" for name in motion.knotted),
+    )
 
 
 def _moved(rates: Mapping[str, Row], start: Mapping[str, float], time: float) -> dict[str, float]:

@@ -27,7 +27,7 @@ from stickslip.solve.march import DONE, DUE, LAPS, TIME, TRY, Dense, Leaps, Show
 from stickslip.solve.refusal import Budget, chatter, held_back, named, require_numbers, unproved
 from stickslip.solve.tables import Stops, numbered
 from stickslip.solve.tape import Tape, tape
-from stickslip.solve.taylor import EXACT, GROWTH, Array, Index, Step, coded, expansion, length
+from stickslip.solve.taylor import EXACT, GROWTH, Array, Index, coded, expansion, length
 from stickslip.solve.trajectory import Trajectory
 
 March = Callable[..., tuple[int, int, int, int]]  # of clock, state, `big`, mode, end, steps and room for a series
@@ -251,7 +251,7 @@ class _Run:
     def _to_stop(self, stops: Stops, follow: March) -> tuple[int, int, int, int, int]:
         """As :func:`stickslip.solve.march.course`, by a march that ends at each stop."""
         until, stop = tuple(stops.ends[self.stop]), self.stop
-        outcome, *rest = follow(self.clock, self.state, self.big, self.mode, until, self.room, self.work.step)
+        outcome, *rest = follow(self.clock, self.state, self.big, self.mode, until, self.room, self.work)
         if outcome == march.DONE and stop + 1 < len(stops.ends):
             outcome, stop = march.FULL, stop + 1
             self.state[stops.places] = stops.values[stop]
@@ -259,14 +259,14 @@ class _Run:
         return outcome, *rest, stop  # type: ignore[return-value]
 
     def _freely(
-        self, clock: Array, state: Array, big: Array, mode: int, until: tuple[float, float], steps: Steps, step: Step
+        self, clock: Array, state: Array, big: Array, mode: int, until: tuple[float, float], steps: Steps, work: Work
     ) -> tuple[int, int, int, int]:
         """Taylor steps, until the contact turns out stiff: what leaps takes seconds to compile."""
         if self.stiff:
             return march.strides(  # type: ignore[no-any-return]
-                self.implicit, clock, state, big, mode, until, steps, 0, 0, self.work
+                self.implicit, clock, state, big, mode, until, steps, 0, 0, work
             )
-        outcome, written, mode = march.march(self.model, clock, state, big, mode, until, steps, 0, step)
+        outcome, written, mode = march.march(self.model, clock, state, big, mode, until, steps, 0, work.step)
         if outcome == march.STIFF:
             outcome, self.stiff, self.fresh = march.FULL, True, True
         return outcome, written, 0, mode
@@ -419,7 +419,7 @@ class _Past:
         return mode % 3 + 3 * (int(np.searchsorted(self.lows, state[PAST], side="right")) - 1)
 
     def __call__(
-        self, clock: Array, state: Array, big: Array, mode: int, until: tuple[float, float], steps: Steps, step: Step
+        self, clock: Array, state: Array, big: Array, mode: int, until: tuple[float, float], steps: Steps, work: Work
     ) -> tuple[int, int, int, int]:
         """As :func:`march`; without leaps, whose polynomials are no Taylor steps."""
         clock[DUE] = math.inf
@@ -429,7 +429,7 @@ class _Past:
         before = self.known
         known = Steps._make(column[: before + count] for column in self.columns)
         outcome, self.known, mode = _march(
-            self.model, self.recalled, clock, state, big, mode, np.array(until), known, before, step
+            self.model, self.recalled, clock, state, big, mode, np.array(until), known, before, work.step
         )
         written = self.known - before
         columns: Any = zip(steps, self.columns, strict=True)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from stickslip.errors import ModelError
 from stickslip.oscillator import Structure
@@ -98,8 +99,8 @@ def energy_flow(run: Trajectory) -> EnergyFlow:
     (-3.0, 3.0)
     """
     system = run.system
-    mass, damping, stiffness = (np.atleast_2d(part) for part in (system.mass, system.damping, system.stiffness))
-    count = len(mass)
+    count = run.table.degrees
+    mass, damping, stiffness = (_matrix(part, count) for part in (system.mass, system.damping, system.stiffness))
     w, values = _gauss(run, ("x", "v", "a", "friction"))
     x, v, a, friction = np.split(values, [count, 2 * count, 3 * count])
     pressed = np.zeros_like(x)
@@ -140,8 +141,8 @@ def energy(run: Trajectory) -> Energy:
     >>> round(energy(decay).friction, 12)  # 1 N along 2 m and 1 m
     3.0
     """
-    mass = np.atleast_2d(run.system.mass)
-    tangents = run.system.tangents if isinstance(run.system, Structure) else np.ones((1, 1))
+    mass = _matrix(run.system.mass, run.table.degrees)
+    tangents = run.system.tangents if isinstance(run.system, Structure) else np.eye(len(mass))
     w, values = _gauss(run, ("v", "a", "friction"))
     v, a, friction = np.split(values, [len(mass), 2 * len(mass)])
     taken = np.sum(tangents.T @ friction * v, axis=0)
@@ -155,6 +156,12 @@ def energy(run: Trajectory) -> Energy:
         float(np.sum(w * taken)),
         float(np.sum(w * (np.abs(given) + np.abs(taken)))) + abs(kinetic),
     )
+
+
+def _matrix(part: ArrayLike, size: int) -> Array:
+    """A matrix as it is; a number for every degree of freedom, or one for all, on the diagonal."""
+    values = np.asarray(part, dtype=np.float64)
+    return values if values.ndim == 2 else values * np.eye(size)
 
 
 def _gauss(run: Trajectory, outputs: tuple[str, ...]) -> tuple[Array, Array]:

@@ -29,7 +29,7 @@ from stickslip.solve.taylor import (
     woken,
 )
 
-DONE, FULL, CHATTER, STALL, UNPROVED, STIFF = range(6)
+DONE, FULL, CHATTER, STALL, UNPROVED, STIFF, HALT = range(7)
 CHAIN = 16  # most transitions without time between them
 BRIEFEST = 1e-19  # of the time: a step below its rounding is one of many while a velocity falls to nothing
 LEAP = 40.0  # Taylor steps that a leap replaces, at least half of them: it costs as much as about 40
@@ -142,7 +142,7 @@ def _explicit(model, mode, h, u, big, step):
 
 
 @compiled(**EXACT)
-def _remaining(clock, until, period):
+def remaining_of(clock, until, period):
     """Time [s] to an end (laps, time)."""
     remaining = until[1] - clock[TIME]
     if until[0] != clock[LAPS]:
@@ -170,7 +170,7 @@ def _arrived(clock, until, model, remaining, ahead, leaving, state):
 
 
 @compiled(**EXACT)
-def _write(steps, row, clock, state, mode, ahead, leaving, which):
+def write(steps, row, clock, state, mode, ahead, leaving, which):
     """Put a step down."""
     steps.laps[row], steps.offsets[row], steps.lengths[row] = clock[LAPS], clock[TIME], ahead
     steps.modes[row], steps.ends[row], steps.leaps[row] = mode, leaving, which
@@ -179,7 +179,7 @@ def _write(steps, row, clock, state, mode, ahead, leaving, which):
 
 
 @compiled(**EXACT)
-def _passed(model, clock, until, remaining, ahead, leaving, before, state, big):
+def passed(model, clock, until, remaining, ahead, leaving, before, state, big):
     """What else a step changes: the drive's tones since the state before, the largest values, and the clock."""
     turn(model.tones, before, ahead, state)
     for i in range(len(state)):
@@ -216,11 +216,12 @@ def _left(model, clock, state, mode, h, leaving, ahead, steps, row, step):
 @compiled(**EXACT)
 def march(model, clock, state, big, mode, until, steps, row, step):
     """Taylor steps from `clock` to `until` (laps, time), written from a row on: the outcome, the row behind them, the
-    mode. STIFF where after many steps without event a leap is due, see :func:`strides`."""
+    mode. STIFF where after many steps without event a leap is due, see :func:`strides`; HALT where an exit leads to no
+    mode (a negative number): what follows is no linear form of the state, and whoever marches goes on from there."""
     series, exits, chain = coded(model.series), model.exits, 0
     while True:
         # Due: what is left, the series of a step, and how far it holds.
-        remaining = _remaining(clock, until, model.period)
+        remaining = remaining_of(clock, until, model.period)
         if remaining <= 4e-16 * (clock[TIME] + clock[TRY]):
             return DONE, row, mode
         h = clock[TRY]
@@ -250,10 +251,10 @@ def march(model, clock, state, big, mode, until, steps, row, step):
         # Step: write it down and carry the state on.
         if ahead > 0.0:
             chain = 0
-            _write(steps, row, clock, state, mode, ahead, leaving, -1)
+            write(steps, row, clock, state, mode, ahead, leaving, -1)
             advance(step.s, step.order, ahead / h, state)
             clock[TRY] = full * h
-            _passed(model, clock, until, remaining, ahead, leaving, steps.states[row], state, big)
+            passed(model, clock, until, remaining, ahead, leaving, steps.states[row], state, big)
             row += 1
         else:
             if row > 0 and steps.ends[row - 1] < 0:
@@ -263,6 +264,8 @@ def march(model, clock, state, big, mode, until, steps, row, step):
                 return CHATTER, row, mode
         if leaving >= 0:
             mode = _left(model, clock, state, mode, h, leaving, ahead, steps, row, step)
+            if mode < 0:
+                return HALT, row, mode
 
 
 @compiled(**EXACT)
@@ -299,18 +302,20 @@ def strides(implicit, clock, state, big, mode, until, steps, row, leapt, work):
             return outcome, row, leapt, mode
         if leapt == len(leaps.polys):
             return FULL, row, leapt, mode
-        h, remaining, poly = clock[TRY], _remaining(clock, until, model.period), leaps.polys[leapt]
+        h, remaining, poly = clock[TRY], remaining_of(clock, until, model.period), leaps.polys[leapt]
         reach, ahead, leaving = _attempt(implicit, clock, state, big, mode, remaining, poly, work)
         if ahead > 0.0:
-            _write(steps, row, clock, state, mode, ahead, leaving, leapt)
+            write(steps, row, clock, state, mode, ahead, leaving, leapt)
             for i in range(len(state)):
                 state[i] = at(poly[i], 2.0 * ahead / reach - 1.0)
             leaps.reach[leapt] = reach
             clock[TRY] = h * length(work.step.s, work.step.order, big, model.tolerance)
-            _passed(model, clock, until, remaining, ahead, leaving, steps.states[row], state, big)
+            passed(model, clock, until, remaining, ahead, leaving, steps.states[row], state, big)
             row, leapt = row + 1, leapt + 1
             if leaving >= 0:
                 mode = _left(model, clock, state, mode, h, leaving, ahead, steps, row, work.step)
+                if mode < 0:
+                    return HALT, row, leapt, mode
 
 
 @compiled(**EXACT)

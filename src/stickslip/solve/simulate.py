@@ -13,13 +13,14 @@ import numpy as np
 
 from stickslip.errors import ModelError, SolveError
 from stickslip.laws.stribeck import TimeDelay
-from stickslip.oscillator import Oscillator
+from stickslip.oscillator import Oscillator, PlanarOscillator
 from stickslip.parameters import finite
 from stickslip.solve import kernel
 from stickslip.solve.assembly import table_of
 from stickslip.solve.curved import degree, delayed_tape, run_curved, run_delayed
 from stickslip.solve.glide import Clock, Model, Pieces, blank_past, blank_pieces, until
 from stickslip.solve.phasors import fast_tables
+from stickslip.solve.planar import planar_tape, run_planar
 from stickslip.solve.refusal import LISTED, Budget, chatter, held_back, named, require_numbers, unproved
 from stickslip.solve.roots import NOISE
 from stickslip.solve.tables import Array, Stops, System, Tables, is_curved
@@ -40,7 +41,7 @@ TRIED = 4.0  # periods of the first of the spans, each twice the one before, in 
 
 
 def simulate(
-    system: System,
+    system: System | PlanarOscillator,
     *,
     duration: float | None = None,
     cycles: float | None = None,
@@ -58,15 +59,15 @@ def simulate(
 
     Parameters
     ----------
-    system : Oscillator or Structure
+    system : Oscillator, Structure or PlanarOscillator
         What moves.
     duration : float, optional
         Time to simulate [s]. Give this or `cycles`.
     cycles : float, optional
         Time in periods of the drive; without a periodic drive, in natural periods.
     start : mapping, optional
-        State at time 0: "x" [m], "v" [m/s] (of a structure "x1", "v1" ...), memory of the law by name, "mode". Where
-        left out: displacement 0, at rest on the counter-face.
+        State at time 0: "x" [m], "v" [m/s] (of a structure, and in a plane, "x1", "v1" ...), memory of the law by name,
+        "mode". Where left out: displacement 0, at rest on the counter-face.
     budget : int
         Most events in one period; more is taken for chatter.
     rtol : float
@@ -92,7 +93,7 @@ def simulate(
     Examples
     --------
     >>> from stickslip.laws.coulomb import Coulomb
-    >>> from stickslip.oscillator import Oscillator
+    >>> from stickslip.oscillator import Oscillator, PlanarOscillator
     >>> slider = Oscillator(mass=1, stiffness=4, law=Coulomb(1.0))
     >>> run = simulate(slider, duration=10, start={"x": 1.25})
     >>> [(round(event.time, 6), event.kind) for event in run.events]
@@ -109,7 +110,7 @@ def simulate(
             return simulate(system, duration=time, start=start, budget=budget, rtol=rtol, progress=progress)
 
         return stopped(march, stop, whole, _scale(system))
-    if is_curved(system):
+    if isinstance(system, PlanarOscillator) or is_curved(system):
         return _simulate_curved(system, (duration, cycles), start or {}, budget, rtol, progress)
     table = table_of(system)
     span = _end(system, table, duration, cycles)
@@ -117,14 +118,14 @@ def simulate(
     return run(system, table, state, mode, span=span, budget=budget, tell=paced(progress))
 
 
-def _scale(system: System) -> float:
+def _scale(system: System | PlanarOscillator) -> float:
     """The period of the drive, without one the natural period, without either a second [s]."""
     period = system.drive.motion().period
     return period if math.isfinite(period) else 1 / system.frequency if system.frequency else 1.0
 
 
 def _simulate_curved(
-    system: System,
+    system: System | PlanarOscillator,
     time_: tuple[float | None, float | None],
     start: Mapping[str, float | str],
     budget: int,
@@ -132,13 +133,16 @@ def _simulate_curved(
     progress: Callable[[float], object] | None,
 ) -> Trajectory:
     table: Any
-    if lags := isinstance(system, Oscillator) and isinstance(system.law, TimeDelay):
-        table = delayed_tape(system, degree(rtol))
+    follow: Callable[..., Trajectory]
+    if isinstance(system, PlanarOscillator):
+        table, follow = planar_tape(system), run_planar
+    elif isinstance(system, Oscillator) and isinstance(system.law, TimeDelay):
+        table, follow = delayed_tape(system, degree(rtol)), run_delayed
     else:
-        table = tape(system)
+        table, follow = tape(system), run_curved
     span = _end(system, table, *time_)
     state, mode = opening(table, start)
-    follow, course = run_delayed if lags else run_curved, (span, stops_of(table, *span))
+    course = span, stops_of(table, *span)
     return follow(table, state, mode, course=course, budget=budget, rtol=rtol, tell=paced(progress))
 
 
@@ -155,7 +159,9 @@ def paced(progress: Callable[[float], object] | None) -> Callable[[float], None]
     return tell
 
 
-def _end(system: System, table: Tables, duration: float | None, cycles: float | None) -> tuple[float, float]:
+def _end(
+    system: System | PlanarOscillator, table: Tables, duration: float | None, cycles: float | None
+) -> tuple[float, float]:
     """The time to simulate, as full periods of the drive and a rest [s]."""
     if (duration is None) == (cycles is None):
         raise ModelError(f"duration = {duration}, cycles = {cycles}", "one of the two is given", "give one of them")

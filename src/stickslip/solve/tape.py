@@ -451,7 +451,7 @@ class _Builder:
             tones=np.array(tones, dtype=np.float64).reshape(len(tones), 4),
             outputs={"face_rate": self.row(self.face[1]), "slip": slip if self.joint else slip[0]},
             nodes=Nodes(*flat(operations), *rate),
-            kept=_kept(self.size, sums, exits, guards),
+            kept=kept_of(self.size, sums, exits, guards),
             sums=sums,
             watched=Nodes(*flat([watched for watched, _ in shown]), *rate),
             exits=exits,
@@ -532,7 +532,7 @@ def _alone(system: Oscillator) -> Structure:
     return Structure(system.mass, system.damping, system.stiffness, [contact], damper=system.damper)
 
 
-def _kept(size: int, sums: Sums, exits: Exits, guards: Guards) -> tuple[tuple[int, ...], ...]:
+def kept_of(size: int, sums: Sums, exits: Exits, guards: Guards) -> tuple[tuple[int, ...], ...]:
     """Nodes of each mode that are exits, are guarded, or make up a rate or an exit."""
     count, kept, low, first = len(exits.first) - 1, [], sums.first, exits.first
     for mode in range(count):
