@@ -124,3 +124,12 @@ def test_a_stiff_contact_that_leaves_far_less_stands_for_itself() -> None:
     assert not any(law.limit for law in ranking)
     ranking, _ = standings([misfit("Coulomb", 1, 1.5), stiff("compliant", 3, 1.0)], EVIDENCE)
     assert [law.name for law in ranking if law.kept] == ["Coulomb"]
+
+
+def test_a_stiff_contact_stands_beside_a_law_of_another_family_that_leads() -> None:
+    """A state variable led a rigid law by 1.7 times, and a contact that gave way and left no more was excluded."""
+    stiff_contact = stiff("compliant", 3, 1.0)
+    assert kept(misfit("state variable", 3, 1.0), misfit("Coulomb", 1, 1.6), stiff_contact)[0] == {
+        "state variable", "Coulomb", "compliant",
+    }  # fmt: skip
+    assert "compliant" not in kept(misfit("state variable", 3, 1.0), misfit("Coulomb", 1, 1.0), stiff_contact)[0]
