@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+import servo
 import stickslip as ss
 from stickslip.record.record import Step
 
@@ -231,3 +232,31 @@ def test_levels_that_a_free_zero_hides_from_each_other_are_not_told() -> None:
     for name, true in (("forward", 1.2), ("back", 0.8)):
         assert fit.parameters[name].includes(true)
         assert "can not be told" in fit.parameters[name].status
+
+
+def servo_record(chance: np.random.Generator) -> tuple[dict[str, float], ss.Record]:
+    """A rigid slider on a base that moves by sines, from an integrator of the tests; x and z have 0.2 % of noise."""
+    mass, natural = chance.uniform(0.5, 5.0), chance.uniform(2.0, 6.0)
+    stiffness = mass * (2 * np.pi * natural) ** 2
+    damping, size = 2 * chance.uniform(0.005, 0.03) * np.sqrt(stiffness * mass), 1e-3
+    kinetic, fs = stiffness * size * chance.uniform(0.15, 0.3), 300 * natural
+    fine = np.arange(12 * 300 * 2 * servo.STEPS + 1) / (2 * fs * servo.STEPS)
+    z = servo.base("sines", fine, natural, size, chance)
+    p = np.array([mass, stiffness, damping, kinetic, kinetic, 0.0])
+    x = servo._rigid(p, z, 1 / (fs * servo.STEPS), np.zeros((0, 3)))[:: servo.STEPS]
+    read = {"x": x, "z": z[:: 2 * servo.STEPS][: len(x)]}
+    noisy = {name: values + 2e-3 * np.std(values) * chance.standard_normal(len(x)) for name, values in read.items()}
+    return {"mass": mass, "stiffness": stiffness, "damping": damping, "kinetic": kinetic}, ss.Record.of(noisy, fs=fs)
+
+
+def test_noise_of_a_base_that_moves_by_no_tone_is_in_the_intervals() -> None:
+    """The mass follows it: of eight rigs the friction and the damper strayed by 2.4 deviations without it."""
+    strays = []
+    for seed in range(8):
+        true, record = servo_record(np.random.default_rng([2024, seed]))
+        rig = {name: true[name] for name in ("mass", "stiffness", "damping")}
+        fit = ss.fit_law(record, ss.Oscillator(law=ss.laws.Coulomb(0.9 * true["kinetic"]), **rig))
+        strays += [
+            (fit.parameters[name].value - true[name]) / fit.parameters[name].sd for name in ("kinetic", "damping")
+        ]
+    assert np.sqrt(np.mean(np.square(strays))) < 1.5

@@ -8,7 +8,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -79,6 +79,19 @@ class Tones:
         return MultiTone(moved, on=self.on, contact=self.contact)
 
 
+class Smoothed(NamedTuple):
+    """How a measured motion was smoothed: its readings, their rate [Hz] and noise [m], and the bandwidth [Hz] kept."""
+
+    readings: int
+    fs: float
+    noise: float
+    bandwidth: float
+
+    def apply(self, values: Array) -> Array:
+        """The motion behind readings."""
+        return Filter("smoother", self.fs, self.bandwidth).apply(values, {0: 1.0})
+
+
 @dataclass(frozen=True, eq=False)
 class Sampled:
     """A motion of any shape, smoothed, at instants as dense as its bandwidth asks for."""
@@ -88,6 +101,14 @@ class Sampled:
     late: float
     contact: str
     unsure: tuple[float]
+    smoothed: Smoothed
+
+    def strayed(self, chance: np.random.Generator) -> Sampled:
+        """The motion as it would seem under other noise of the same size."""
+        of = self.smoothed
+        noise = of.apply(chance.normal(scale=of.noise, size=of.readings))
+        own = np.arange(len(self.values)) / self.fs
+        return replace(self, values=self.values + np.interp(own, np.arange(of.readings) / of.fs, noise))
 
     def coarser(self, share: float) -> Sampled:
         """At fewer instants, a share of the motion's deviation away: each instant costs the engine a new start."""
@@ -157,10 +178,9 @@ def _driven(record: Record, channel: str, contact: str) -> DriveFrom:
             "the force on the mass is periodic",
             "cut the record to where it is, drive the base, or fit a curve of friction instead (fit_curve, --curve)",
         )
-    bandwidth = best_bandwidth(values, record.fs)
-    smooth = Filter("smoother", record.fs, bandwidth).apply(values - values.mean(), {0: 1.0})
-    knots, rate = _knots(smooth, record.fs, noise)
-    return Sampled(knots, rate, late, contact, (share / (2**0.5 * float(np.std(values))),))
+    smoothed = Smoothed(len(values), record.fs, noise, best_bandwidth(values, record.fs))
+    knots, rate = _knots(smoothed.apply(values - values.mean()), record.fs, noise)
+    return Sampled(knots, rate, late, contact, (share / (2**0.5 * float(np.std(values))),), smoothed)
 
 
 def _knots(smooth: Array, fs: float, noise: float) -> tuple[Array, float]:
