@@ -21,6 +21,9 @@ os.environ.setdefault("STICKSLIP_DATA", str(Path(__file__).resolve().parents[2] 
 # The program tries its answers on 40 twins unless told otherwise, which takes seconds: test_twin.py asks for them.
 os.environ.setdefault("STICKSLIP_TWINS", "0")
 
+# What is not compiled yet is waited for: no process is begun that compiles beside, but by test_meanwhile.py.
+os.environ.setdefault("STICKSLIP_WAIT", "1")
+
 # The same examples in every run: a change is what makes a test fail, not chance.
 # pytest --hypothesis-profile=default looks further.
 settings.register_profile("same", derandomize=True, deadline=None)

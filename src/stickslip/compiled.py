@@ -5,6 +5,9 @@ another file has changed. So a file's kernels are kept in a folder that is named
 file whose kernels, constants or tuples it imports: an edited kernel is compiled anew with those that call it alone.
 
 A CUDA kernel calls the same functions: numba compiles them anew for the device.
+
+Who asks for a kernel by `meanwhile.now` does not wait for the compiler: what is not on disk yet Python runs from the
+same source, while another process compiles.
 """
 
 from __future__ import annotations
@@ -19,25 +22,38 @@ import os
 import re
 import shutil
 import struct
+import subprocess
 import sys
 import tempfile
 import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from functools import cache
 from importlib.machinery import SourceFileLoader
 from importlib.util import module_from_spec, spec_from_loader
 from pathlib import Path
-from types import MappingProxyType, ModuleType
+from types import FunctionType, MappingProxyType, ModuleType
 from typing import Any
 
 import llvmlite.binding
 import llvmlite.ir
+import numba
+import numpy as np
 from numba import cfunc, config, njit, types
-from numba.core import cgutils, compiler, event
-from numba.core.codegen import JITCodeLibrary
+from numba.core import cgutils, event
 from numba.extending import intrinsic
+
+from stickslip.workers import processors
+
+# What compiles faster below goes into numba's own classes, which it may change with any release: for releases that are
+# not known yet there are none, and all is compiled as numba does by itself.
+KNOWN = (0, 61) <= tuple(map(int, numba.__version__.split(".")[:2])) <= (0, 68)
+if KNOWN:
+    from numba.core.codegen import JITCodeLibrary
+    from numba.core.compiler import Compiler, Flags
+else:
+    JITCodeLibrary = Compiler = Flags = object
 
 OPTIONS = {"error_model": "numpy", "_nrt": False}
 FAST = {**OPTIONS, "fastmath": {"contract", "nsz", "arcp"}}
@@ -48,6 +64,17 @@ IMPORT = re.compile(r"^from (stickslip[\w.]*) import (\([^)]*\)|[^\n]+)", re.MUL
 UNUSED = 30 * 86400.0  # s after which what nothing has loaded is removed
 KEPT = 256  # generated modules on disk, the latest used: what a user comes back to, some 20 MB
 IN_USE = 60.0  # s: one that was used so lately may be about to be read by another process
+WAITS = "STICKSLIP_WAIT"  # environment variable: where it is set, who calls a kernel waits until it is compiled
+# s that a process runs kernels by Python, before it waits for who compiles: half of what that takes; of one processor
+# it would only take away from it
+PATIENCE = 5.0 if processors() > 1 else 1.0
+MOST = 30_000  # steps of a loop: Python takes some hundredths of a second
+ALIVE = 30.0  # s that who compiles may be silent; it says every second that it lives
+LOCK = "compiling"  # file in the folder of kernels, which lives as long as who compiles
+LOW = 5  # of its priority: it takes a quarter of a processor that another process needs, and so comes to its end
+WINDOWS = {"creationflags": 0x4000 | 0x8}  # below normal, without a console
+APART: dict[str, Any] = WINDOWS if sys.platform == "win32" else {"start_new_session": True}
+AHEAD = "from stickslip.compiled import beside\nwith beside():\n from stickslip.solve.simulate import ahead\n ahead()"
 
 
 class Compilation(event.Listener):  # type: ignore[misc]  # numba tells no types
@@ -99,7 +126,7 @@ def _say(sentence: str) -> None:
 compilation = Compilation()
 
 
-class _Flags(compiler.Flags):  # type: ignore[misc]  # numba tells no types
+class _Flags(Flags):  # type: ignore[misc]  # numba tells no types
     """numba's own, compared by what was set: it compares all that may be, as often as it looks for a type."""
 
     def __eq__(self, other: object) -> bool:
@@ -109,7 +136,7 @@ class _Flags(compiler.Flags):  # type: ignore[misc]  # numba tells no types
         return hash(frozenset(self._values))
 
 
-class _Shown(compiler.Compiler):  # type: ignore[misc]
+class _Shown(Compiler):  # type: ignore[misc]
     """Compiles what Python calls, with all that it calls: for C it needs no entrance."""
 
     def __init__(self, typing: Any, target: Any, library: Any, args: Any, result: Any, flags: Any, names: Any) -> None:
@@ -150,10 +177,13 @@ def compiled(**options: Any) -> Callable[[Callable[..., Any]], Any]:
     a quarter of the time, its optimisation and machine code a third of the rest. A number that stands in the call is an
     argument as any other: numba would compile the function anew for each.
     """
+    quick = {"pipeline_class": _Shown} if KNOWN else {}
 
     def compile_(function: Callable[..., Any]) -> Any:
-        shown = _keeping(njit, {"pipeline_class": _Shown, **options})(function)
+        shown = _keeping(njit, {**quick, **options})(function)
         if not config.DISABLE_JIT:
+            shown.kept = folder(Path(function.__code__.co_filename))
+        if KNOWN and not config.DISABLE_JIT:
             called = _keeping(njit, {"pipeline_class": _Called, **options, **BARE})(function)
             shown.get_call_template = lambda given, named: called.get_call_template(map(types.unliteral, given), named)
             shown.get_overload = called.get_overload
@@ -183,6 +213,137 @@ def _keeping(compiler: Callable[..., Any], options: dict[str, Any]) -> Callable[
             config.CACHE_DIR = kept
 
     return compile_
+
+
+_plain: dict[str, dict[str, Any]] = {}
+
+
+def by_python(kernel: Any) -> Callable[..., Any]:
+    """The source of a kernel and of all that it calls, for Python to run."""
+    function = getattr(kernel, "py_func", kernel)
+    if function.__module__ not in _plain:
+        names = function.__globals__
+        _plain[function.__module__] = plain = dict(names)
+        plain.update({name: by_python(value) for name, value in names.items() if hasattr(value, "py_func")})
+    return FunctionType(function.__code__, _plain[function.__module__], function.__name__, function.__defaults__)
+
+
+class Meanwhile:
+    """Kernels that are not on disk yet, run by Python while another process compiles them.
+
+    Attributes
+    ----------
+    seconds : float
+        That this process has run kernels by Python so far.
+    """
+
+    def __init__(self) -> None:
+        self.seconds, self._ready = 0.0, set[Any]()
+        self._tried = False  # to begin another process
+        self._own: subprocess.Popen[bytes] | None = None
+
+    def now(self, kernel: Any, steps: int = 1) -> Callable[..., Any]:
+        """The kernel where it is on disk or nobody else compiles it; else its source, for Python to run, where that
+        takes no more than `MOST` steps."""
+        if kernel in self._ready or steps > MOST or not hasattr(kernel, "kept"):
+            return kernel  # type: ignore[no-any-return]
+        if self.seconds > PATIENCE or kernel.overloads or _on_disk(kernel) or not self._compiling():
+            return self.awaited(kernel)
+        return self._timed(by_python(kernel))
+
+    def awaited(self, kernel: Any) -> Callable[..., Any]:
+        """The kernel, where another process compiles it once that is done: two would take as long."""
+        if kernel not in self._ready and hasattr(kernel, "kept"):
+            while not kernel.overloads and not _on_disk(kernel) and self._compiling():
+                time.sleep(0.02)
+            self._ready.add(kernel)
+        return kernel  # type: ignore[no-any-return]
+
+    def _timed(self, function: Callable[..., Any]) -> Callable[..., Any]:
+        """The same, its time taken; a division by zero is what it is to compiled code."""
+
+        def run(*arguments: Any) -> Any:
+            began = time.perf_counter()
+            try:
+                with np.errstate(all="ignore"):
+                    return function(*arguments)
+            finally:
+                self.seconds += time.perf_counter() - began
+
+        return run
+
+    def _compiling(self) -> bool:
+        """Whether another process compiles; one is begun where none does, once."""
+        root = None if WAITS in os.environ else _root()
+        if root is None:
+            return False
+        if not self._tried:
+            self._tried, self._own = True, _begun(root / LOCK)
+            if self._own is not None:
+                _say("running uncompiled while another process compiles for this machine, once")
+        return _held(root / LOCK) if self._own is None else self._own.poll() is None
+
+
+def _on_disk(kernel: Any) -> bool:
+    """Whether numba has kept the machine code of a kernel: each is called with arguments of one kind."""
+    function = kernel.py_func
+    name = f"*/*.{function.__qualname__}-{function.__code__.co_firstlineno}.*.nbc"
+    return kernel.kept is not None and any(kernel.kept.glob(name))
+
+
+def _held(lock: Path) -> bool:
+    """Whether another process says that it compiles."""
+    try:
+        return time.time() - lock.stat().st_mtime < ALIVE
+    except FileNotFoundError:
+        return False
+
+
+def _begun(lock: Path) -> subprocess.Popen[bytes] | None:
+    """A process that compiles ahead; None where one is at it, or none can be had."""
+    if not Path(sys.executable or "").name.startswith("python"):  # a program that holds Python would begin once more
+        return None
+    search = [*filter(None, sys.path), str(PACKAGE.parent)]
+    environment = {**os.environ, WAITS: "1", "PYTHONPATH": os.pathsep.join(map(os.path.abspath, search))}
+    silent: dict[str, Any] = dict.fromkeys(("stdin", "stdout", "stderr"), subprocess.DEVNULL)
+    try:
+        if not _held(lock):
+            lock.unlink(missing_ok=True)  # of one that was killed
+        os.close(os.open(lock, os.O_CREAT | os.O_EXCL))
+    except OSError:  # there already, or no place to write
+        return None
+    try:
+        other = subprocess.Popen([sys.executable, "-c", AHEAD], cwd=lock.parent, env=environment, **silent, **APART)
+    except OSError:
+        lock.unlink(missing_ok=True)
+        return None
+    atexit.register(setattr, other, "returncode", 0)  # it may outlive this process, which is no cause for a warning
+    return other
+
+
+@contextmanager
+def beside() -> Iterator[None]:
+    """While it lasts others see that this process compiles, and gives way to them."""
+    root, done = _root(), threading.Event()
+    assert root is not None
+    lock = root / LOCK
+
+    def live() -> None:
+        while not done.wait(1.0):
+            with suppress(OSError):
+                os.utime(lock)
+
+    if hasattr(os, "nice"):
+        os.nice(LOW)
+    threading.Thread(target=live, daemon=True).start()
+    try:
+        yield
+    finally:
+        done.set()
+        lock.unlink(missing_ok=True)
+
+
+meanwhile = Meanwhile()
 
 
 def straight(text: str) -> Any:
@@ -338,8 +499,9 @@ def digest(file: Path) -> str:
 
 
 def _digest(texts: dict[Path, str]) -> str:
+    """What is compiled of these texts, and for whom: numba would compile anew for itself of another release."""
     sources = (f"{file.relative_to(PACKAGE).as_posix()}\0{texts[file]}" for file in sorted(texts))
-    return hashlib.sha256("\0".join(sources).encode()).hexdigest()[:16]
+    return hashlib.sha256("\0".join([numba.__version__, *sources]).encode()).hexdigest()[:16]
 
 
 def _closure(text: str) -> dict[Path, str]:

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from stickslip.compiled import meanwhile
 from stickslip.errors import ModelError
 from stickslip.laws.base import Mode
 from stickslip.oscillator import Oscillator, Structure
@@ -319,7 +320,8 @@ class _Builder:
                     series[:, part, 0] = quantities
             self._resets(j, [own for _, own in rows], reset[:, part])
         if not self.systems.joint:
-            derive(flows, first, series, np.empty((2, size**2), np.int64), np.empty(size**2))
+            now = meanwhile.now(derive, series.size * size)
+            now(flows, first, series, np.empty((2, size**2), np.int64), np.empty(size**2))
         cell, hop = cells_of(flows, self.physical)
         return Tables(
             names=self.names,

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from stickslip.compiled import OPTIONS, compiled
+from stickslip.compiled import OPTIONS, compiled, meanwhile
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -114,7 +114,7 @@ def cells_of(flow: Array, constant: int) -> tuple[Array, Array]:
     moving, resting = np.flatnonzero(~still), np.flatnonzero(still)
     core = np.ascontiguousarray(whole[:, moving[:, None], moving])
     where, which = np.empty((2, len(core)), np.int64)
-    where = where[: distinct(core.reshape(len(core), -1), where, which)]
+    where = where[: meanwhile.now(distinct, core.size)(core.reshape(len(core), -1), where, which)]
     cell, turned, integral = _one_by_one(core[where]) if count == 1 else _turned(core[where], where % modes)
     hop = np.zeros((len(whole), 3, size, size))
     hop[:, 0, resting, resting] = 1.0

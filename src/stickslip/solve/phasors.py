@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from stickslip.compiled import FAST, compiled
+from stickslip.compiled import FAST, compiled, meanwhile
 from stickslip.solve.cells import distinct
 from stickslip.solve.tables import Array, Tables
 
@@ -212,7 +212,7 @@ def _all_nodes(turns: NDArray[np.complex128], able: NDArray[np.bool_]) -> tuple[
     """Nodes of all that turns, the drive first: where each system's lie in the table, and in them first node and number
     of each of its turning parts. Systems that turn alike share theirs."""
     where, which = np.empty((2, len(turns)), np.int64)
-    keys = turns[where[: distinct(turns.view(np.float64), where, which)]]
+    keys = turns[where[: meanwhile.now(distinct, turns.size)(turns.view(np.float64), where, which)]]
     spans, offsets = np.zeros((len(keys), 2), np.int64), np.zeros((*keys.shape, 2))
     parts, length = [np.zeros((0, 3))], 0
     wanted = np.zeros(len(keys), dtype=bool)

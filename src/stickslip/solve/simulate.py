@@ -5,13 +5,16 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Mapping
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from stickslip.compiled import by_python, meanwhile
+from stickslip.drives.kinds import HarmonicBase, Recorded
 from stickslip.errors import ModelError, SolveError
+from stickslip.laws.coulomb import Coulomb
 from stickslip.laws.stribeck import TimeDelay
 from stickslip.oscillator import Oscillator, PlanarOscillator
 from stickslip.parameters import finite
@@ -31,6 +34,7 @@ if TYPE_CHECKING:
     from stickslip.solve.tape import Tape
 
 CHUNK = 16384  # pieces between two looks at the clock and the keyboard
+FEW, SHORT = 16, 2048  # pieces and cells of a chunk that Python runs: tenths of a second, and some
 CELLS = 65536  # Taylor cells between two looks, of a state of up to `SMALL` entries; of larger ones less by the square
 SMALL = 8
 MOST_CELLS = 1e10  # of a run: some hours
@@ -38,6 +42,7 @@ PACE = 0.1  # s between two calls of progress
 ORDER = 14  # of the polynomials: a cell turns by a radian or so, and its terms fall as 1 / 14!
 ROUNDING = 1e-13  # of the largest value: a polynomial that stays farther from the level than this does not touch it
 TRIED = 4.0  # periods of the first of the spans, each twice the one before, in which a run's end is looked for
+_until = by_python(until)  # to call it compiled takes longer than the sum does
 
 
 def simulate(
@@ -281,26 +286,23 @@ class _March:
     def through(self, stops: Stops) -> None:
         """March to the last stop."""
         self.state[stops.places] = stops.values[0]
-        came, self.mode = self.mode, kernel.begin(self.model.linear, self.mode, self.state, self.total, 1.0, self.work)
+        begin = meanwhile.now(kernel.begin)
+        came, self.mode = self.mode, begin(self.model.linear, self.mode, self.state, self.total, 1.0, self.work)
         _refuse(kernel.CHATTER if self.mode < 0 else kernel.DONE, self.table, self.state, came, self.clock)
         while self._chunk(stops) == kernel.FULL:
             pass
 
     def _chunk(self, stops: Stops) -> int:
         """March until the room is full, patience ends, or the last stop is reached."""
-        # numba makes the Clock that it hands back by calling Python, and dies of a Ctrl-C that comes just
-        # then; the first call may compile for long, and is left to it
         march = kernel.march if len(stops.ends) == 1 else kernel.course
-        if self.heed is None and getattr(march, "overloads", True):
-            self.heed = self.holding.enter_context(held_back())
-        before, room = self.clock, self.pieces.room()
-        outcome, count, self.mode, self.clock, self.stop = self._marched(stops, room)
-        if self.heed is not None:
-            self.heed()
-        passed = until(before, self.clock, self.table.motion.period)
+        before, room, written = self.clock, self.pieces.room(), None
+        if (now := meanwhile.now(march)) is not march:
+            written = self._by_python(now, stops, room)
+        outcome, count = self._compiled(march, stops, room) if written is None else written
+        passed = _until(before, self.clock, self.table.motion.period)
         self.pieces.keep(count, passed, self.total)
         _refuse(outcome, self.table, self.state, self.mode, self.clock)
-        if outcome == kernel.FULL and count < len(room.laps):  # by its patience: it goes cell by cell
+        if outcome == kernel.FULL and count < len(room.laps) and written is None:  # by its patience: cell by cell
             name = self.table.modes[self.mode].name
             _require_cells(passed / self.patience, self.total - self.pieces.passed, name)
         last = self.pieces.columns.exits[self.pieces.count - count : self.pieces.count]
@@ -309,14 +311,51 @@ class _March:
             self.tell(self.pieces.passed / self.total)
         return int(outcome)
 
-    def _marched(self, stops: Stops, room: Pieces) -> tuple[int, int, int, Clock, int]:
+    def _compiled(self, march: Any, stops: Stops, room: Pieces) -> tuple[int, int]:
+        """Outcome and number of pieces of a chunk, whose room they fill."""
+        march = meanwhile.awaited(march)
+        # numba makes the Clock that it hands back by calling Python, and dies of a Ctrl-C that comes just
+        # then; the first call may compile for long, and is left to it
+        if self.heed is None and getattr(march, "overloads", True):
+            self.heed = self.holding.enter_context(held_back())
+        written = self._marched(march, stops, room, self.patience)
+        if self.heed is not None:
+            self.heed()
+        return written
+
+    def _by_python(self, march: Any, stops: Stops, room: Pieces) -> tuple[int, int] | None:
+        """As :meth:`_compiled`, a few pieces; None, and nothing done, where one is too long for Python, or where Python
+        refuses what compiled code makes infinite."""
+        begun = self.clock, self.mode, self.stop
+        state, past = self.state.copy(), [part.copy() for part in self.past]
+        with suppress(ArithmeticError, ValueError):
+            outcome, count = self._marched(march, stops, room.part(0, FEW), SHORT)
+            at_stop = np.any(np.all(stops.ends[max(0, self.stop - 1) : self.stop + 1] == self.clock[:2], axis=1))
+            if outcome != kernel.FULL or room.exits[count - 1] >= 0 or at_stop:  # else cut by its patience
+                return outcome, count
+        self.clock, self.mode, self.stop = begun
+        for part, was in zip((self.state, *self.past), (state, *past), strict=True):
+            part[:] = was
+        return None
+
+    def _marched(self, march: Any, stops: Stops, room: Pieces, patience: int) -> tuple[int, int]:
         """As :func:`stickslip.solve.kernel.course`; where there is one stop, without what leads from one to the next,
         which takes seconds to compile."""
-        begun, rest = (self.model, self.clock, self.state, self.mode), (self.past, room, self.work, self.patience)
+        begun, rest = (self.model, self.clock, self.state, self.mode), (self.past, room, self.work, patience)
         if len(stops.ends) > 1:
-            return kernel.course(*begun, stops, self.stop, *rest)  # type: ignore[no-any-return]
-        laps, time = stops.ends[0].tolist()
-        return (*kernel.march(*begun, Clock(laps, time, 0.0), *rest), 0)
+            outcome, count, self.mode, self.clock, self.stop = march(*begun, stops, self.stop, *rest)
+        else:
+            laps, time = stops.ends[0].tolist()
+            outcome, count, self.mode, self.clock = march(*begun, Clock(laps, time, 0.0), *rest)
+        return outcome, count
+
+
+def ahead() -> None:
+    """Have the kernels compiled that a run of a linear law calls, and what is asked of it."""
+    for drive in (HarmonicBase(2.0, 0.1), Recorded([0.0, 1.0, 0.0], 1.0, on="force", order=1)):
+        run = simulate(Oscillator(1.0, 1.0, Coulomb(0.5), drive), duration=2.0)
+        run.sample([0.0], ("x",))
+        run.end()
 
 
 class _Log:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from stickslip.compiled import meanwhile
 from stickslip.errors import SolveError
 from stickslip.printing import html_table
 from stickslip.record.channels import Channel, described
@@ -29,6 +30,7 @@ UNITS = {
 }  # fmt: skip
 TURNING = {"x": "angle", "v": "angular velocity", "a": "angular acceleration"}
 A_PERIOD = 200  # samples of a table, where no rate is asked for
+FEW = 1024  # instants that Python looks at in one go: a tenth of a second
 MOST = 1e10  # samples of a record; more fit no desk
 
 
@@ -119,7 +121,7 @@ class Trajectory:
         """
         table, mode, leaving = self.table, int(self.modes[-1]), int(self.exits[-1])
         first, last = self.states[0].copy(), self.states[-1].copy()
-        follow(table.linear, mode, last, float(self.durations[-1]), np.empty((3, len(last))))
+        meanwhile.now(follow)(table.linear, mode, last, float(self.durations[-1]), np.empty((3, len(last))))
         if leaving >= 0:
             last, mode = table.reset[leaving] @ last, int(table.target[leaving])
         first[: table.physical] = last[: table.physical]  # the drive's signals are again what they were
@@ -324,9 +326,17 @@ class Trajectory:
         if np.any(np.diff(times) < 0):
             raise SolveError("instants that run back", "they are looked up in the order of time", "sort them")
         rows = np.concatenate([self.rows(name) for name in outputs], axis=1)
-        out, piece = np.empty((rows.shape[1], len(times))), np.empty(len(times), dtype=np.int64)
-        work, c = np.empty((4, self.states.shape[1])), np.empty((len(out), DEGREE + 1))
-        sample(self.table.linear, self.starts, self.modes, self.states, times, rows, piece, out, work, c)
+        work, c = np.empty((4, self.states.shape[1])), np.empty((rows.shape[1], DEGREE + 1))
+        out, piece, done = np.empty((rows.shape[1], len(times))), np.empty(len(times), dtype=np.int64), 0
+        motion = (self.table.linear, self.starts, self.modes, self.states)
+        while done < len(times):
+            now = meanwhile.now(sample)
+            part = slice(done, len(times) if now is sample else done + FEW)
+            values = out[:, part] if part == slice(0, len(times)) else np.empty_like(out[:, part], order="C")
+            now(*motion, times[part], rows, piece[part], values, work, c)
+            if values.base is not out:
+                out[:, part] = values
+            done = part.stop
         return out, piece
 
     @property
