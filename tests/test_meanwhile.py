@@ -242,6 +242,26 @@ def test_who_would_rather_wait_begins_none(cold: Any, monkeypatch: pytest.Monkey
     assert not (compiled._root() / compiled.LOCK).exists()  # type: ignore[operator]
 
 
+def test_long_work_begins_none(cold: Any) -> None:
+    with compiled.waiting():
+        assert os.environ["STICKSLIP_WAIT"] == "1"
+        assert Meanwhile().now(cold) is cold
+    assert "STICKSLIP_WAIT" not in os.environ
+    assert not (compiled._root() / compiled.LOCK).exists()  # type: ignore[operator]
+
+
+def test_who_waits_for_a_slow_process_compiles_itself_at_last(cold: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    lock = compiled._root() / compiled.LOCK  # type: ignore[operator]
+    lock.touch()
+    monkeypatch.setattr(compiled, "LONGEST", 0.2)
+    meanwhile = Meanwhile()
+    assert meanwhile.now(cold) is not cold
+    assert meanwhile.awaited(cold)(2.0) == 16.5
+    assert lock.exists()
+    assert not sum(cold.stats.cache_hits.values())
+    lock.unlink()
+
+
 def test_what_takes_python_long_is_compiled_at_once(cold: Any) -> None:
     assert Meanwhile().now(cold, compiled.MOST + 1) is cold
 

@@ -68,6 +68,7 @@ WAITS = "STICKSLIP_WAIT"  # environment variable: where it is set, who calls a k
 # s that a process runs kernels by Python, before it waits for who compiles: half of what that takes; of one processor
 # it would only take away from it
 PATIENCE = 5.0 if processors() > 1 else 1.0
+LONGEST = 10.0  # s of waiting for another process: on a busy machine it has less of a processor than who waits
 MOST = 30_000  # steps of a loop: Python takes some hundredths of a second
 ALIVE = 30.0  # s that who compiles may be silent; it says every second that it lives
 LOCK = "compiling"  # file in the folder of kernels, which lives as long as who compiles
@@ -254,7 +255,8 @@ class Meanwhile:
     def awaited(self, kernel: Any) -> Callable[..., Any]:
         """The kernel, where another process compiles it once that is done: two would take as long."""
         if kernel not in self._ready and hasattr(kernel, "kept"):
-            while not kernel.overloads and not _on_disk(kernel) and self._compiling():
+            last = time.monotonic() + LONGEST
+            while not (kernel.overloads or _on_disk(kernel)) and self._compiling() and time.monotonic() < last:
                 time.sleep(0.02)
             self._ready.add(kernel)
         return kernel  # type: ignore[no-any-return]
@@ -341,6 +343,20 @@ def beside() -> Iterator[None]:
     finally:
         done.set()
         lock.unlink(missing_ok=True)
+
+
+@contextmanager
+def waiting() -> Iterator[None]:
+    """Within it, and in processes begun there, who calls a kernel compiles it: long work gains nothing by Python."""
+    before = os.environ.get(WAITS)
+    os.environ[WAITS] = "1"
+    try:
+        yield
+    finally:
+        if before is None:
+            del os.environ[WAITS]
+        else:
+            os.environ[WAITS] = before
 
 
 meanwhile = Meanwhile()

@@ -10,6 +10,7 @@ from typing import Any, TypeVar
 
 from stickslip.answers.findings import BY_FORCE, NOT_TRIED, Findings, flagged, without
 from stickslip.balance.force import friction_force
+from stickslip.compiled import waiting
 from stickslip.cycle.loops import Loops, friction_loops
 from stickslip.cycle.onset import Breakaway, Presliding, breakaway, presliding
 from stickslip.cycle.sticks import Sticks, find_sticks
@@ -78,7 +79,7 @@ def tried(
     """
     findings = findings.having(**{key: without(findings.results.get(key), UNTRIED) for key in NOT_TRIED})
     answers = {estimate.name: estimate for estimate in findings.estimates}
-    with workers(processes, __name__, among=True) as mapped:  # they are ready when the rig is found
+    with waiting(), workers(processes, __name__, among=True) as mapped:  # they are ready when the rig is found
         belief = believe(findings.record, mapped=mapped)
         ask = partial(_ask, stated=belief.record.rig)
         trial = try_on_twins(belief, answers, ask, count=twins, rng=rng, progress=progress, mapped=mapped)
