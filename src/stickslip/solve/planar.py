@@ -39,15 +39,17 @@ from stickslip.solve.tables import Stops
 from stickslip.solve.tape import Tape, kept_of
 from stickslip.solve.taylor import Array, Exits, Index, Nodes
 
-SLIP, STUCK = range(2)
-STOPPED, RELEASED = range(2)  # exits: out of slip, out of stick
+SLIP, STUCK, SLOW = range(3)  # a slow slip is followed where its end is not near, or where it turns
+STOPPED, RELEASED, SPED, FAINT = range(4)  # exits: out of slip, out of stick, and two out of slow slip
+MODES = ("slip", "slip", 0, symbol("f")), ("stuck", "stick", 0, None), ("slow", "slip", 0, symbol("f"))
 NEAR = 1e-9  # of the speed that friction gives in a period: there a slip ends, its force as good as constant
 BRIEF = 1e-6  # of a period: the longest that such an end may take
+REST = 1e-4  # of the speed at which a slip ends: a slip so slow is none, whatever pushes; far above the rounding of u
 STRAIGHT = 1e-12  # of the largest speed: a slip so little beside P runs straight against it
 LEVEL = 1e-12  # of the friction: P that exceeds it by no more is on the disc, for a run does not tell them apart
 TURN = 0.2  # rad that the fastest motion turns in a begin: its ten powers of time are then exact to rounding
 RESOLVED = 1e-12  # of w: what its last two coefficients may be
-FAINT = 1e-5  # of the slowest speed: or what they may be of the velocity
+LEAST = 1e-5  # of the speed at which a slip ends: or what they may be of the velocity
 SQUARED = 1e-8  # of w: a last step of Newton's, whose square is rounding
 HALVINGS, NEWTON = 60, 12
 
@@ -59,7 +61,7 @@ class PlanarTrajectory(CurvedTrajectory):
     def sample(self, times: ArrayLike, outputs: tuple[str, ...]) -> tuple[Array, Index]:
         """Values at increasing instants; parameters and returns as of :meth:`Trajectory.sample`."""
         values, piece = super().sample(times, outputs)
-        begun = np.flatnonzero(np.isnan(values).any(axis=0))
+        begun = np.flatnonzero(~np.isfinite(values).all(axis=0))
         if not len(begun):
             return values, piece
         # where a slip begins, at rest, friction has the direction that it comes from
@@ -152,12 +154,12 @@ class _Plane:
     def tape(self) -> Tape:
         """The operations of both modes, their exits and the outputs."""
         size = len(self.names)
-        made = [self._sliding(), self._held()]
+        made = [self._sliding(fast=True), self._held(), self._sliding(fast=False)]
         entries = [
             [one.scaled(rates[j]) if rates[j] != ({}, 0.0) else (-1, 0.0) for j in range(size)]
             for one, rates, *_ in made
         ]
-        quantities = [[one.scaled(exit_)] for one, _, exit_, _ in made]
+        quantities = [[one.scaled(exit_) for exit_ in exits] for one, _, exits, _ in made]
         moving = [one for one, *_ in made]
         outputs = [self._outputs(rates, friction) for _, rates, _, friction in made]
         kept = _copied(moving)
@@ -176,7 +178,7 @@ class _Plane:
         return Tape(
             system=system,
             names=self.names,
-            modes=(CurvedMode("slip", "slip", 0, symbol("f")), CurvedMode("stuck", "stick", 0, None)),
+            modes=tuple(CurvedMode(*mode) for mode in MODES),
             motion=self.motion,
             physical=4,
             degrees=2,
@@ -193,7 +195,7 @@ class _Plane:
             places=places,
         )
 
-    def _sliding(self) -> tuple[Operations, list[Form], Form, list[Form]]:
+    def _sliding(self, *, fast: bool) -> tuple[Operations, list[Form], list[Form], list[Form]]:
         """Slip: operations, rates, what ends it, and friction. Speeds in units of the slowest: a root needs it."""
         moving, near = Operations(len(self.names), {}), self.near
         along = [combined([(1 / near, _form(row))]) for row in self.slip]
@@ -204,9 +206,10 @@ class _Plane:
         rates = [_form(row) for row in self.flow]
         for i in range(2):
             rates[2 + i] = combined([(1.0, rates[2 + i]), (-1 / self.system.mass, friction[i])])
-        return moving, rates, combined([(1.0, ({}, 1.0)), (-1.0, speed)]), friction
+        levels = [(-1.0, 1.0)] if fast else [(1.0, -2.0), (-1.0, REST)]
+        return moving, rates, [combined([(side, speed), (level, ({}, 1.0))]) for side, level in levels], friction
 
-    def _held(self) -> tuple[Operations, list[Form], Form, list[Form]]:
+    def _held(self) -> tuple[Operations, list[Form], list[Form], list[Form]]:
         """Stick: the mass goes with the counter-face, until the force that holds it leaves the disc."""
         moving, radius = Operations(len(self.names), {}), self.system.breakaway * (1 + LEVEL)
         friction = [_form(row) for row in self.push]
@@ -214,7 +217,8 @@ class _Plane:
         rates = [_form(row) for row in self.flow]
         faced = self.face @ self.flow
         rates[:2], rates[2:4] = [_form(row) for row in faced], [_form(row) for row in faced @ self.flow]
-        return moving, rates, combined([*((1.0, moving.product(s, s)) for s in shares), (-1.0, ({}, 1.0))]), friction
+        beyond = combined([*((1.0, moving.product(share, share)) for share in shares), (-1.0, ({}, 1.0))])
+        return moving, rates, [beyond], friction
 
     def _outputs(self, rates: list[Form], friction: list[Form]) -> dict[str, list[Form]]:
         entry: list[Form] = [({j: 1.0}, 0.0) for j in range(len(self.names))]
@@ -224,18 +228,17 @@ class _Plane:
         return outputs | {name: [entry[j]] for j, name in enumerate(self.names)}
 
     def _exits(self, quantities: list[list[tuple[int, float]]]) -> Exits:
-        """An exit for each mode. One out of slip counts where the speed falls through its level only."""
-        (stopped,), (released,) = quantities
-        size = len(self.names)
+        """How each mode may end. An end of slip counts where the speed falls through its level only."""
+        own = [quantity for mode in quantities for quantity in mode]
         return Exits(
-            node=np.array([stopped[0], released[0]], dtype=np.int64),
-            factor=np.array([stopped[1], released[1]], dtype=np.float64),
-            target=np.array([STUCK, SLIP], dtype=np.int64),
-            crossing=np.array([True, False]),
-            polished=np.array([False, True]),
-            carried=np.array([False, False]),
-            reset=np.tile(np.eye(size), (2, 1, 1)),
-            first=np.array([0, 1, 2], dtype=np.int64),
+            node=np.array([node for node, _ in own], dtype=np.int64),
+            factor=np.array([factor for _, factor in own], dtype=np.float64),
+            target=np.array([STUCK, SLIP, SLIP, STUCK], dtype=np.int64),
+            crossing=np.array([True, False, True, True]),
+            polished=np.array([False, True, False, False]),
+            carried=np.zeros(4, dtype=np.bool_),
+            reset=np.tile(np.eye(len(self.names)), (4, 1, 1)),
+            first=np.array([0, 1, 2, 4], dtype=np.int64),
         )
 
 
@@ -309,9 +312,8 @@ class _March:
     def __init__(self, table: Tape, rtol: float) -> None:
         self.plane = _Plane(table.system)
         # every exit leads to no mode: whether the mass then slides or sticks is no matter of linear forms
-        self.model = model_of(table, rtol)._replace(
-            exits=table.exits._replace(target=np.array([-1 - STOPPED, -1 - RELEASED]))
-        )
+        exits = table.exits._replace(target=-1 - np.arange(len(table.exits.target)))
+        self.model = model_of(table, rtol)._replace(exits=exits)
         self.implicit, self.stiff, self.fresh = implicit_of(table, self.model), False, True
         self.level, self.slope = self.plane.system.friction, self.plane.system.friction.slope("v")
         self.rest, self.breakaway = self.level.at(v=0.0), self.plane.system.breakaway
@@ -335,11 +337,9 @@ class _March:
             if outcome == STIFF:
                 self.stiff = True
             elif outcome == HALT:
-                mode = place.stopped() if mode == -1 - STOPPED else place.freed()
-            elif outcome == STALL and mode == SLIP and place.slow:
-                mode = place.stopped()
-                if mode == SLIP:
-                    return STALL, place.row, place.leapt, mode
+                mode = place.freed() if mode == -1 - RELEASED else place.slowed(-1 - mode)
+            elif outcome == STALL and mode != STUCK and place.slow:
+                mode = place.slowed(FAINT)
             else:
                 return outcome, place.row, place.leapt, mode
         return FULL, place.row, place.leapt, mode
@@ -393,26 +393,30 @@ class _Place:
         held = np.hypot(*self.push) <= self.own.breakaway * (1 + LEVEL)
         return STUCK if held else self.released()
 
-    def stopped(self) -> int:
-        """The mode behind a slip whose speed has fallen to nothing: stick, slip the other way, or the same slip where
-        it turns before."""
+    def slowed(self, leaving: int) -> int:
+        """The mode behind a change of speed: stick, slip the other way, or the same slip, slow or no more so."""
         slip, push, rest = self.slip, self.push, self.own.rest
         speed, force = np.hypot(*slip), np.hypot(*push)
         across = abs(slip[0] * push[1] - slip[1] * push[0])
-        time = math.inf
-        if force < rest:
-            time = self.mass * (rest * speed + push @ slip) / (rest**2 - force**2)
-        elif across <= STRAIGHT * np.hypot(*self.big[2:4]) * force and push @ slip <= 0:
-            time = self.mass * speed / (rest + force)
+        straight = across <= STRAIGHT * np.hypot(*self.big[2:4]) * force and push @ slip <= 0
+        longest = BRIEF * self.plane.time
         if self.row:
             self.steps.ends[self.row - 1] = -1  # the event, if it is one, is at the end of what follows
-        if not time <= BRIEF * self.plane.time:
+        if leaving == SPED:
             return SLIP
+        if force < rest:
+            time = self.mass * (rest * speed + push @ slip) / (rest**2 - force**2)
+        else:
+            time = self.mass * speed / (rest + force)
+        if leaving == FAINT:
+            time = min(time, longest)
+        elif time > longest or not (force < rest or straight):
+            return SLOW
         speeds, ways = np.zeros((2, WIDTH)), np.zeros((2, WIDTH))
         speeds[:, 0], speeds[:, 1] = slip / 2, -slip / 2
         ways[:, :3] = time * slip[:, None] * np.array([0.375, 0.25, -0.125])  # of t - t^2 / 2
         if time > 0.0 and not self.lay(speeds, ways, time, STOPPED):
-            return SLIP
+            return SLOW
         self.still()
         return self.rested()
 
@@ -485,7 +489,7 @@ class _Place:
                 break
         else:
             return None
-        least = FAINT * self.plane.near / time**p
+        least = LEAST * self.plane.near / time**p
         return shares if np.max(np.abs(shares[-2:])) <= max(RESOLVED * np.max(np.abs(shares)), least) else None
 
     def lay(self, speeds: Array, ways: Array, time: float, leaving: int) -> bool:
