@@ -14,6 +14,7 @@ import stickslip as ss
 from stickslip.answers import analyze_joint, axis_record
 from stickslip.cli.program import main
 from stickslip.cycle import joint_backlash, joint_breakaway, regress_joint, regress_joint_logs
+from stickslip.cycle.joint import is_late
 from stickslip.cycle.joint_fit import SURELY
 from stickslip.errors import EstimateError, ModelError, RecordError
 from stickslip.estimate import kinds, stands
@@ -530,3 +531,46 @@ def test_the_figure_draws_either_direction_by_its_own_friction() -> None:
     share = joint.load.value * joint.carried
     assert back.get_ydata()[0] == pytest.approx(-joint.back.value - share)
     assert forward.get_ydata()[0] == pytest.approx(joint.forward.value + share)
+
+
+def late_log(seed: int, late: float) -> tuple[joints.Joint, ss.Record]:
+    """A joint of the integrator of the tests, its torque logged `late` [s], its reference not."""
+    joint = joints.drawn(seed, torque=True)
+    time = np.arange(len(joint.record)) / joint.record.fs
+    written = {
+        "theta": joint.record["theta"],
+        "force": np.interp(time - late, time, joint.record["force"]),
+    }
+    record = ss.Record.of(written, fs=joint.record.fs, units={"force": "N m"})
+    return joint, record.with_details("force", gain_sd=joints.GAIN)
+
+
+@pytest.mark.parametrize("seed", [70100, 70109, 70119])
+def test_a_torque_that_comes_late_is_no_friction_of_the_load(seed: int) -> None:
+    """Read as it was logged, its load part missed the truth by up to 9 deviations, and its viscous friction by 20."""
+    joint, record = late_log(seed, 0.015)
+    regression = regress_joint(record)
+    assert is_late(regression.delay)
+    assert regression.delay.value == pytest.approx(0.015, abs=1.5e-3)
+    for name in ("load", "viscous", "inertia"):
+        assert getattr(regression, name).includes(joint.truth[name])
+    assert regression.level.includes(joint.level(regression.time))
+    headline = ss.summary(analyze_joint(record)).headline
+    assert any("later than the position" in sentence for sentence in headline)
+    assert not is_late(regress_joint(record.with_details("force", delay=0.015)).delay)
+
+
+def test_a_torque_that_comes_in_time_is_not_told_to_be_late() -> None:
+    for seed in (70100, 70109, 70119):
+        joint, record = late_log(seed, 0.0)
+        regression = regress_joint(record)
+        assert not is_late(regression.delay)
+        assert abs(regression.load.value - joint.truth["load"]) < 4 * regression.load.sd
+    controlled = ss.Record.of({name: joint.record[name] for name in ("theta", "reference")}, fs=joint.record.fs)
+    assert regress_joint(controlled, kp=joint.kp).delay is None
+
+
+def test_a_joint_without_dry_friction_is_told_what_would_be_felt() -> None:
+    record = log(noise=0.005, forward=0.0, back=0.0, load=0.0)
+    headline = " ".join(ss.summary(analyze_joint(record)).headline)
+    assert re.match(r"No dry friction .*is felt; more than [\d.]+ µN m would be", headline)

@@ -2,26 +2,31 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from stickslip.cycle.joint_fit import (
     ADVICE,
+    SURELY,
     WARM,
+    WORDS,
     JointData,
-    Telling,
     about_load,
+    coefficient,
     fitted,
     joint_data,
     pooled,
     turning,
     warmed,
 )
+from stickslip.cycle.regression import TURNING, UNITS
 from stickslip.errors import EstimateError, RecordError
-from stickslip.estimate import Constant, Doubt, Estimate, Result, Status
+from stickslip.estimate import NORMAL_95, Constant, Doubt, Estimate, Result, Status
 from stickslip.record.record import Record
 from stickslip.signals.noise import noise_level
 from stickslip.statistics import FEW_INDEPENDENT, LeastSquares
@@ -29,8 +34,13 @@ from stickslip.statistics import FEW_INDEPENDENT, LeastSquares
 Array = NDArray[np.float64]
 
 BIASED = 0.01  # share of noise in the power of the acceleration above which the inertia is visibly low
+LATEST = 0.1  # s that a torque may be late
+OFTEN, USUAL = 0.25, 0.02  # odds that a torque is late, chosen, and s by which it then usually is, chosen
+STRAYS = 1.6  # times its chance that a delay strays: so it did on 60 joints of 15 ms, seeds 70100 to 70225
+NEARER, NEAR = 8, 1e-3  # steps towards the delay, and the last one's size in samples
 WAYS = ((1.0, "forward"), (-1.0, "back"))
-NOISY, LOADED = "noisy", "loaded"  # kinds of doubt
+NOISY, LOADED, CONFOUNDED = "noisy", "loaded", "confounded"  # kinds of doubt
+BARELY = 0.5  # of a value: an interval that is wider on either side hardly tells it
 RICHER = {"load", "uneven", *WARM}  # what Coulomb and viscous friction of both directions alike do not have
 
 
@@ -83,6 +93,9 @@ class JointFriction(Result):
         "force", "current", or "reference" where the torque is that of the stated controller.
     status : str
         "ok", or in words what to beware of.
+    delay : Estimate or None
+        By how much the measured torque comes later [s] than the position; taken out where it is surely there. None of
+        a controller's torque, and where the motion does not tell it.
     """
 
     level: Estimate
@@ -112,6 +125,7 @@ class JointFriction(Result):
     left_out: tuple[str, ...]
     source: str
     status: str
+    delay: Estimate | None = None
 
     def weight(self, position: Array) -> Array:
         """Gravity's torque [N m] at positions."""
@@ -195,8 +209,66 @@ def regress_joint(
     """
     record, data = joint_data(record, gravity, inertia=inertia, kp=kp, kd=kd, torque_constant=torque_constant)
     (data,) = warmed([data])
+    delay = _delay_of(data)
+    data = _punctual(data, delay)
     fit, terms, pull, left_out = fitted(data)
-    return _answer(record, data, fit, terms, pull, left_out)
+    if delay is None and data.source != "reference":
+        left_out = (*left_out, f"{WORDS['late']}: {ADVICE['late']}")
+    return replace(_answer(record, data, fit, terms, pull, left_out), delay=delay)
+
+
+def _delay_of(data: JointData) -> Estimate | None:
+    """By how much a measured torque comes late; None of a controller's, and where the motion can not tell.
+
+    A torque that was filtered, or logged after the position, passes for friction that grows with the load. Its delay is
+    where its own column of the balance, :math:`-d\\,\\dot\\tau`, has nothing left to explain.
+    """
+    if any(log.torque is None for log in data.logs):
+        return None
+    fs = data.logs[0].sliding.window.fs
+    bare, terms = tuple(term for term in data.terms if term not in RICHER), (*data.terms, "late")
+    most = int(LATEST * fs)
+    counts = [0, *(sign * 2**k for k in range(most.bit_length()) for sign in (1, -1))]
+
+    def left(count: int) -> float:
+        return float(np.linalg.norm(about_load(data.earlier(count / fs), bare)[0].residual))
+
+    try:
+        late = min(counts, key=left) / fs
+        for _ in range(NEARER):
+            fit, _ = about_load(data.earlier(late), terms)
+            step = coefficient(fit, terms, "late")
+            late += min(max(step, -LATEST), LATEST)
+            if abs(step) < NEAR / fs:
+                break
+    except EstimateError:  # what else it can not tell is said where nothing is asked of a delay
+        return None
+    sd = STRAYS * Telling(data, fit, terms, True, "ok").sum({"late": 1.0}, WORDS["late"]).sd
+    late, sd = (late, sd) if abs(late) <= LATEST else (0.0, LATEST)  # beyond that it is some other fault's
+    return Estimate.normal(WORDS["late"], late, sd=sd, unit="s", method="the balance of torque, read later")
+
+
+def _punctual(data: JointData, delay: Estimate | None) -> JointData:
+    """The data with a torque read as much later as it surely is late, and unsure by how unsure that is."""
+    if delay is None:
+        return data
+    data, unsure = (data.earlier(delay.value), delay.sd) if is_late(delay) else (data, _unseen(delay))
+    return replace(data, unsure=(*data.unsure, unsure * data.columns(("late",), 0.0, (0.0, 0.0))[:, 0]))
+
+
+def _unseen(delay: Estimate) -> float:
+    """Deviation [s] of a delay that is not surely there: most logs have none, which one that is seen badly may be."""
+    among = delay.sd**2 + USUAL**2  # the variance of what is seen of delays, where there is one
+    share = USUAL**2 / among
+    seen = min((delay.value / delay.sd) ** 2, SURELY**2)
+    odds = OFTEN * delay.sd / math.sqrt(among) * math.exp(seen / 2 * share)
+    size = math.hypot(share * delay.value, math.sqrt(share) * delay.sd)
+    return math.sqrt(odds / (1 + odds)) * size
+
+
+def is_late(delay: Estimate) -> bool:
+    """Whether a delay is surely there."""
+    return abs(delay.value) > SURELY * delay.sd
 
 
 def _answer(
@@ -282,6 +354,62 @@ def _worries(data: JointData, fit: LeastSquares, terms: tuple[str, ...], record:
     return worries
 
 
+@dataclass(frozen=True)
+class Telling:
+    """Coefficients and their sums as Estimates."""
+
+    data: JointData
+    fit: LeastSquares
+    terms: tuple[str, ...]
+    turning: bool
+    status: str
+
+    @cached_property
+    def unsure(self) -> tuple[Array, ...]:
+        """What the torque is unsure by beside its residuals: by what was stated, and by what nobody stated."""
+        stated = self.data.stated.get("inertia")
+        inertia = stated.value if stated else coefficient(self.fit, self.terms, "inertia")
+        return *self.data.unsure, *self.data.unshared(inertia, coefficient(self.fit, self.terms, "viscous"))
+
+    def one(self, term: str) -> Estimate:
+        """A coefficient, with a doubt where its interval hardly tells it."""
+        estimate = self.sum({term: 1.0}, WORDS[term])
+        wide = NORMAL_95 * estimate.sd > BARELY * abs(estimate.value)
+        if not wide:
+            return estimate
+        partner = self._partner(self.terms.index(term))
+        doubt = Doubt(f"hardly told from the {WORDS[partner]}: {ADVICE[term]}", CONFOUNDED, lesser=True)
+        return replace(estimate, status=Status(self.status, doubt))
+
+    def sum(self, weights: dict[str, float], name: str) -> Estimate:
+        """A sum of coefficients."""
+        row = np.array([weights.get(term, 0.0) for term in self.terms])
+        beside = math.hypot(*(float(row @ self.fit.projection @ column) for column in self.unsure), 0.0)
+        heat = (
+            {"warming": "N m/K", "thinning": "N m s/rad/K"}
+            if self.turning
+            else {"warming": "N/K", "thinning": "N s/m/K"}
+        )
+        units = {**(TURNING if self.turning else UNITS), "load": "1", "late": "s", **heat}
+        kind = {"forward": "coulomb", "back": "coulomb", "sine": "coulomb", "cosine": "coulomb", "damping": "viscous"}
+        unit = units[kind.get(next(iter(weights)), next(iter(weights)))]
+        how = "instruments of the reference" if self.data.followed else "least squares"
+        checks = (
+            f"condition number {self.fit.condition:.3g}",
+            f"residuals are worth {self.fit.independent:.0f} independent samples",
+        )
+        return self.fit.combined(
+            row, name, unit, f"{how}, windows within strokes", beside=beside, status=self.status, checks=checks
+        )
+
+    def _partner(self, index: int) -> str:
+        """The term whose coefficient goes with this one most."""
+        forms = self.fit.projection
+        alike = np.abs(forms @ forms[index]) / np.linalg.norm(forms, axis=1)
+        alike[index] = -1.0
+        return self.terms[int(np.argmax(alike))]
+
+
 # ---- several logs of one joint
 
 
@@ -321,6 +449,8 @@ class JointLogs(Result):
         What all logs together can not tell, and which motion would.
     status : str
         "ok", or in words what to beware of.
+    delay : Estimate or None
+        As of :class:`JointFriction`, of all logs at once.
     """
 
     forward: Estimate
@@ -336,6 +466,7 @@ class JointLogs(Result):
     predictions: tuple[JointPrediction, ...]
     left_out: tuple[str, ...]
     status: str = "ok"
+    delay: Estimate | None = None
 
 
 def regress_joint_logs(
@@ -396,6 +527,8 @@ def regress_joint_logs(
             "several logs are told together by torques of one source",
             "give two logs or more, of one robot and one kind",
         )
+    delay = _delay_of(pooled(data))
+    data = [_punctual(one, delay) for one in data]
     fit, terms, _, left_out = fitted(pooled(data))
     tell = Telling(pooled(data), fit, terms, turning(records[0]), "ok")
     known = {term: tell.one(term) for term in terms if term != "uneven"}
@@ -407,7 +540,7 @@ def regress_joint_logs(
         known["forward"].within(0.0), known["back"].within(0.0), known["viscous"],
         load=known.get("load"), inertia=known.get("inertia"), sine=known.get("sine"), cosine=known.get("cosine"),
         damping=known.get("damping"), warming=known.get("warming"), thinning=known.get("thinning"),
-        predictions=tuple(predictions), left_out=left_out,
+        predictions=tuple(predictions), left_out=left_out, delay=delay,
     )  # fmt: skip
 
 

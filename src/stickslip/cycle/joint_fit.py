@@ -13,12 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stickslip.balance.motion import away_from, require_fit, stretches
-from stickslip.cycle.regression import TURNING, UNITS
 from stickslip.errors import EstimateError, ModelError, RecordError
-from stickslip.estimate import NORMAL_95, Constant, Doubt, Estimate, Status
+from stickslip.estimate import Constant, Estimate
 from stickslip.record.record import Record, Step, require_record
 from stickslip.signals.derivatives import differentiate, five_point_difference, smooth
-from stickslip.signals.interpolate import without_delays
+from stickslip.signals.interpolate import band_limited, without_delays
 from stickslip.signals.noise import noise_level, quantisation_step
 from stickslip.statistics import LeastSquares, least_squares
 
@@ -39,14 +38,13 @@ SETTLED = 1e-6  # of the load part between two rounds
 STARTS = (0.0, 0.3)  # of the load part: from none alone one joint in a hundred ended where gravity has the wrong sign
 SURELY = 4.0  # deviations, by which the viscous friction of both directions differs: chance gives that once in 15000
 TOGETHER = 0.995  # correlation of motor and link: an encoder that wraps, or the motor of another joint, has less
-BARELY = 0.5  # of a value: an interval that is wider on either side hardly tells it
-CONFOUNDED = "confounded"  # a kind of doubt
 WORDS = {
     "inertia": "inertia", "viscous": "viscous friction", "uneven": "uneven viscous friction",
     "forward": "Coulomb friction forward", "back": "Coulomb friction back",
     "coulomb": "Coulomb friction", "load": "friction per load",
     "warming": "friction per kelvin", "thinning": "viscous friction per kelvin",
     "sine": "gravity, sine part", "cosine": "gravity, cosine part", "damping": "damping of the control loop",
+    "late": "delay of the torque",
 }  # fmt: skip
 ADVICE = {
     "inertia": "accelerate harder, by steps or faster swings",
@@ -60,6 +58,7 @@ ADVICE = {
     "sine": "turn farther, a quarter turn at least",
     "cosine": "turn farther, a quarter turn at least",
     "damping": "log the torque or the motor's current, or state kd",
+    "late": "swing at several frequencies, or state it",
 }
 WARM = ("warming", "thinning")
 # Of the variance of a temperature, its counts' and its noise's: a regression on it is low by as much.
@@ -176,6 +175,8 @@ class Log:
         Of the joint [K], where it was logged.
     about : float
         Temperature at which the friction is told [K].
+    torque : ndarray or None
+        As it was measured, apart from the position; None of a controller's, which is made of it.
     """
 
     position: Array
@@ -184,6 +185,7 @@ class Log:
     lead: Array
     temperature: Array | None = None
     about: float = 0.0
+    torque: Array | None = None
 
     @property
     def turned(self) -> Array:
@@ -196,14 +198,14 @@ class Log:
         r"""The balance's columns at the rows.
 
         Of :math:`\tau = J \ddot q + F_v \dot q + F_u |\dot q| \pm F_c + g_s \sin q + g_c \cos q +
-        \mathrm{sgn}(\dot q) \mu |g| - k_d \dot e + (\pm b + b_v \dot q)(T - \bar T)`,
+        \mathrm{sgn}(\dot q) \mu |g| - k_d \dot e + (\pm b + b_v \dot q)(T - \bar T) - d \dot\tau`,
         linear about a load part `load` and gravity's torque `pull`.
 
         Parameters
         ----------
         terms : tuple of str
             Of inertia, viscous, uneven, forward, back, coulomb (both alike), sine, cosine, load, damping, warming and
-            thinning (Coulomb and viscous friction per kelvin).
+            thinning (Coulomb and viscous friction per kelvin), and late (by how much the torque is).
         load : float
             The load part about which gravity's columns are linear.
         pull : (float, float)
@@ -231,6 +233,7 @@ class Log:
             "damping": lambda: self._error_rate(steered),
             "warming": lambda: window.apply(side * warmer),
             "thinning": lambda: window.apply(five_point_difference(turned, 1) * window.fs * warmer),
+            "late": lambda: -window.apply(np.zeros_like(position) if self.torque is None else self.torque, 1),
         }
         return np.column_stack([made[term]()[self.sliding.rows] for term in terms])
 
@@ -301,6 +304,17 @@ class JointData:
         bare = tuple(term for term in terms if term != "load")
         columns = np.concatenate([log.quiet().columns(bare, share, pull) for log in self.logs])
         return np.asarray(self.known + columns @ fit.coefficients[[terms.index(term) for term in bare]])
+
+    def earlier(self, late: float) -> JointData:
+        """With the torque read by so much later [s] as it comes late."""
+        logs = []
+        for log in self.logs:
+            assert log.torque is not None
+            rows = np.arange(len(log.torque)) + late * log.sliding.window.fs
+            logs.append(replace(log, torque=band_limited(log.torque, np.clip(rows, 0, len(rows) - 1))))
+        smoothed = [log.sliding.window.apply(np.asarray(log.torque))[log.sliding.rows] for log in logs]
+        raw = np.concatenate([np.asarray(log.torque) for log in logs])
+        return replace(self, logs=tuple(logs), torque=np.concatenate(smoothed), raw=raw)
 
     def unshared(self, inertia: float, viscous: float) -> tuple[Array, Array]:
         """As :meth:`Log.unshared`, of all logs."""
@@ -420,6 +434,7 @@ def _data_of(record: Record, constants: dict[str, Estimate], gravity: bool) -> J
     if "force" in record:
         raw = record["force"]
         torque = window.apply(raw)[rows]
+        log = replace(log, torque=raw)
         scale = constants.get("torque_constant") if record.channels["force"].source == "current" else None
         source = "current" if scale else "force"
     else:
@@ -537,59 +552,3 @@ def _inseparable(data: JointData, terms: tuple[str, ...]) -> EstimateError:
         "every term needs motion that shows it alone",
         "; ".join(dict.fromkeys(ADVICE[term] for term in mixed)),
     )
-
-
-@dataclass(frozen=True)
-class Telling:
-    """Coefficients and their sums as Estimates."""
-
-    data: JointData
-    fit: LeastSquares
-    terms: tuple[str, ...]
-    turning: bool
-    status: str
-
-    @cached_property
-    def unsure(self) -> tuple[Array, ...]:
-        """What the torque is unsure by beside its residuals: by what was stated, and by what nobody stated."""
-        stated = self.data.stated.get("inertia")
-        inertia = stated.value if stated else coefficient(self.fit, self.terms, "inertia")
-        return *self.data.unsure, *self.data.unshared(inertia, coefficient(self.fit, self.terms, "viscous"))
-
-    def one(self, term: str) -> Estimate:
-        """A coefficient, with a doubt where its interval hardly tells it."""
-        estimate = self.sum({term: 1.0}, WORDS[term])
-        wide = NORMAL_95 * estimate.sd > BARELY * abs(estimate.value)
-        if not wide:
-            return estimate
-        partner = self._partner(self.terms.index(term))
-        doubt = Doubt(f"hardly told from the {WORDS[partner]}: {ADVICE[term]}", CONFOUNDED, lesser=True)
-        return replace(estimate, status=Status(self.status, doubt))
-
-    def sum(self, weights: dict[str, float], name: str) -> Estimate:
-        """A sum of coefficients."""
-        row = np.array([weights.get(term, 0.0) for term in self.terms])
-        beside = math.hypot(*(float(row @ self.fit.projection @ column) for column in self.unsure), 0.0)
-        heat = (
-            {"warming": "N m/K", "thinning": "N m s/rad/K"}
-            if self.turning
-            else {"warming": "N/K", "thinning": "N s/m/K"}
-        )
-        units = {**(TURNING if self.turning else UNITS), "load": "1", **heat}
-        kind = {"forward": "coulomb", "back": "coulomb", "sine": "coulomb", "cosine": "coulomb", "damping": "viscous"}
-        unit = units[kind.get(next(iter(weights)), next(iter(weights)))]
-        how = "instruments of the reference" if self.data.followed else "least squares"
-        checks = (
-            f"condition number {self.fit.condition:.3g}",
-            f"residuals are worth {self.fit.independent:.0f} independent samples",
-        )
-        return self.fit.combined(
-            row, name, unit, f"{how}, windows within strokes", beside=beside, status=self.status, checks=checks
-        )
-
-    def _partner(self, index: int) -> str:
-        """The term whose coefficient goes with this one most."""
-        forms = self.fit.projection
-        alike = np.abs(forms @ forms[index]) / np.linalg.norm(forms, axis=1)
-        alike[index] = -1.0
-        return self.terms[int(np.argmax(alike))]

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from stickslip.answers.findings import Comparison, Findings
-from stickslip.cycle.joint import JointFriction, JointLogs
+from stickslip.cycle.joint import JointFriction, JointLogs, is_late
 from stickslip.cycle.joint_fit import SURELY
 from stickslip.cycle.tribometer import DEFINITIONS
 from stickslip.errors import ModelError
@@ -145,8 +145,11 @@ def _of_one_joint(findings: Findings) -> Iterator[str]:
     level, unit = joint.level, joint.level.unit
     doubt = "" if stands(level.status) else f", which is not to be trusted ({level.status})"
     under = f" under a mean load of {number(joint.carried, joint.carried / 100, unit)}" if joint.carried else ""
-    yield f"The joint slides against {value_of(level)} of friction{under} (95 %: {interval_of(level)}){doubt}."
-    yield from _directions(joint)
+    if level.interval[0] > 0:
+        yield f"The joint slides against {value_of(level)} of friction{under} (95 %: {interval_of(level)}){doubt}."
+        yield from _directions(joint)
+    else:
+        yield f"No dry friction{under} is felt{doubt}; more than {value_of(level, level.interval[1])} would be (95 %)."
     parts = [f"{value_of(joint.viscous)} of viscous friction"]
     if joint.load is not None and joint.load.known:
         most = f"less than {value_of(joint.load, joint.load.interval[1])}"
@@ -162,6 +165,10 @@ def _of_one_joint(findings: Findings) -> Iterator[str]:
         f"With an inertia of {value_of(joint.inertia)} that explains {torque} {source};"
         f" {100 * joint.residual:.2g} % of it is left unexplained while it slides."
     )
+    if joint.delay is not None and is_late(joint.delay):
+        delay, way = joint.delay, "later" if joint.delay.value > 0 else "earlier"
+        moved = number(abs(delay.value), delay.sd, "s")
+        yield f"It comes {moved} {way} than the position (95 %: {interval_of(delay)}), which is taken out."
     if findings.breakaway is not None:
         ratio = findings.breakaway.ratio
         yield f"It breaks away at {value_of(ratio)} times its sliding friction (95 %: {interval_of(ratio)})."
