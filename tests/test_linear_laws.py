@@ -10,7 +10,7 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
 import stickslip as ss
-from stickslip.laws.base import Exit, Law, Mode, Rigid
+from stickslip.laws.base import Exit, Law, Mode, Rigid, static_level
 from stickslip.solve import assembly, cells
 
 HEAVY = 1e15  # kg: a mass that the contact can not move, so that the counter-face imposes the motion
@@ -346,3 +346,12 @@ def test_energy_bears_cells_that_are_shorter_than_the_rounding_of_the_clock(monk
     short = (np.insert(begins, 5, begins[5] - 2e-16), np.insert(widths, 5, 1e-18))
     monkeypatch.setattr(type(run), "cells", property(lambda _: short))
     assert ss.solve.energy(run).friction == pytest.approx(known.friction, rel=1e-12)
+
+
+def test_a_static_level_too_low_is_refused_by_the_names_of_its_law() -> None:
+    with pytest.raises(ss.errors.ModelError, match=r"static = 0.5 N below kinetic = 1 N; .*raise static="):
+        ss.laws.Coulomb(1.0, static=0.5)
+    with pytest.raises(ss.errors.ModelError, match=r"static = 0.5 N below forces\[0\] = 1 N; .*raise static="):
+        ss.laws.Tabulated([0.0, 1.0], [1.0, 2.0], static=0.5)
+    with pytest.raises(ss.errors.ModelError, match=r"static_back = 0.5 N below against = 1 N; .*raise static_back="):
+        static_level(0.5, 1.0, name="static_back", kinetic_name="against")

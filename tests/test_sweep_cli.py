@@ -73,6 +73,13 @@ def test_a_file_has_laws_and_what_changes_together(file: Path) -> None:
         ("cycles = 4", "cyles = 4", "key 'cyles'.*cycles"),
         ('["200 mN", 0.7, 1.2]', "1.0", "a list"),
         ("to = 9, points = 8", 'to = -9, points = 8, scale = "log"', "logarithmic"),
+        (
+            "cycles = 4",
+            'law = { name = "Dahl" }',
+            r"line 4, has the key 'law'; .*file that system = names; .*slider.toml",
+        ),
+        ("[grid]", "[law]", r"line 6, has the key 'law'; .*file that system = names; .*slider.toml"),
+        ("[grid]", "[[contacts]]", "has the key 'contacts'; .*file that system = names"),
     ],
 )
 def test_a_mistake_in_the_file_is_named(file: Path, old: str, new: str, words: str) -> None:

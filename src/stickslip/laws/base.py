@@ -116,13 +116,13 @@ class Rigid:
         return "back", "stuck", "forward"
 
 
-def static_level(static: float | None, kinetic: float) -> float:
-    """The break-away force [N]: `static` where given, else the kinetic level."""
+def static_level(static: float | None, kinetic: float, *, name: str = "static", kinetic_name: str = "kinetic") -> float:
+    """The break-away force [N]: `static` where given, else the kinetic level; a refusal calls both by these names."""
     level = kinetic if static is None else float(static)
     if level < kinetic:
         raise ModelError(
-            f"static = {level:.6g} N below kinetic = {kinetic:.6g} N",
+            f"{name} = {level:.6g} N below {kinetic_name} = {kinetic:.6g} N",
             "static friction is at least the kinetic friction",
-            "raise static=, or leave it out to make both equal",
-        ).of("static")
+            f"raise {name}=, or leave it out to make both equal",
+        ).of(name)
     return level

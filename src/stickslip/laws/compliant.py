@@ -47,6 +47,7 @@ class CompliantContact:
         "f = kinetic sign(v) while sliding; f = stiffness (x - anchor) + damping v from each reversal until |f| = "
         "static, the anchor then kinetic/stiffness behind"
     )
+    absent: ClassVar = {"static": "kinetic"}
     loads = ("preload", "normal")  # of a contact: it may be told as a coefficient of friction
 
     kinetic: float = parameter("N", "sliding friction")
@@ -175,6 +176,7 @@ class InertialContact:
         "f = stiffness (x - y) + damping (x' - y'), mass (y'' + face_acceleration) = f - kinetic sign(y'), x and y on "
         "the counter-face"
     )
+    absent: ClassVar = {"static": "kinetic"}
     memory_units: ClassVar[Mapping[str, str]] = {"stretch": "m", "u": "m/s"}
     loads = ("preload",)  # of a contact: its levels are proportional to a steady load
 

@@ -7,6 +7,7 @@ that of a gear, whose directions differ and whose teeth carry a part of the load
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import ClassVar
 
 from stickslip.laws.base import Exit, Mode, Rigid, Row, static_level
 from stickslip.laws.curved import Expression
@@ -34,6 +35,7 @@ class Coulomb(Rigid):
 
     label = "Coulomb: rigid contact"
     formula = "f = kinetic sign(v) while sliding, |f| <= static at rest"
+    absent: ClassVar = {"static": "kinetic"}
     loads = ("preload", "normal")  # of a contact: it may be told as a coefficient of friction
 
     kinetic: float = parameter("N", "sliding friction")
@@ -92,6 +94,7 @@ class LinearSlope(Rigid):
 
     label = "Friction linear in speed"
     formula = "f = kinetic sign(v) + slope v while sliding, |f| <= static at rest"
+    absent: ClassVar = {"static": "kinetic"}
     loads = ("preload", "normal")  # of a contact: it may be told as a coefficient of friction
 
     kinetic: float = parameter("N", "sliding friction", note="at vanishing speed")

@@ -199,8 +199,9 @@ def formula_of(law: Any) -> str:
     if not _registered(law):
         return _formula_of_modes(law)
     formula: str = law.own_formula() if hasattr(law, "own_formula") else law.formula
-    if getattr(law, "static", "") is None:  # a parameter that is not there is not named
-        formula = formula.replace("static", "kinetic" if hasattr(law, "kinetic") else "F(0)")
+    for name, substitute in getattr(law, "absent", {}).items():  # in the class's order: one may stand for another
+        if getattr(law, name) is None:
+            formula = re.sub(rf"\b{name}\b", substitute, formula)
     inner = getattr(law, "law", None)
     return f"{formula}; {formula_of(inner)}" if is_dataclass(inner) else formula
 

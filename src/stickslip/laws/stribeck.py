@@ -192,6 +192,7 @@ class FrictionCurve(Rigid):
     label = "Any curve over speed"
     loads = ("preload", "normal")  # of a contact: it may be told as a coefficient of friction
     formula = "f = F(|v|) sign(v) while sliding, |f| <= static at rest"
+    absent: ClassVar = {"static": "F(0)"}
 
     curve: Curve = parameter(
         "", "friction over the speed", note="from the sliding speed [m/s] to the force [N], both Expressions"
@@ -272,6 +273,7 @@ class Tabulated(Rigid):
         "f = F(|v|) sign(v) while sliding, F a polygon through forces at speeds, level beyond the last; |f| <= "
         "static at rest"
     )
+    absent: ClassVar = {"static": "F(0)"}
     loads = ("preload", "normal")  # of a contact: it may be told as a coefficient of friction
     chosen = ("error",)  # not fitted where nothing else is said
 
@@ -299,7 +301,7 @@ class Tabulated(Rigid):
             raise ModelError(
                 "the speeds do not increase from 0", "a friction curve starts at 0 and is sorted", "sort it"
             )
-        static_level(self.static, forces[0])
+        static_level(self.static, forces[0], kinetic_name="forces[0]")
         object.__setattr__(self, "speeds", speeds)
         object.__setattr__(self, "forces", forces)
 

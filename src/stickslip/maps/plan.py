@@ -24,6 +24,7 @@ from stickslip import __version__
 from stickslip.errors import ModelError, RecordError
 from stickslip.maps.grid import MOST, Axis, coordinates, placed, unit
 from stickslip.maps.measures import Measure, Variable, own_name, variables
+from stickslip.parameters import PARTS
 from stickslip.settings import STRICT, checked, line_of, read_toml
 from stickslip.solve.tables import System
 from stickslip.systems.file import Case, read_system, scenario_case
@@ -315,6 +316,12 @@ def read_sweep(path: str | Path) -> SweepFile:
     """
     path = Path(path)
     values, lines = read_toml(path, what="a sweep is")
+    for key in (key for key in values if key in (*PARTS, "start", "run")):
+        raise ModelError(
+            f"{path.name}{line_of([key], lines)} has the key '{key}'",
+            "a system's parts stand in the file that system = names",
+            f'move it there, as system = "slider.toml"{", or vary laws as law = [...] under [grid]" * (key == "law")}',
+        )
     whole = checked(_File, values, source=path.name, lines=lines)
     beside = path.parent / whole.system
     case = read_system(beside) if whole.system.endswith(".toml") else scenario_case(whole.system)
