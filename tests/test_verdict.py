@@ -122,7 +122,9 @@ def test_a_stiff_contact_that_leaves_far_less_stands_for_itself() -> None:
     ranking, _ = standings([misfit("Coulomb", 1, 3.0), stiff("compliant", 3, 1.0)], EVIDENCE)
     assert [law.name for law in ranking if law.kept] == ["compliant"]
     assert not any(law.limit for law in ranking)
-    ranking, _ = standings([misfit("Coulomb", 1, 1.5), stiff("compliant", 3, 1.0)], EVIDENCE)
+    both = [misfit("Coulomb", 1, 1.5), stiff("compliant", 3, 1.0)]  # a rough surface may have done so, or the contact
+    assert [law.name for law in standings(both, EVIDENCE)[0] if law.kept] == ["compliant", "Coulomb"]
+    ranking, _ = standings([misfit("Coulomb", 1, 1.05), stiff("compliant", 3, 1.0)], EVIDENCE)
     assert [law.name for law in ranking if law.kept] == ["Coulomb"]
 
 

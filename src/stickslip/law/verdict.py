@@ -220,18 +220,14 @@ def _odds(order: Sequence[Misfit], best: Misfit, evidence: Evidence) -> dict[str
 def _limits(order: Sequence[Misfit], evidence: Evidence) -> set[str]:
     """Laws whose contact is next to rigid, where a rigid law leaves as little: what they say is said by that.
 
-    Where a law of another family leads them all, what it explains beyond a rigid one a contact that gives way may
-    explain as well: a state variable was told at 99.5 % in the place of a compliant contact that left no more.
+    Not where it leaves more than chance makes it: a rough surface may have done so, or the contact. Nor where a law of
+    another family leads them all: what that explains beyond a rigid law, a contact that gives way may explain as well.
     """
     worth = {law.name: evidence.criterion(law) for law in order}
     leads = min((law for law in order if not law.stiff), key=lambda law: worth[law.name], default=None)
     rigid = min((worth[law.name] for law in order if law.family == "rigid"), default=math.inf)
-    beyond = leads is not None and leads.family != "rigid"
-    return {
-        law.name
-        for law in order
-        if law.stiff and rigid - worth[law.name] <= evidence.allowance and not (beyond and worth[law.name] < rigid)
-    }
+    chance = 0.0 if leads is not None and leads.family != "rigid" else -BLUNT * math.log(UNLIKELY)
+    return {law.name for law in order if law.stiff and rigid - worth[law.name] <= min(chance, evidence.allowance)}
 
 
 def _why(law: Misfit, best: Misfit, ratios: Mapping[str, float], worse: float) -> str:
