@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -14,6 +15,7 @@ from hypothesis import strategies as st
 
 import stickslip as ss
 from stickslip.files.expression import linear, split_spec
+from stickslip.files.read import FORMATS
 from stickslip.record.clock import fit_clock
 from stickslip.units import POUND_FORCE
 
@@ -21,6 +23,31 @@ AUDIO = (
     "canary_01", "chalk_screech_01", "chalk_write_01", "chalk_write_02", "chalk_write_03", "church_bells_01",
     "door_creak", "rain_light", "scrape_01", "scrape_02", "scrape_03", "scrape_04", "whistle",
 )  # fmt: skip
+
+CALLED = {
+    "tdms": "TDMS",
+    "matlab": "MAT",
+    "hdf5": "HDF5",
+    "parquet": "Parquet",
+    "uff": "UFF|universal file format",
+    "audio": "WAV",
+    "lvm": "LVM",
+    "mcap": "MCAP",
+    "rosbag": "[Bb]ags",
+    "mdf": "MDF",
+    "json_table": "JSON",
+    "text": "CSV",
+}
+
+
+def test_every_format_is_named_where_users_read_of_it() -> None:
+    """But the journal, which is the bench's own."""
+    root, listed = Path(__file__).parents[1], set(FORMATS) - {"journal"}
+    assert listed == set(CALLED), "give CALLED of this test what users call the format"
+    texts = {place: (root / place).read_text("utf-8") for place in ("README.md", "src/stickslip/lab/page/data.js")}
+    texts["read_record's docstring"] = ss.read_record.__doc__ or ""
+    missing = [f"{word} in {place}" for word in CALLED.values() for place in texts if not re.search(word, texts[place])]
+    assert not missing, f"name the format there: {', '.join(missing)}"
 
 
 @pytest.fixture
