@@ -355,3 +355,24 @@ def test_what_has_no_meaning_is_refused(changes: dict[str, Any], rule: str) -> N
         ss.simulate(PlanarOscillator(**plain), duration=1.0, start={"x": 1.0})
     with pytest.raises(ModelError, match="finite"):
         ss.simulate(PlanarOscillator(**plain), duration=1.0, start={"x1": math.nan})
+
+
+PLANE = PlanarOscillator(1.0, 4.0, Coulomb(1.0, static=1.2), drives=(HarmonicBase(1.0, frequency=0.5), Release()))
+
+
+@pytest.mark.parametrize(
+    "ask",
+    [
+        lambda: ss.steady_state(PLANE),
+        lambda: ss.sweep(PLANE, {"kinetic": [0.5, 1.0]}),
+        lambda: ss.basins(PLANE, grid={"x1": [0.0, 1.0], "v1": [0.0, 1.0]}),
+        lambda: ss.solve.lyapunov(PLANE),
+        lambda: ss.solve.steady_sliding(PLANE),
+        lambda: ss.dither(PLANE),
+        lambda: ss.fit_law(ss.datasets.demo(), PLANE),
+        lambda: ss.compare_laws(ss.datasets.demo(), PLANE),
+    ],
+)
+def test_what_is_asked_of_masses_on_a_line_is_refused_in_a_plane(ask):
+    with pytest.raises(ss.errors.ModelError, match=r"a PlanarOscillator; .*along a line.*give an Oscillator"):
+        ask()

@@ -20,7 +20,7 @@ from stickslip.law.start import CALIBRATION
 from stickslip.law.verdict import LawComparison
 from stickslip.law.which_law import compare_laws, fit_law, widened
 from stickslip.laws.coulomb import Coulomb
-from stickslip.oscillator import Oscillator
+from stickslip.oscillator import Oscillator, require_oscillator
 from stickslip.record.record import RIG_UNITS, Record
 from stickslip.rig.settings import RigSettings
 from stickslip.settings import read_toml
@@ -312,17 +312,8 @@ def read_fitted(path: str | Path, *, rig: RigSettings | None = None) -> Oscillat
             stated = {name: float(value) for name in RIG_UNITS if (value := getattr(rig, name)) is not None}
             drive = {"name": "HarmonicBase", "amplitude": 0.0, "frequency": 1.0, "contact": rig.contact}
             whole = {"system": {**stated, "damper": rig.damper}, "drive": drive, **values}
-            return require_oscillator(read_system(whole).system)
-    return require_oscillator(read_system(path).system)
-
-
-def require_oscillator(system: object) -> Oscillator:
-    """The system, if it is one mass on one contact."""
-    if not isinstance(system, Oscillator):
-        raise ModelError(
-            "a system of several masses", "a record is predicted for an oscillator of one", "give such a one"
-        )
-    return system
+            return require_oscillator(read_system(whole).system, "a record is predicted")
+    return require_oscillator(read_system(path).system, "a record is predicted")
 
 
 def predict(
@@ -389,7 +380,7 @@ def predict(
     records = [records] if isinstance(records, Record) else list(records)
     if not records:
         raise EstimateError("no record", "a prediction is held against one record at least", "give one")
-    require_oscillator(oscillator)
+    require_oscillator(oscillator, "a record is predicted")
     if rig is not None:
         oscillator = with_stated(oscillator, rig)
         records = [with_sensors(record, rig) for record in records]

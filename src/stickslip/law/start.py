@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from stickslip.errors import UNNAMED, EstimateError, ModelError, RecordError
 from stickslip.law.search import ABOVE, OF_MOUNTS, OF_SENSORS, Knob, Point, Problem, Profile, descend
 from stickslip.law.stretch import DriveFrom, Sensor, Stretch, as_driven, driving, measured_drive
-from stickslip.oscillator import Oscillator
+from stickslip.oscillator import Oscillator, require_oscillator
 from stickslip.parameters import find
 from stickslip.record.record import Record
 from stickslip.settings import nearest
@@ -60,6 +60,7 @@ class Shown:
     @classmethod
     def of(cls, record: Record, channels: Sequence[str], oscillator: Oscillator) -> Shown:
         """Displacement and velocity by x or v; the level of the load, the friction, or the balance of forces."""
+        require_oscillator(oscillator, "a law is fitted")
         name = next((name for name in ("x", "v") if name in record), None)
         if name is None:
             raise RecordError(

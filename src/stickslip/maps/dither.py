@@ -15,7 +15,7 @@ from stickslip.drives.on_another import Dithered
 from stickslip.errors import ModelError, SolveError
 from stickslip.estimate import Doubt, Estimate, Result, Status
 from stickslip.maps.basins import Start
-from stickslip.oscillator import Oscillator
+from stickslip.oscillator import Oscillator, require_oscillator
 from stickslip.solve.poincare import tables
 from stickslip.solve.simulate import simulate
 from stickslip.solve.tables import Array
@@ -313,10 +313,7 @@ class _Search:
 
 
 def _require(system: Oscillator, on: str, cycles: int, precision: float) -> None:
-    if not isinstance(system, Oscillator):
-        raise ModelError(
-            f"a {type(system).__name__}", "dither is sought for one mass with one contact", "give an Oscillator"
-        )
+    require_oscillator(system, "dither is sought")
     if isinstance(system.drive, Dithered):
         raise ModelError("the drive is dithered already", "the dither is what is sought", "give the drive without it")
     if on not in UNITS:

@@ -26,7 +26,7 @@ from stickslip.oscillator import Oscillator, Structure
 from stickslip.solve.poincare import BATCHES, tables
 from stickslip.solve.refusal import Endless
 from stickslip.solve.simulate import opening, simulate
-from stickslip.solve.tables import System
+from stickslip.solve.tables import System, laws_of
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -231,6 +231,7 @@ def planned(
     plan = Plan(system, axes, asked_for, int(cycles), int(settle), dict(start or {}), chunks)
     named = {measure for measure in plan.measures if isinstance(measure, str)}
     system, begun = first_of(plan)
+    laws_of(system)  # a mass in a plane has none of the measures
     if begun and not (isinstance(system, Oscillator) and isinstance(system.law, TimeDelay)):
         opening(tables(system), begun)
     if "lyapunov" in named and cycles < BATCHES:

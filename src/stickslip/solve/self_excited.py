@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from stickslip.drives.kinds import Belt
 from stickslip.errors import ModelError, SolveError
 from stickslip.laws.curved import CurvedLaw
-from stickslip.oscillator import Oscillator
+from stickslip.oscillator import Oscillator, require_oscillator
 from stickslip.solve.curved import CurvedTrajectory
 from stickslip.solve.march import Dense
 from stickslip.solve.poincare import SteadyState, Table, closes, derivative, stretch
@@ -79,6 +79,7 @@ def steady_sliding(system: Oscillator) -> SteadySliding:
     >>> steady_sliding(slider).status, steady_sliding(slider.having(drive=Belt(0.3))).status
     ('unstable', 'stable')
     """
+    require_oscillator(system, "steady sliding is asked")
     law, drive = system.law, system.drive
     if not (isinstance(law, CurvedLaw) and isinstance(drive, Belt) and system.stiffness > 0):
         raise ModelError(

@@ -302,7 +302,19 @@ def curves_of(system: System) -> list[str]:
 
 
 def laws_of(system: System) -> list[Any]:
-    """The law of each contact."""
+    """The law of each contact.
+
+    Raises
+    ------
+    ModelError
+        No oscillator and no structure: a mass in a plane, whose two motions one contact couples.
+    """
+    if not isinstance(system, Oscillator | Structure):
+        raise ModelError(
+            f"a {type(system).__name__}",
+            "this is asked of masses that move along a line; one in a plane is simulated alone",
+            "give an Oscillator or a Structure",
+        )
     return [contact.law for contact in system.contacts] if isinstance(system, Structure) else [system.law]
 
 
