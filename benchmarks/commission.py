@@ -36,17 +36,31 @@ def random_rig(seed: int, fs: float = 4000.0) -> SimulatedBench:
     rig, lag = ss.Rig(), spread(1.2e-3, 2)
     for channel in ("x", "z"):
         rig = rig.having(
-            channel, gain=chance.normal(1, 0.02), lag=spread(lag, 1.1), white=spread(1e-6, 1.5),
-            offset=chance.normal(0, 5e-5), limit=15e-3,
-        )  # fmt: skip
+            channel,
+            gain=chance.normal(1, 0.02),
+            lag=spread(lag, 1.1),
+            white=spread(1e-6, 1.5),
+            offset=chance.normal(0, 5e-5),
+            limit=15e-3,
+        )
     rig = rig.having(
-        "a", gain=chance.normal(1, 0.02), white=spread(0.03, 1.5), offset=chance.normal(0, 0.05),
-        frequency=spread(140, 1.2), damping=spread(0.08, 1.4),
-    )  # fmt: skip
+        "a",
+        gain=chance.normal(1, 0.02),
+        white=spread(0.03, 1.5),
+        offset=chance.normal(0, 0.05),
+        frequency=spread(140, 1.2),
+        damping=spread(0.08, 1.4),
+    )
     rig = rig.having(
-        "load", gain=chance.normal(1, 0.02), white=spread(2e-3, 1.5), offset=chance.normal(0, 0.02),
-        discharge=spread(50, 2), frequency=spread(270, 1.15), damping=spread(0.05, 1.4), mass=spread(0.05, 1.5),
-    )  # fmt: skip
+        "load",
+        gain=chance.normal(1, 0.02),
+        white=spread(2e-3, 1.5),
+        offset=chance.normal(0, 0.02),
+        discharge=spread(50, 2),
+        frequency=spread(270, 1.15),
+        damping=spread(0.05, 1.4),
+        mass=spread(0.05, 1.5),
+    )
     return SimulatedBench(system, rig, fs, seed)
 
 

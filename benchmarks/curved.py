@@ -20,8 +20,12 @@ from scipy.integrate import DOP853, LSODA, solve_ivp
 import stickslip as ss
 
 M, K, CYCLES, GOAL = 2.42, 2310.0, 100, 1e-8
-SLIDER = ss.Oscillator(mass=M, stiffness=K, law=ss.laws.SmoothStateVariable(1.1, rate=100.0, steepness=3000.0),
-                       drive=ss.drives.HarmonicBase(0.6e-3, 2.5))  # fmt: skip
+SLIDER = ss.Oscillator(
+    mass=M,
+    stiffness=K,
+    law=ss.laws.SmoothStateVariable(1.1, rate=100.0, steepness=3000.0),
+    drive=ss.drives.HarmonicBase(0.6e-3, 2.5),
+)
 CASES = {
     "state variable, 2.5 Hz": SLIDER,
     "LuGre, 2.5 Hz": SLIDER.having(law=ss.laws.LuGre(1.1, 1.3, speed=1e-3, stiffness=192000, damping=24, viscous=0.4)),
@@ -86,8 +90,16 @@ def general(method: type) -> Solver:
         t, state, side = 0.0, np.zeros(size), 1.0
         while t < end:
             turn.direction = -side
-            run = solve_ivp(slope, (t, end), state, method=method, rtol=tolerance, atol=tolerance * 1e-6, args=(side,),
-                            events=turn if kink else None)  # fmt: skip
+            run = solve_ivp(
+                slope,
+                (t, end),
+                state,
+                method=method,
+                rtol=tolerance,
+                atol=tolerance * 1e-6,
+                args=(side,),
+                events=turn if kink else None,
+            )
             t, state = run.t[-1], run.y[:, -1]
             if t < end:
                 state[1], side, since[0] = 0.0, -side, t + 1e-9
@@ -123,8 +135,9 @@ def heyoka(system: ss.Oscillator, tolerance: float) -> tuple[float, np.ndarray]:
 
         smooth = isinstance(law, ss.laws.SmoothStateVariable)
         extra = {} if smooth else {"t_events": [hy.t_event(v, callback=turned)], "pars": [1.0]}
-        COMPILED[key] = hy.taylor_adaptive([(x, v), (v, (pull - force) / M), *equations],
-                                           [0.0] * (2 + len(equations)), tol=tolerance, **extra)  # fmt: skip
+        COMPILED[key] = hy.taylor_adaptive(
+            [(x, v), (v, (pull - force) / M), *equations], [0.0] * (2 + len(equations)), tol=tolerance, **extra
+        )
     stepper = COMPILED[key]
     stepper.time = 0.0
     stepper.state[:] = 0.0

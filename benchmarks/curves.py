@@ -63,8 +63,10 @@ def main(draws: int) -> None:
             errors = np.array([each.value for each in found]) / value - 1
             half = np.median([each.interval[1] - each.interval[0] for each in found]) / 2 / value
             held = np.mean([each.includes(value) for each in found])
-            print(f"  {name:10} {100 * held:5.1f} % held  mean {errors.mean():+.1e}  rms "
-                  f"{np.sqrt(np.mean(errors**2)):.1e}  half interval {half:.1e}")  # fmt: skip
+            print(
+                f"  {name:10} {100 * held:5.1f} % held  mean {errors.mean():+.1e}  rms "
+                f"{np.sqrt(np.mean(errors**2)):.1e}  half interval {half:.1e}"
+            )
 
 
 if __name__ == "__main__":

@@ -117,5 +117,7 @@ if __name__ == "__main__":
     print(f"  {np.nanmedian(ratios):.3f} of it (median), {np.nanmax(ratios):.3f} (largest)")
     for kind in sorted({line.kind for line in lines}):
         own = [line for line in lines if line.kind == kind]
-        print(f"  {kind}: {len(own)}, removed {sum(line.removed for line in own)}, "
-              f"within 10 % {sum(line.ratio <= 1.1 for line in own)}")  # fmt: skip
+        print(
+            f"  {kind}: {len(own)}, removed {sum(line.removed for line in own)}, "
+            f"within 10 % {sum(line.ratio <= 1.1 for line in own)}"
+        )

@@ -34,9 +34,12 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 FLAGS = ("-O3", "-march=native", "-fno-math-errno", "-ffp-contract=fast", "-shared", "-fPIC")
 MASS, SPRING = 2.42, 2310.0
 RIGID = ss.Oscillator(
-    mass=MASS, stiffness=SPRING, damping=2 * 0.0008 * math.sqrt(MASS * SPRING), law=ss.laws.Coulomb(1.1),
+    mass=MASS,
+    stiffness=SPRING,
+    damping=2 * 0.0008 * math.sqrt(MASS * SPRING),
+    law=ss.laws.Coulomb(1.1),
     drive=ss.drives.HarmonicBase(0.65e-3, 2.5),
-)  # fmt: skip
+)
 CONTACT = ss.laws.CompliantContact(1.1, 192000, 2 * 0.0174 * math.sqrt(MASS * (SPRING + 192000)))
 CASES = {
     "W1a rigid 5.61 Hz": RIGID.having(frequency=5.61, amplitude=0.6e-3),
@@ -105,8 +108,16 @@ def dop853(system: ss.Oscillator, cycles: int, tolerance: float = 1e-10) -> Run:
 
             exits = [terminal(lambda t, s, j=j, f=friction: j * f(s) - level, 1) for j in (1, -1)]
         field = (lambda t, s: [0.0, 0.0]) if friction is None else (lambda t, s, f=friction: slope(t, s, f))
-        ahead = solve_ivp(field, (t, end), [x, v], method="DOP853", rtol=tolerance, atol=tolerance * 1e-4, events=exits,
-                          max_step=longest)  # fmt: skip
+        ahead = solve_ivp(
+            field,
+            (t, end),
+            [x, v],
+            method="DOP853",
+            rtol=tolerance,
+            atol=tolerance * 1e-4,
+            events=exits,
+            max_step=longest,
+        )
         t, (x, v) = float(ahead.t[-1]), ahead.y[:, -1]
         if ahead.status != 1:
             break
@@ -133,11 +144,13 @@ def taylor_integrators(system: ss.Oscillator, tolerance: float) -> dict[int, Any
     pull = k * (system.drive.amplitude * hy.cos(w * hy.time) - x)
     built = {
         side: hy.taylor_adaptive(
-            [(x, v), (v, (pull - c * v - side * level) / m)], [0.0, 0.0], tol=tolerance,
+            [(x, v), (v, (pull - c * v - side * level) / m)],
+            [0.0, 0.0],
+            tol=tolerance,
             t_events=[hy.t_event(v, direction=down if side > 0 else up)],
         )
         for side in (1, -1)
-    }  # fmt: skip
+    }
     compliant = isinstance(system.law, ss.laws.CompliantContact)
     force = system.law.stiffness * (x - hy.par[0]) + system.law.damping * v if compliant else pull
     field = [(x, v), (v, (pull - c * v - force) / m)] if compliant else [(x, 0.0 * v), (v, 0.0 * v)]
@@ -212,9 +225,19 @@ def soda_march() -> Callable[..., int]:
         while True:
             step = longest if p[8] == 0.0 and p[6] == 0.0 else longest * (p[10] == 1.0)
             solution = solve_ivp(
-                field, np.array([t, end]), state, np.empty(0), "DOP853", 2, events, p.ctypes.data, 0.0, step,
-                tolerance, tolerance * 1e-4,
-            )  # fmt: skip
+                field,
+                np.array([t, end]),
+                state,
+                np.empty(0),
+                "DOP853",
+                2,
+                events,
+                p.ctypes.data,
+                0.0,
+                step,
+                tolerance,
+                tolerance * 1e-4,
+            )
             if not solution.event_found:
                 return count
             t = solution.t_event
@@ -269,9 +292,19 @@ def floor(system: ss.Oscillator, cycles: int) -> Run:
     times, modes = np.zeros(room), np.zeros(room, np.int32)
     begin = time.process_time()
     count = library().run(
-        system.mass, system.stiffness, system.damping, drive.amplitude, 2 * math.pi * drive.frequency, law.kinetic,
-        contact, loss, cycles, room, times.ctypes.data, modes.ctypes.data,
-    )  # fmt: skip
+        system.mass,
+        system.stiffness,
+        system.damping,
+        drive.amplitude,
+        2 * math.pi * drive.frequency,
+        law.kinetic,
+        contact,
+        loss,
+        cycles,
+        room,
+        times.ctypes.data,
+        modes.ctypes.data,
+    )
     seconds = time.process_time() - begin
     if not 0 <= count <= room:
         raise RuntimeError(f"the floor found {count} events")

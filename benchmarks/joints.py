@@ -135,8 +135,10 @@ def main() -> None:
                     [sure for there, sure in changes[name] if there],
                     [s for there, s in changes[name] if not there],
                 )
-                print(f"  {name} claimed of {sum(claimed[0])} of {len(claimed[0])}, where there is none of "
-                      f"{sum(claimed[1])} of {len(claimed[1])}")  # fmt: skip
+                print(
+                    f"  {name} claimed of {sum(claimed[0])} of {len(claimed[0])}, where there is none of "
+                    f"{sum(claimed[1])} of {len(claimed[1])}"
+                )
         for there in (True, False) if claims else ():
             rightly = [claimed for play, claimed in claims if play == there]
             print(f"  play claimed of {sum(rightly)} of {len(rightly)} joints with{'' if there else 'out'} any")

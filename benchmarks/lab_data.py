@@ -90,8 +90,10 @@ def main() -> None:
             stop.set()
             watcher.join()
         late = np.array(silences) * 1e3
-        print(f"the lab answered meanwhile: median {np.median(late):.1f} ms, 95 % {np.percentile(late, 95):.1f} ms, "
-              f"longest {late.max():.0f} ms ({len(late)} times)")  # fmt: skip
+        print(
+            f"the lab answered meanwhile: median {np.median(late):.1f} ms, 95 % {np.percentile(late, 95):.1f} ms, "
+            f"longest {late.max():.0f} ms ({len(late)} times)"
+        )
         print(f"memory of the server: {before:.0f} MB before, {resident(lab):.0f} MB at most")
 
 

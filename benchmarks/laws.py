@@ -173,8 +173,9 @@ def _held(fit: ss.law.LawFit, law: Any) -> dict[str, list[float]]:
     own = {name.removeprefix("law."): one for name, one in fit.parameters.items() if name not in RIG}
     return {
         name: [value, own[name].value, *own[name].interval]
-        for name, value in vars(law).items() if isinstance(value, float) and name in own
-    }  # fmt: skip
+        for name, value in vars(law).items()
+        if isinstance(value, float) and name in own
+    }
 
 
 def family(name: str) -> str:

@@ -97,9 +97,12 @@ def main() -> None:
             false += int((~used).sum())
             unlike += len(times) != within - shorter
         told = given.rigs - untold
-        print(f"noise {100 * noise:3.1f} %: {given.rigs} rigs, {untold} not told; found {sum(long)} of {len(long)} "
-              f"that last long enough, {sum(short)} of {len(short)} shorter ones; {false} where none is; "
-              f"counts right in {told - unlike} of {told}", flush=True)  # fmt: skip
+        print(
+            f"noise {100 * noise:3.1f} %: {given.rigs} rigs, {untold} not told; found {sum(long)} of {len(long)} "
+            f"that last long enough, {sum(short)} of {len(short)} shorter ones; {false} where none is; "
+            f"counts right in {told - unlike} of {told}",
+            flush=True,
+        )
 
 
 if __name__ == "__main__":

@@ -30,9 +30,12 @@ def record_of(kind: str, ratio: float, seed: int) -> ss.Record:
         swept * np.clip(np.minimum(time, SECONDS - time), 0, 1) if kind == "sweep" else chance.normal(size=len(time))
     )
     slider = ss.Oscillator(
-        mass=MASS, stiffness=STIFFNESS, damping=2 * ratio * math.sqrt(MASS * STIFFNESS), law=ss.laws.Coulomb(0.0),
+        mass=MASS,
+        stiffness=STIFFNESS,
+        damping=2 * ratio * math.sqrt(MASS * STIFFNESS),
+        law=ss.laws.Coulomb(0.0),
         drive=ss.drives.Recorded(0.5 * force, FS, on="force"),
-    )  # fmt: skip
+    )
     record = ss.Rig.perfect("x", "force").measure(ss.simulate(slider, duration=SECONDS), fs=FS)
     for name in ("x", "force"):
         sd = SD * float(np.std(record[name]))
@@ -45,9 +48,15 @@ def beside(record: ss.Record) -> float:
     """The damping ratio by both other programs."""
     size = 2 * len(record) // 16
     spectra = pyFRF.FRF(
-        FS, exc=record["force"], resp=record["x"], resp_type="d", window="hann", nperseg=size, noverlap=size // 2,
+        FS,
+        exc=record["force"],
+        resp=record["x"],
+        resp_type="d",
+        window="hann",
+        nperseg=size,
+        noverlap=size // 2,
         fft_len=size,
-    )  # fmt: skip
+    )
     response = np.atleast_2d(np.squeeze(spectra.get_H1()))
     model = EMA.Model(response, np.squeeze(spectra.get_f_axis()), lower=2, upper=12, pol_order_high=20)
     model.get_poles(show_progress=False)

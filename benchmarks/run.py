@@ -133,13 +133,26 @@ def bench_analyze(file: Path, rounds: int) -> None:
     truth = ss.datasets.demo().truth
     table(
         f"analyze, {found['samples']:,.0f} samples of four channels (allowed: 10 s, 1 GB)",
-        ["read Parquet", "analyze", "publish", "processor in all", "over a like job of pandas, scipy, matplotlib",
-         "peak memory", "friction level (true)", "stuck share (true)"],
-        [[*(f"{found[key]:.2f} s" for key in ("read", "analyze", "publish", "processor")), f"{ratio:.2f}",
-          f"{found['peak']:.0f} MB",
-          f"{found['level']:.4f} ({truth['sliding friction']}) N",
-          f"{found['share']:.3f} ({truth['stuck share of the time']:.3f})"]],
-    )  # fmt: skip
+        [
+            "read Parquet",
+            "analyze",
+            "publish",
+            "processor in all",
+            "over a like job of pandas, scipy, matplotlib",
+            "peak memory",
+            "friction level (true)",
+            "stuck share (true)",
+        ],
+        [
+            [
+                *(f"{found[key]:.2f} s" for key in ("read", "analyze", "publish", "processor")),
+                f"{ratio:.2f}",
+                f"{found['peak']:.0f} MB",
+                f"{found['level']:.4f} ({truth['sliding friction']}) N",
+                f"{found['share']:.3f} ({truth['stuck share of the time']:.3f})",
+            ]
+        ],
+    )
 
 
 def bench_reading(files: Mapping[str, Path], rounds: int) -> None:

@@ -58,10 +58,13 @@ def true_slips(run: ss.solve.Trajectory, begin: float, end: float) -> np.ndarray
     """Times at which the contact slips within a stick: it holds again before a tenth of a cycle is over."""
     slips = [event.time for event in run.events if event.kind == "slip"]
     sticks = [event.time for event in run.events if event.kind == "microstick"]
-    return np.array([
-        slip for slip in slips
-        if begin < slip < end and min((stick for stick in sticks if stick > slip), default=math.inf) - slip < 0.04
-    ])  # fmt: skip
+    return np.array(
+        [
+            slip
+            for slip in slips
+            if begin < slip < end and min((stick for stick in sticks if stick > slip), default=math.inf) - slip < 0.04
+        ]
+    )
 
 
 def slips_told(ringing: Ringing, true: np.ndarray) -> tuple[list[float], int, int]:

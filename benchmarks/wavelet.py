@@ -99,10 +99,10 @@ def error(found: np.ndarray, values: np.ndarray, scales: np.ndarray) -> float:
         true = true_row(values, float(scales[row]))[EDGE:-EDGE]
         got = np.asarray(found[row][EDGE:-EDGE], dtype=complex)
         best = min(
-            np.abs(turned - np.vdot(true, turned) / np.vdot(true, true) * true).max() / np.abs(
-                np.vdot(true, turned) / np.vdot(true, true) * true).max()
+            np.abs(turned - np.vdot(true, turned) / np.vdot(true, true) * true).max()
+            / np.abs(np.vdot(true, turned) / np.vdot(true, true) * true).max()
             for turned in (got, got.conj())
-        )  # fmt: skip
+        )
         worst = max(worst, float(best))
     return worst
 

@@ -91,8 +91,11 @@ def simulate_batch(
     if len(laws) > 1 or len(drives) > 1:
         raise ModelError("the systems have different modes", "a batch has one kind of law and drive", "split it")
     if None in laws or None in drives:
-        raise ModelError("a law is curved, or a drive has knots or several tones",
-                         "a batch runs through linear modes without stops", "run them one by one")  # fmt: skip
+        raise ModelError(
+            "a law is curved, or a drive has knots or several tones",
+            "a batch runs through linear modes without stops",
+            "run them one by one",
+        )
     tables = tables_of(systems_of(systems))
     size, count = len(tables.names), len(starts)
     which = np.zeros(count, np.int64) if len(systems) == 1 else np.arange(count)
@@ -110,10 +113,16 @@ def simulate_batch(
         raise ModelError(f"cycles = {cycles}", "a system without period has no cycles", "give it a drive or a spring")
     given = Given(which, modes, states, ends, Model(tables.linear, phasors_of(tables), tables.period))
     out = Batch(
-        np.zeros(count, np.int64), np.zeros(count, np.int64), np.empty((count, room), np.int32),
-        np.empty((count, room)), np.empty((count, room), np.int16), np.empty((count, room)),
-        np.empty((count, room, size)), np.empty((count, room), np.int16), np.empty((count, size)),
-    )  # fmt: skip
+        np.zeros(count, np.int64),
+        np.zeros(count, np.int64),
+        np.empty((count, room), np.int32),
+        np.empty((count, room)),
+        np.empty((count, room), np.int16),
+        np.empty((count, room)),
+        np.empty((count, room, size)),
+        np.empty((count, room), np.int16),
+        np.empty((count, size)),
+    )
     works = np.zeros((count, *scratch(size).shape))
     if gpu:
         from batches_gpu import march_all  # where numba-cuda is

@@ -100,13 +100,27 @@ def write_sound(path: Path) -> None:
 def write_uff(path: Path) -> None:
     sets = [
         pyuff.prepare_58(
-            binary=0, func_type=1, rsp_node=node + 1, rsp_dir=3, ref_dir=0, ref_node=0, data=X[:, node],
-            x=np.arange(400) / 512, id1="NONE", rsp_ent_name="NONE", ref_ent_name="NONE", abscissa_spacing=1,
-            abscissa_spec_data_type=17, abscissa_axis_units_lab="s", ordinate_spec_data_type=12,
-            ordinate_axis_units_lab="g", orddenom_spec_data_type=0, z_axis_spec_data_type=0,
+            binary=0,
+            func_type=1,
+            rsp_node=node + 1,
+            rsp_dir=3,
+            ref_dir=0,
+            ref_node=0,
+            data=X[:, node],
+            x=np.arange(400) / 512,
+            id1="NONE",
+            rsp_ent_name="NONE",
+            ref_ent_name="NONE",
+            abscissa_spacing=1,
+            abscissa_spec_data_type=17,
+            abscissa_axis_units_lab="s",
+            ordinate_spec_data_type=12,
+            ordinate_axis_units_lab="g",
+            orddenom_spec_data_type=0,
+            z_axis_spec_data_type=0,
         )
         for node in (0, 1)
-    ]  # fmt: skip
+    ]
     pyuff.UFF(str(path)).write_sets(sets, mode="add")
 
 

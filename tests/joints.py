@@ -161,9 +161,14 @@ def _reference(kind: str, time: np.ndarray, chance: np.random.Generator) -> np.n
 
 
 def drawn(
-    seed: int, *, torque: bool, seconds: float = 30.0, loaded: bool = True, play: bool = False,
+    seed: int,
+    *,
+    torque: bool,
+    seconds: float = 30.0,
+    loaded: bool = True,
+    play: bool = False,
     warming: bool = False,
-) -> Joint:  # fmt: skip
+) -> Joint:
     """A joint by chance, about one of the seven servos; with the motor's torque logged, or positions alone.
 
     With `warming` it warms up, as one does that is switched on: Coulomb friction falls by up to 1.5 % per kelvin,

@@ -54,11 +54,14 @@ def _rows() -> list[tuple[int, dict[str, object]]]:
             10**18 + round(now * 1e9),
             {
                 "header": {"stamp": {"sec": 10**9 + int(now), "nanosec": round(now % 1 * 1e9)}, "frame_id": ""},
-                "name": ["shoulder", "elbow"], "position": [0.0, angle], "velocity": [], "effort": [0.1, torque],
+                "name": ["shoulder", "elbow"],
+                "position": [0.0, angle],
+                "velocity": [],
+                "effort": [0.1, torque],
             },
         )
         for now, angle, torque in zip(t.tolist(), q.tolist(), effort.tolist(), strict=True)
-    ]  # fmt: skip
+    ]
 
 
 def _commands() -> list[tuple[int, list[float]]]:

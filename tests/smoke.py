@@ -81,8 +81,18 @@ def jobs(wheel: Path, env: Path, python: str) -> str:
     out = env.with_suffix(".out")
     out.mkdir()
     run(*uv, "venv", "--quiet", "--python", python, env, folder=out)
-    run(*uv, "pip", "install", "--quiet", "--python", binaries(env) / "python", "--resolution", env.name,
-        f"{wheel}[io,lab,maps,sound]", folder=out)  # fmt: skip
+    run(
+        *uv,
+        "pip",
+        "install",
+        "--quiet",
+        "--python",
+        binaries(env) / "python",
+        "--resolution",
+        env.name,
+        f"{wheel}[io,lab,maps,sound]",
+        folder=out,
+    )
     return f"{env.name} releases:\n" + run(binaries(env) / "python", JOBS, out, folder=out)
 
 

@@ -95,13 +95,27 @@ def write_uff(path: Path, record: ss.Record) -> None:
 
     sets = [
         pyuff.prepare_58(
-            binary=0, func_type=1, rsp_node=1, rsp_dir=1, ref_dir=0, ref_node=0, data=values, x=record.time,
-            id1=name, rsp_ent_name=name, ref_ent_name="NONE", abscissa_spacing=1, abscissa_spec_data_type=17,
-            abscissa_axis_units_lab="s", ordinate_spec_data_type=8, ordinate_axis_units_lab="m",
-            orddenom_spec_data_type=0, z_axis_spec_data_type=0,
+            binary=0,
+            func_type=1,
+            rsp_node=1,
+            rsp_dir=1,
+            ref_dir=0,
+            ref_node=0,
+            data=values,
+            x=record.time,
+            id1=name,
+            rsp_ent_name=name,
+            ref_ent_name="NONE",
+            abscissa_spacing=1,
+            abscissa_spec_data_type=17,
+            abscissa_axis_units_lab="s",
+            ordinate_spec_data_type=8,
+            ordinate_axis_units_lab="m",
+            orddenom_spec_data_type=0,
+            z_axis_spec_data_type=0,
         )
         for name, values in record.samples.items()
-    ]  # fmt: skip
+    ]
     pyuff.UFF(str(path)).write_sets(sets, mode="add")
 
 
@@ -187,8 +201,9 @@ def decay(folder: Path) -> None:
     """Half-cycles that lose a fixed amount each: dry friction alone."""
     released = ss.Oscillator(mass=1.0, stiffness=400.0, law=ss.laws.Coulomb(0.2))
     run = ss.simulate(released, start={"x": 0.01}, duration=5.0)
-    ss.write_record(ss.Record.of({"x": run.record(fs=500.0).samples["x"]}, fs=500.0, units={"x": "m"}),
-                    folder / "release.csv")  # fmt: skip
+    ss.write_record(
+        ss.Record.of({"x": run.record(fs=500.0).samples["x"]}, fs=500.0, units={"x": "m"}), folder / "release.csv"
+    )
     stickslip("decay", folder / "release.csv", "--method", "thesis", "--mass", 1.0, "--output", folder / "decay")
 
 

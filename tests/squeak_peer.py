@@ -150,8 +150,14 @@ def dop853(rig: Rig, duration: float, *, rtol: float, longest: float) -> tuple[l
         # an exit at the very start of a step is the way in: begin a little past it
         begin = min(1e-9, duration - now)
         first = solve_ivp(rate, (now, now + begin), state[:size], **options).y[:, -1]
-        solution = solve_ivp(rate, (now + begin, duration), first, events=[watched(row) for row in mode.rows],
-                          max_step=longest, **options)  # fmt: skip
+        solution = solve_ivp(
+            rate,
+            (now + begin, duration),
+            first,
+            events=[watched(row) for row in mode.rows],
+            max_step=longest,
+            **options,
+        )
         now = float(solution.t[-1])
         angle = omega * now
         state = np.array([*solution.y[:, -1], 1.0, math.cos(angle), math.sin(angle)])

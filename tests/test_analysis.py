@@ -151,9 +151,14 @@ def test_stated_delays_are_taken_out_of_the_record_that_is_shown() -> None:
     assert findings.loops.energy_per_cycle.value == pytest.approx(4 * 1.5 * 0.01, rel=0.01)
 
 
-@pytest.mark.parametrize(("reading", "load", "words"), [
-    (-4.0, 4.0, "its magnitude is taken"), (np.nan, None, "no numbers"), (0.0, None, "zeros"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("reading", "load", "words"),
+    [
+        (-4.0, 4.0, "its magnitude is taken"),
+        (np.nan, None, "no numbers"),
+        (0.0, None, "zeros"),
+    ],
+)
 def test_a_normal_load_is_taken_by_its_magnitude_or_missed_aloud(reading: float, load: float, words: str) -> None:
     findings = analyze(sliding(normal=reading))
     assert findings.normal == load
@@ -166,8 +171,9 @@ def test_records_left_out_of_the_coefficient_are_named() -> None:
     variants = [replace(analyze(sliding(0.3 * n, normal=n)), name=f"load {n}") for n in (2.0, 4.0)]
     turning = ss.Record.of(
         {"theta": sliding()["x"], "friction": sliding()["friction"], "normal": np.full(TIME.size, 3.0)},
-        fs=FS, units={"friction": "N m"},
-    )  # fmt: skip
+        fs=FS,
+        units={"friction": "N m"},
+    )
     torque = replace(analyze(turning), name="torque")
     mute = replace(variants[0].having(loops=None), name="mute")
     comparison = compare([*variants, torque, mute])

@@ -18,9 +18,16 @@ LAWS = [ss.laws.Coulomb(0.4), ss.laws.Coulomb(0.4, static=0.6), ss.laws.Complian
 
 @pytest.mark.parametrize(
     ("frequencies", "period"),
-    [([2.0], 0.5), ([2.0, 3.0], 1.0), ([2.5, 2.5 * ROOT], math.inf), ([0.1, 0.25, 0.3], 20.0), ([1.0, 1e-5], math.inf),
-     ([3.0, 1.0, 3.0], 1.0), ([100.0, 250.0], 0.02)],
-)  # fmt: skip
+    [
+        ([2.0], 0.5),
+        ([2.0, 3.0], 1.0),
+        ([2.5, 2.5 * ROOT], math.inf),
+        ([0.1, 0.25, 0.3], 20.0),
+        ([1.0, 1e-5], math.inf),
+        ([3.0, 1.0, 3.0], 1.0),
+        ([100.0, 250.0], 0.02),
+    ],
+)
 def test_tones_have_the_least_common_period(frequencies: list[float], period: float) -> None:
     assert common_period(frequencies) == pytest.approx(period, rel=1e-15)
     drive = ss.drives.MultiTone([(1.0, f, 0.0) for f in frequencies])

@@ -22,9 +22,14 @@ MASS, SPRING, FS, STEPS = 2.0, 3000.0, 2000, 20
 
 @functools.cache
 def rig(
-    *, elastic: float = math.inf, level: float = 0.0, damping: float = 0.0, amplitude: float = 1e-3,
-    frequency: float = 2.0, duration: float = 6.0,
-) -> dict[str, np.ndarray]:  # fmt: skip
+    *,
+    elastic: float = math.inf,
+    level: float = 0.0,
+    damping: float = 0.0,
+    amplitude: float = 1e-3,
+    frequency: float = 2.0,
+    duration: float = 6.0,
+) -> dict[str, np.ndarray]:
     """A mass on a driven spring by steps of 25 us: a Jenkins contact (a spring that slips at `level`), and a damper."""
     step, x, v, held = 1 / (FS * STEPS), 0.0, 0.0, 0.0
     rows = []
@@ -184,9 +189,7 @@ def test_records_side_by_side_have_no_friction_below_zero_at_no_load() -> None:
 
 def test_forces_agree_up_to_no_more_than_half_the_sampling_rate() -> None:
     made = rig(elastic=1e5, level=1.2, damping=2.0)
-    record = seen(
-        {**made, "load": made["friction"]}, "x", "z", "a", "load", seed=81, x=1e-9, a=1e-6, load=1e-6
-    )  # fmt: skip
+    record = seen({**made, "load": made["friction"]}, "x", "z", "a", "load", seed=81, x=1e-9, a=1e-6, load=1e-6)
     agree_up_to = ss.balance.compare_force(record, mass=MASS, stiffness=SPRING).agree_up_to
     assert 0 <= agree_up_to.interval[0] <= agree_up_to.value <= agree_up_to.interval[1] <= FS / 2
 

@@ -105,8 +105,9 @@ def test_files_joined_by_plus_are_one_record(dataset: Callable[[str], Path]) -> 
     assert result.exit_code == 0, result.output
     data = json.loads(result.stdout)
     assert [record["name"] for record in data["records"]] == [
-        "s_b_250g_x.mat + s_b_250g_y.mat", "s_b_450g_x.mat + s_b_450g_y.mat"
-    ]  # fmt: skip
+        "s_b_250g_x.mat + s_b_250g_y.mat",
+        "s_b_450g_x.mat + s_b_450g_y.mat",
+    ]
     levels = [{e["name"]: e["value"] for e in record["estimates"]}["sliding friction"] for record in data["records"]]
     assert levels == pytest.approx([0.682, 1.318], rel=0.04)
     assert not [path for path in Path().iterdir() if path.name != "rig.toml"], "--json alone writes nothing"
@@ -125,8 +126,9 @@ def test_a_load_on_the_command_line_goes_before_those_of_the_file() -> None:
     for name in ("one", "two", "three"):
         slide(f"{name}.csv")
     Path("rig.toml").write_text('[normal]\n"one*" = 1\n"two*" = 2\n"*" = 9\n')
-    result = run("analyze", "one.csv", "two.csv", "three.csv", *MAP, "--config", "rig.toml", "--normal", "two*=5",
-                 "--json")  # fmt: skip
+    result = run(
+        "analyze", "one.csv", "two.csv", "three.csv", *MAP, "--config", "rig.toml", "--normal", "two*=5", "--json"
+    )
     assert result.exit_code == 0, result.stderr
     assert [record["normal_load"] for record in json.loads(result.stdout)["records"]] == [1.0, 5.0, 9.0]
 
@@ -296,9 +298,21 @@ def damaged(kind: str) -> list[str]:
 
 @pytest.mark.parametrize(
     "kind",
-    ["wrong unit", "unknown unit", "missing channel", "prose", "empty", "truncated TDMS", "truncated MAT",
-     "unequal columns", "unequal columns of text", "all NaN", "constant", "ten samples"],
-)  # fmt: skip
+    [
+        "wrong unit",
+        "unknown unit",
+        "missing channel",
+        "prose",
+        "empty",
+        "truncated TDMS",
+        "truncated MAT",
+        "unequal columns",
+        "unequal columns of text",
+        "all NaN",
+        "constant",
+        "ten samples",
+    ],
+)
 def test_bad_data_end_in_one_sentence_and_nothing_is_written(kind: str) -> None:
     arguments = damaged(kind)
     before = sorted(Path().iterdir())

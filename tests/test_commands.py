@@ -104,9 +104,18 @@ def test_two_recorders_are_joined(stated: tuple[str, ...]) -> None:
     rows("daq.csv", "t [s],pos [mm]", time, 1e3 * (np.sin(9 * time) + np.sin(23 * time)))
     rows("logger.csv", "t [s],speed [m/s]", time, 9 * np.cos(9 * late) + 23 * np.cos(23 * late))
     ask(
-        "rig", "join", "daq.csv", "logger.csv", "--first-channels", "x=pos [mm]", "--second-channels",
-        "v=speed [m/s]", "--output", "out", *(("--offset", "100 ms") if stated else ()),
-    )  # fmt: skip
+        "rig",
+        "join",
+        "daq.csv",
+        "logger.csv",
+        "--first-channels",
+        "x=pos [mm]",
+        "--second-channels",
+        "v=speed [m/s]",
+        "--output",
+        "out",
+        *(("--offset", "100 ms") if stated else ()),
+    )
     joined = ss.read_record("out/record.csv")
     inner = slice(200, -200)
     expected = 9 * np.cos(9 * joined.time) + 23 * np.cos(23 * joined.time)

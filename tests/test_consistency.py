@@ -42,10 +42,15 @@ def test_a_sound_record_is_consistent(frequency: float, rough: float) -> None:
     assert consistency.status == "ok"
     held = {check.name for check in consistency.checks if check.verdict == "holds"}
     assert held >= {
-        "range of the sensors", "acceleration is that of the displacement", "forces balance at the forcing frequency",
-        "energy of whole cycles", "mean force is zero", "identity of harmonic forcing", "sliding without stops",
+        "range of the sensors",
+        "acceleration is that of the displacement",
+        "forces balance at the forcing frequency",
+        "energy of whole cycles",
+        "mean force is zero",
+        "identity of harmonic forcing",
+        "sliding without stops",
         "samples of a reversal",
-    }  # fmt: skip
+    }
 
 
 def test_it_seldom_cries_wolf() -> None:
@@ -195,8 +200,11 @@ def test_plain_data_and_words() -> None:
     data = consistency.to_dict()
     assert data["status"] == "ok"
     assert len(data["checks"]) == len(consistency.checks)
-    assert all(value is None or not isinstance(value, float) or math.isfinite(value)
-               for check in data["checks"] for value in check.values())  # fmt: skip
+    assert all(
+        value is None or not isinstance(value, float) or math.isfinite(value)
+        for check in data["checks"]
+        for value in check.values()
+    )
     assert "energy of whole cycles: holds" in repr(consistency)
     with pytest.raises(EstimateError, match="no check"):
         consistency["magic"]
@@ -336,11 +344,15 @@ def test_stated_numbers_without_meaning_are_refused() -> None:
 @pytest.mark.parametrize(
     ("b", "r", "z", "amplitude"),
     [
-        (0.6, 0.3, 0.0, 1.5356018092808652), (0.8, 0.5, 0.0, 2.3322349875413653), (1.3, 0.4, 0.0, 1.2009006123575887),
-        (2.0, 0.2, 0.0, 0.31797973380564853), (0.8, 0.5, 0.05, 1.9293215304847432),
-        (1.3, 0.4, 0.1, 0.90533083487309023), (2.0, 0.2, 0.02, 0.31559307764650139),
+        (0.6, 0.3, 0.0, 1.5356018092808652),
+        (0.8, 0.5, 0.0, 2.3322349875413653),
+        (1.3, 0.4, 0.0, 1.2009006123575887),
+        (2.0, 0.2, 0.0, 0.31797973380564853),
+        (0.8, 0.5, 0.05, 1.9293215304847432),
+        (1.3, 0.4, 0.1, 0.90533083487309023),
+        (2.0, 0.2, 0.02, 0.31559307764650139),
     ],
-)  # fmt: skip
+)
 def test_den_hartogs_drive(b: float, r: float, z: float, amplitude: float) -> None:
     assert Slider(1.0, 1.0, b, 2 * z).drive(amplitude, r) == pytest.approx(1.0, rel=1e-12)
 
@@ -348,10 +360,15 @@ def test_den_hartogs_drive(b: float, r: float, z: float, amplitude: float) -> No
 @pytest.mark.parametrize(
     ("b", "z", "share"),
     [
-        (0.3, 0.0, 0.086407277853965626), (0.5, 0.0, 1 / 3), (0.8, 0.0, 0.81740638571088274), (3.0, 0.0, 0.5625),
-        (1.1, 0.0, 0.74677231148819771), (0.3, 0.02, 0.067725937424001559), (0.9, 0.2, 0.56797327234168904),
+        (0.3, 0.0, 0.086407277853965626),
+        (0.5, 0.0, 1 / 3),
+        (0.8, 0.0, 0.81740638571088274),
+        (3.0, 0.0, 0.5625),
+        (1.1, 0.0, 0.74677231148819771),
+        (0.3, 0.02, 0.067725937424001559),
+        (0.9, 0.2, 0.56797327234168904),
     ],
-)  # fmt: skip
+)
 def test_den_hartogs_boundary(b: float, z: float, share: float) -> None:
     assert Slider(1.0, 1.0, b, 2 * z).boundary() == pytest.approx(share, rel=1e-4)
 
@@ -364,10 +381,11 @@ def test_the_boundary_at_resonance_and_far_above() -> None:
 @pytest.mark.parametrize(
     ("frequency", "friction", "contact", "base", "amplitude"),
     [
-        (5.61, 1.06, 201000.0, 0.6e-3, 3.351651575369614e-4), (8.7, 1.10, 181000.0, 1.1e-3, 4.583018372375212e-4),
+        (5.61, 1.06, 201000.0, 0.6e-3, 3.351651575369614e-4),
+        (8.7, 1.10, 181000.0, 1.1e-3, 4.583018372375212e-4),
         (11.1, 1.28, 194000.0, 2.0e-3, 4.790057107500766e-4),
     ],
-)  # fmt: skip
+)
 def test_the_drive_of_an_elastic_contact(
     frequency: float, friction: float, contact: float, base: float, amplitude: float
 ) -> None:

@@ -23,9 +23,11 @@ LUGRE = ss.laws.LuGre(1.0, 1.5, speed=1e-3, stiffness=1e5, damping=math.sqrt(1e5
 ROCK = ss.laws.RateState(5e6, friction=0.6, direct=0.010, evolution=0.015, distance=1e-5, reference=1e-6)
 STRIBECK = ss.laws.Stribeck(1.0, 1.5, speed=0.1, exponent=1.0, viscous=0.2)
 THESIS = ss.Oscillator(
-    mass=2.42, stiffness=2310, law=ss.laws.SmoothStateVariable(1.1, rate=100.0, steepness=3000.0),
+    mass=2.42,
+    stiffness=2310,
+    law=ss.laws.SmoothStateVariable(1.1, rate=100.0, steepness=3000.0),
     drive=ss.drives.HarmonicBase(0.6e-3, 2.5),
-)  # fmt: skip
+)
 
 
 def dragged(law: object, speed: float, duration: float, **options: float) -> ss.solve.Trajectory:
@@ -42,8 +44,9 @@ def upcrossings(run: ss.solve.Trajectory, name: str, level: float, count: int) -
     return [brentq(lambda t: run.state(t)[name] - level, times[j], times[j + 1], xtol=1e-14) for j in rises]
 
 
-@pytest.mark.parametrize(("time", "force"), [(1e-3, 0.70097980308993968), (5e-3, 0.87011348575644943),
-                                             (1e-2, 0.95804298293237985)])  # fmt: skip
+@pytest.mark.parametrize(
+    ("time", "force"), [(1e-3, 0.70097980308993968), (5e-3, 0.87011348575644943), (1e-2, 0.95804298293237985)]
+)
 def test_lugre_follows_its_closed_transient_at_constant_speed(time: float, force: float) -> None:
     assert dragged(LUGRE, 0.002, 0.01).state(time)["friction"] == pytest.approx(force, rel=1e-13)
 
@@ -73,8 +76,10 @@ def test_lugre_stick_slip_has_the_reference_period() -> None:
     assert crossings[3] - crossings[2] == pytest.approx(6.36271982, abs=1e-8)
 
 
-@pytest.mark.parametrize(("rate", "force"), [(1.0, 1.460734471242172), (5.0, 1.379927337908279),
-                                             (10.0, 1.3070592115581885), (50.0, 0.852414079639229)])  # fmt: skip
+@pytest.mark.parametrize(
+    ("rate", "force"),
+    [(1.0, 1.460734471242172), (5.0, 1.379927337908279), (10.0, 1.3070592115581885), (50.0, 0.852414079639229)],
+)
 def test_lugre_breaks_away_at_the_reference_force(rate: float, force: float) -> None:
     soft = 1e-9  # N/m: the spring's force is that of its end alone
     system = ss.Oscillator(mass=1, stiffness=soft, law=LUGRE, drive=ss.drives.Ramp(rate / soft))
@@ -84,8 +89,12 @@ def test_lugre_breaks_away_at_the_reference_force(rate: float, force: float) -> 
 
 def test_dahl_loop_is_the_closed_one() -> None:
     level, stiffness, size = 1.1, 192000.0, 20e-6
-    system = ss.Oscillator(mass=HEAVY, stiffness=0.0, law=ss.laws.Dahl(level, stiffness),
-                           drive=ss.drives.MultiTone([(size, 1.0, 0.0)], on="face"))  # fmt: skip
+    system = ss.Oscillator(
+        mass=HEAVY,
+        stiffness=0.0,
+        law=ss.laws.Dahl(level, stiffness),
+        drive=ss.drives.MultiTone([(size, 1.0, 0.0)], on="face"),
+    )
     run = ss.simulate(system, cycles=None, duration=4.25)
     turns = [event.time for event in run.events][-3:]
     peaks = [abs(run.state(t)["friction"]) for t in turns]
@@ -112,22 +121,30 @@ def test_dahl_with_a_broken_exponent_saturates() -> None:
     assert run.state(0.02)["friction"] == pytest.approx(level, rel=1e-9)
 
 
-@pytest.mark.parametrize(("law", "values"), [
-    ("aging", {0.1: 0.62168278350884353, 1.0: 0.61040432711104689, 3.0: 0.59404069010018018}),
-    ("slip", {0.1: 0.6197390517903221, 1.0: 0.60119318029393492, 3.0: 0.59020665895674556}),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("law", "values"),
+    [
+        ("aging", {0.1: 0.62168278350884353, 1.0: 0.61040432711104689, 3.0: 0.59404069010018018}),
+        ("slip", {0.1: 0.6197390517903221, 1.0: 0.60119318029393492, 3.0: 0.59020665895674556}),
+    ],
+)
 def test_rate_and_state_answers_a_velocity_step_as_the_closed_form(law: str, values: dict[float, float]) -> None:
     system = ss.Oscillator(mass=HEAVY, stiffness=0.0, law=ROCK)
-    run = ss.simulate(system.having(law=ss.laws.RateState(5e6, 0.6, 0.010, 0.015, 1e-5, 1e-6, law=law)), duration=60,
-                      start={"v": 1e-5})  # fmt: skip
+    run = ss.simulate(
+        system.having(law=ss.laws.RateState(5e6, 0.6, 0.010, 0.015, 1e-5, 1e-6, law=law)),
+        duration=60,
+        start={"v": 1e-5},
+    )
     for time, friction in values.items():
         assert run.state(time)["friction"] / 5e6 == pytest.approx(friction, rel=1e-12)
     assert run.state(0.0)["friction"] / 5e6 == pytest.approx(0.62302585092994046, rel=1e-13)
     assert run.state(60.0)["friction"] / 5e6 == pytest.approx(0.58848707453502977, rel=1e-12)
 
 
-@pytest.mark.parametrize(("mass", "speed", "stiffness", "turn"), [(1e-6, 1e-6, 2.5e9, 0.070710678118654752),
-                                                                  (1e3, 0.1, 5.25e10, 7071.0678118654752)])  # fmt: skip
+@pytest.mark.parametrize(
+    ("mass", "speed", "stiffness", "turn"),
+    [(1e-6, 1e-6, 2.5e9, 0.070710678118654752), (1e3, 0.1, 5.25e10, 7071.0678118654752)],
+)
 @pytest.mark.parametrize("law", ["aging", "slip"])
 def test_rate_and_state_loses_stability_at_the_critical_stiffness(
     law: str, mass: float, speed: float, stiffness: float, turn: float
@@ -153,9 +170,14 @@ def test_rate_and_state_simulation_turns_at_the_critical_frequency() -> None:
     assert 2 * math.pi / np.mean(np.diff(rises[1:])) == pytest.approx(7071.0678118654752, rel=1e-8)
 
 
-@pytest.mark.parametrize(("exponent", "low", "high", "known"), [(1.0, 0.1, 0.4, 0.23025850929940457),
-                                                                (2.0, 1e-3, 0.02, 0.0050125787690136614),
-                                                                (2.0, 0.1, 0.4, 0.19084020979734697)])  # fmt: skip
+@pytest.mark.parametrize(
+    ("exponent", "low", "high", "known"),
+    [
+        (1.0, 0.1, 0.4, 0.23025850929940457),
+        (2.0, 1e-3, 0.02, 0.0050125787690136614),
+        (2.0, 0.1, 0.4, 0.19084020979734697),
+    ],
+)
 def test_stribeck_sliding_loses_stability_at_the_threshold(
     exponent: float, low: float, high: float, known: float
 ) -> None:
@@ -167,10 +189,13 @@ def test_stribeck_sliding_loses_stability_at_the_threshold(
     assert brentq(growth, low, high, xtol=1e-16) == pytest.approx(known, rel=1e-12)
 
 
-@pytest.mark.parametrize(("speed", "slip", "restick", "stick", "extrema"), [
-    (1.0, 4.449285846689756, 0.35373634944617727, 3.6462636505538226, (4.631702308799714, 0.17702658185414405)),
-    (0.5, 4.147462124687207, 0.22722196260183694, 7.545556074796326, (4.299432690040165, 0.18858272394502176)),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("speed", "slip", "restick", "stick", "extrema"),
+    [
+        (1.0, 4.449285846689756, 0.35373634944617727, 3.6462636505538226, (4.631702308799714, 0.17702658185414405)),
+        (0.5, 4.147462124687207, 0.22722196260183694, 7.545556074796326, (4.299432690040165, 0.18858272394502176)),
+    ],
+)
 def test_falling_friction_on_a_belt_has_the_reference_limit_cycle(
     speed: float, slip: float, restick: float, stick: float, extrema: tuple[float, float]
 ) -> None:
@@ -186,8 +211,10 @@ def test_falling_friction_on_a_belt_has_the_reference_limit_cycle(
     assert (path.max(), path.min()) == pytest.approx(extrema, rel=1e-9)
 
 
-@pytest.mark.parametrize(("speed", "known"), [(0.05, 0.02426530323049094), (0.1, 0.050238758375514184),
-                                              (0.2, 0.11682362175901599), (0.4, 0.2908)])  # fmt: skip
+@pytest.mark.parametrize(
+    ("speed", "known"),
+    [(0.05, 0.02426530323049094), (0.1, 0.050238758375514184), (0.2, 0.11682362175901599), (0.4, 0.2908)],
+)
 def test_dither_smooths_a_cubic_curve_as_the_closed_form(speed: float, known: float) -> None:
     level, low, knee, swing = 0.4, 0.25, 0.5, 0.3
     k1, k3 = 1.5 * (level - low) / knee, 0.5 * (level - low) / knee**3
@@ -198,8 +225,10 @@ def test_dither_smooths_a_cubic_curve_as_the_closed_form(speed: float, known: fl
     assert mean_friction(run, 1.0, 2.0) == pytest.approx(known, rel=1e-10)
 
 
-@pytest.mark.parametrize(("ratio", "known"), [(0.1, 0.063768560858519848), (0.25, 0.16086124651033249), (0.5, 1 / 3),
-                                              (0.9, 0.71286741374258746), (2.0, 1.0)])  # fmt: skip
+@pytest.mark.parametrize(
+    ("ratio", "known"),
+    [(0.1, 0.063768560858519848), (0.25, 0.16086124651033249), (0.5, 1 / 3), (0.9, 0.71286741374258746), (2.0, 1.0)],
+)
 def test_dither_smooths_dry_friction_as_the_closed_form(ratio: float, known: float) -> None:
     dry = ss.laws.FrictionCurve(lambda v: 1.0 + 0.0 * v)
     face = ss.drives.MultiTone([(1 / (2 * math.pi), 1.0, 0.0)], on="face")
@@ -220,13 +249,18 @@ def mean_friction(run: ss.solve.Trajectory, begin: float, end: float) -> float:
     return total / (end - begin)
 
 
-@pytest.mark.parametrize(("changes", "amplitude", "zeros"), [
-    ({"printed": True}, 0.0006426127604065683, 6), ({}, 0.0005494788871969221, 6),
-    ({"rate": 100 / 1.1}, 0.0005409185901804385, 6),
-    ({"kinetic": 1.28}, 0.0001964689794010018, 10), ({"kinetic": 1.06}, 0.0005882932850948199, 6),
-    ({"frequency": 8.7, "amplitude": 1.1e-3}, 0.0005765083739851339, 2),
-    ({"frequency": 8.7, "amplitude": 1.1e-3, "printed": True}, 0.000576294304827135, 2),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("changes", "amplitude", "zeros"),
+    [
+        ({"printed": True}, 0.0006426127604065683, 6),
+        ({}, 0.0005494788871969221, 6),
+        ({"rate": 100 / 1.1}, 0.0005409185901804385, 6),
+        ({"kinetic": 1.28}, 0.0001964689794010018, 10),
+        ({"kinetic": 1.06}, 0.0005882932850948199, 6),
+        ({"frequency": 8.7, "amplitude": 1.1e-3}, 0.0005765083739851339, 2),
+        ({"frequency": 8.7, "amplitude": 1.1e-3, "printed": True}, 0.000576294304827135, 2),
+    ],
+)
 def test_thesis_state_variable_has_the_reference_amplitudes(
     changes: dict[str, float], amplitude: float, zeros: int
 ) -> None:
@@ -238,11 +272,17 @@ def test_thesis_state_variable_has_the_reference_amplitudes(
     assert max(abs(run.state(t)["x"]) for t in turns) == pytest.approx(amplitude, rel=2e-9)
 
 
-@pytest.mark.parametrize("law", [
-    ss.laws.LuGre(1.1, 1.3, speed=1e-3, stiffness=192000, damping=24, viscous=0.4), ss.laws.Dahl(1.1, 192000),
-    ss.laws.Stribeck(1.1, 1.3, speed=1e-3, viscous=0.4), ss.laws.Stribeck(1.1, 1.3, speed=1e-3, exponent=0.7),
-    THESIS.law,
-], ids=lambda law: type(law).__name__)  # fmt: skip
+@pytest.mark.parametrize(
+    "law",
+    [
+        ss.laws.LuGre(1.1, 1.3, speed=1e-3, stiffness=192000, damping=24, viscous=0.4),
+        ss.laws.Dahl(1.1, 192000),
+        ss.laws.Stribeck(1.1, 1.3, speed=1e-3, viscous=0.4),
+        ss.laws.Stribeck(1.1, 1.3, speed=1e-3, exponent=0.7),
+        THESIS.law,
+    ],
+    ids=lambda law: type(law).__name__,
+)
 def test_tolerance_is_kept_over_a_hundred_cycles(law: object) -> None:
     system = THESIS.having(law=law)
     times = np.linspace(39, 40, 101)
@@ -382,8 +422,12 @@ def test_a_stiff_creep_comes_to_steady_sliding() -> None:
 @pytest.mark.parametrize(("short", "crossings"), [(1e-6, 2), (1e-9, 2), (-1e-9, 0), (-1e-12, 0)])
 def test_two_crossings_within_a_step_are_two(short: float, crossings: int) -> None:
     fastest = 1e-3 * 2 * math.pi
-    system = ss.Oscillator(mass=HEAVY, stiffness=0.0, law=ss.laws.Dahl(1.0, stiffness=100.0),
-                           drive=ss.drives.MultiTone([(1e-3, 1.0, 0.0)], on="face"))  # fmt: skip
+    system = ss.Oscillator(
+        mass=HEAVY,
+        stiffness=0.0,
+        law=ss.laws.Dahl(1.0, stiffness=100.0),
+        drive=ss.drives.MultiTone([(1e-3, 1.0, 0.0)], on="face"),
+    )
     run = ss.simulate(system, duration=0.95, start={"v": fastest * (1 - short)})
     assert len(run.events) == crossings
     if crossings:
@@ -395,9 +439,17 @@ def test_two_crossings_within_a_step_are_two(short: float, crossings: int) -> No
 
 def test_every_function_moves_as_a_general_solver_says() -> None:
     curve = ss.laws.FrictionCurve(
-        lambda v: 1 + 0.1 * tanh(5 * v) + 0.2 * log(1 + v) - 0.1 * sqrt(1 + v * v) + 0.1 * asinh(3 * v)
-        + 0.3 * exp(-v) + 0.1 / (1 + v) ** 1.5 + v**3
-    )  # fmt: skip
+        lambda v: (
+            1
+            + 0.1 * tanh(5 * v)
+            + 0.2 * log(1 + v)
+            - 0.1 * sqrt(1 + v * v)
+            + 0.1 * asinh(3 * v)
+            + 0.3 * exp(-v)
+            + 0.1 / (1 + v) ** 1.5
+            + v**3
+        )
+    )
     run = ss.simulate(ss.Oscillator(mass=1, stiffness=0, law=curve), duration=0.8, start={"v": 2.0}, rtol=1e-9)
     known = solve_ivp(
         lambda t, s: [s[1], -curve.friction(s[1])], (0, 0.8), [0, 2.0], method="DOP853", rtol=1e-12, atol=1e-14

@@ -64,10 +64,13 @@ def test_multipliers_are_those_of_the_variational_equations(system: ss.Oscillato
 
 
 @pytest.mark.parametrize("frequency", [2.5, 8.7])
-@pytest.mark.parametrize(("curved", "linear"), [
-    (ss.laws.Stribeck(1.1, 1.1, speed=1.0), ss.laws.Coulomb(1.1)),
-    (ss.laws.FrictionCurve(lambda v: 1.1 - 2.0 * v, static=1.2), ss.laws.LinearSlope(1.1, slope=-2.0, static=1.2)),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("curved", "linear"),
+    [
+        (ss.laws.Stribeck(1.1, 1.1, speed=1.0), ss.laws.Coulomb(1.1)),
+        (ss.laws.FrictionCurve(lambda v: 1.1 - 2.0 * v, static=1.2), ss.laws.LinearSlope(1.1, slope=-2.0, static=1.2)),
+    ],
+)
 def test_a_curve_without_curvature_has_the_exact_engines_orbit(
     curved: object, linear: object, frequency: float
 ) -> None:

@@ -77,10 +77,17 @@ def test_the_bandwidth_is_where_the_smoothing_passes_half_the_power():
 @pytest.mark.parametrize(
     ("size", "penalty"),
     [
-        (24, 3.0), (25, 1e4), (60, 1e3), (301, 1e5), (800, 1e6), (501, 1e-6), (24, 1e-3), (100, 1e9),
+        (24, 3.0),
+        (25, 1e4),
+        (60, 1e3),
+        (301, 1e5),
+        (800, 1e6),
+        (501, 1e-6),
+        (24, 1e-3),
+        (100, 1e9),
         pytest.param(2000, 1e6, marks=pytest.mark.soak),
     ],
-)  # fmt: skip
+)
 def test_the_smoother_is_the_minimum_of_its_criterion_to_the_ends(size, penalty):
     y = np.random.default_rng(size).standard_normal(size).cumsum()
     rough = np.sqrt(penalty) * np.diff(np.eye(size), 3, axis=0)
@@ -172,10 +179,16 @@ def test_a_record_at_rest_has_no_derivative():
 @pytest.mark.parametrize(
     "wrong",
     [
-        {"order": 3}, {"method": "spline"}, {"noise": -1.0}, {"noise": "x"}, {"noise": np.ones(7)}, {"bandwidth": 0.0},
-        {"bandwidth": 80.0}, {"bandwidth": 10.0, "method": "five-point"},
+        {"order": 3},
+        {"method": "spline"},
+        {"noise": -1.0},
+        {"noise": "x"},
+        {"noise": np.ones(7)},
+        {"bandwidth": 0.0},
+        {"bandwidth": 80.0},
+        {"bandwidth": 10.0, "method": "five-point"},
     ],
-)  # fmt: skip
+)
 def test_wrong_use_is_refused(wrong):
     with pytest.raises(EstimateError):
         differentiate(np.random.default_rng(0).standard_normal(200), 100.0, **wrong)

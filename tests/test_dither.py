@@ -48,9 +48,12 @@ def test_the_answer_scales_with_the_units(found: ss.maps.Dither) -> None:
     """Lengths by L, times by T, forces by F: the same number of the same dither."""
     length, time, force = 1e-3, 1e-2, 7.0
     small = ss.Oscillator(
-        mass=force * time**2 / length, stiffness=force / length, law=ss.laws.Coulomb(force, static=1.5 * force),
-        drive=ss.drives.Belt(0.5 * length / time), damping=0.02 * force * time / length,
-    )  # fmt: skip
+        mass=force * time**2 / length,
+        stiffness=force / length,
+        law=ss.laws.Coulomb(force, static=1.5 * force),
+        drive=ss.drives.Belt(0.5 * length / time),
+        damping=0.02 * force * time / length,
+    )
     other = ss.dither(small, frequency=FREQUENCY / time)
     assert other.amplitude.value == pytest.approx(length * found.amplitude.value, rel=1e-6)
 

@@ -23,9 +23,17 @@ def test_a_value_outside_its_interval_can_not_be_built(value, low, high):
 
 @pytest.mark.parametrize(
     ("value", "low", "high"),
-    [(1, 1, 1), (0.0, 1e-18, 0.3), (1 + 1e-15, 0, 1), (math.nan, math.nan, math.nan), (math.nan, -math.inf, math.inf),
-     (-math.inf, -math.inf, -math.inf), (math.inf, 3, math.inf), (2, math.nan, 3)],
-)  # fmt: skip
+    [
+        (1, 1, 1),
+        (0.0, 1e-18, 0.3),
+        (1 + 1e-15, 0, 1),
+        (math.nan, math.nan, math.nan),
+        (math.nan, -math.inf, math.inf),
+        (-math.inf, -math.inf, -math.inf),
+        (math.inf, 3, math.inf),
+        (2, math.nan, 3),
+    ],
+)
 def test_what_lies_inside_but_for_rounding_or_is_not_known_can(value, low, high):
     assert estimate(value, low, high).interval == (low, high)
 

@@ -47,8 +47,11 @@ def test_every_setup_is_asked_everything() -> None:
     found = plan()
     assert [setup.fs for setup in found.setups] == [500] * 4 + [2000] * 4
     assert [setup.sensors for setup in found.setups[:4]] == [
-        ("x", "z"), ("x", "z", "load"), ("x", "z", "a"), ("x", "z", "a", "load"),
-    ]  # fmt: skip
+        ("x", "z"),
+        ("x", "z", "load"),
+        ("x", "z", "a"),
+        ("x", "z", "a", "load"),
+    ]
     assert found.questions == ("delay", "friction", "sliding friction", "contact stiffness")
     assert all(tuple(setup.accuracy) == found.questions for setup in found.setups)
 

@@ -176,8 +176,9 @@ def test_a_record_is_the_old_one_or_the_new_one(steps: Steps, tmp_path: Path, fo
         mine = folder / f".slide.{form}-stranger.part"
         assert (mine / "mine").read_text() == "mine too"
 
-    every_step(steps, tmp_path, prepare, lambda to: write_record(NEW, to / f"slide.{form}", overwrite=True), check,
-               kill=kill)  # fmt: skip
+    every_step(
+        steps, tmp_path, prepare, lambda to: write_record(NEW, to / f"slide.{form}", overwrite=True), check, kill=kill
+    )
 
 
 def test_a_file_that_comes_while_a_record_is_written_is_not_replaced(

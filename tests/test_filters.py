@@ -59,14 +59,15 @@ def test_a_trend_of_the_degree_asked_for_goes() -> None:
 @pytest.mark.parametrize(
     ("ask", "words"),
     [
-        (lambda r: ss.signals.keep_band(r), "low=, high="), (lambda r: ss.signals.keep_band(r, high=500.0), "half the"),
+        (lambda r: ss.signals.keep_band(r), "low=, high="),
+        (lambda r: ss.signals.keep_band(r, high=500.0), "half the"),
         (lambda r: ss.signals.keep_band(r, low=20, high=10), "lower first"),
         (lambda r: ss.signals.keep_band(r, low=0.1), "needs at least 30001"),
         (lambda r: ss.signals.remove_mode(r, frequency=490.0), "correct the frequency"),
         (lambda r: ss.signals.remove_trend(r, degree=9), "degree 0 to 6"),
         (lambda r: ss.signals.keep_band(r, high=5.0, channels=["w"]), "channel w is missing"),
     ],
-)  # fmt: skip
+)
 def test_what_a_filter_can_not_do_is_one_sentence(ask: Any, words: str) -> None:
     with pytest.raises(ss.errors.RecordError, match=words):
         ask(tone(5.0))

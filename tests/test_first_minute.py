@@ -249,8 +249,9 @@ def test_a_selected_span_gives_the_command_that_analyses_it(browser: Browser, ad
     assert words[2] == "run one.csv", "not where this machine keeps it"
     assert (words[words.index("--mass") + 1], words[words.index("--damper") + 1]) == ("2", "base")
     assert [words[place + 1] for place, word in enumerate(words) if word == "--channels"] == [
-        "x=x [m]", "friction=friction [N]"
-    ]  # fmt: skip
+        "x=x [m]",
+        "friction=friction [N]",
+    ]
     first, last = map(int, words[words.index("--rows") + 1].split(":"))
     assert (first, last) == (pytest.approx(500 + 750, abs=6), pytest.approx(500 + 1500, abs=6))
     page.get_by_role("button", name="Zoom to it").click()

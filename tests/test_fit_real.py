@@ -24,7 +24,7 @@ def test_paper_slips_as_often_as_its_law_says(dataset: Callable[[str], Path]) ->
     level = float(np.median(record["load"]))
     slider = ss.Oscillator(
         MASS, STIFFNESS, law=ss.laws.Coulomb(level, static=1.08 * level), drive=ss.drives.Ramp(SPEED)
-    )  # fmt: skip
+    )
     excesses = []
     for first, last in zip(rows[:-1:EVERY], rows[1::EVERY], strict=False):
         part = way[first : last + 60]

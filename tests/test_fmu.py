@@ -20,9 +20,7 @@ RIG = {"mass": 2.42, "stiffness": 2310.0, "damping": 0.5}
 OUTPUTS = ["x", "v", "friction", "acceleration", "mode"]
 REFUSED = ("RateState", "slip law", "TimeDelay")
 KINDS = ("Coulomb", "Tabulated", "Stribeck", "ElastoSlip", "LuGre", "InSeries")  # rigid, compliant, curved
-SHORT = [
-    pytest.param(name, marks=() if name in KINDS else pytest.mark.soak) for name in LAWS if name not in REFUSED
-]  # fmt: skip
+SHORT = [pytest.param(name, marks=() if name in KINDS else pytest.mark.soak) for name in LAWS if name not in REFUSED]
 
 
 def unit(law: Any, folder: Path, **values: Any) -> Path:
@@ -66,8 +64,14 @@ def test_a_unit_follows_the_base_that_a_tool_moves(damper: str, near: float, tmp
     rate = -2e-3 * w * np.sin(w * t)
     moved = np.array([*zip(t, 0 * t, z, rate, strict=True)], dtype=[(k, float) for k in INPUTS])
     begin = {"x": record["x"][0], "v": record["v"][0]}
-    told = run(unit(law, tmp_path, damper=damper), "CoSimulation", stop_time=0.5, input=moved, start_values=begin,
-               output_interval=h)  # fmt: skip
+    told = run(
+        unit(law, tmp_path, damper=damper),
+        "CoSimulation",
+        stop_time=0.5,
+        input=moved,
+        start_values=begin,
+        output_interval=h,
+    )
     assert np.abs(told["x"] - record["x"]).max() < near * np.ptp(record["x"])
 
 
@@ -78,8 +82,13 @@ def test_a_push_below_static_friction_moves_nothing_and_one_above_does(tmp_path:
     """Without a spring: x = (F - f_k) t^2 / 2m once it has broken away, and rest where the push goes."""
     path = unit(ss.laws.Coulomb(1.0, static=1.5), tmp_path, mass=2.0, stiffness=0.0, damping=0.0, turning=True)
     pushes = [(0.0, 1.4), (0.5, 1.4), (0.5, 2.0), (1.0, 2.0), (1.0, 0.0), (3.0, 0.0)]
-    told = run(path, "CoSimulation", stop_time=3.0, input=np.array([(t, f, 0.0, 0.0) for t, f in pushes],
-               dtype=[(k, float) for k in INPUTS]), output_interval=0.25)  # fmt: skip
+    told = run(
+        path,
+        "CoSimulation",
+        stop_time=3.0,
+        input=np.array([(t, f, 0.0, 0.0) for t, f in pushes], dtype=[(k, float) for k in INPUTS]),
+        output_interval=0.25,
+    )
     assert told["x"][:3] == pytest.approx(0.0, abs=1e-15)
     assert told["friction"][:2] == pytest.approx(1.4)
     # 0.5 s with 0.5 m/s^2, then as long with -0.5 m/s^2

@@ -145,12 +145,19 @@ def test_a_torque_is_no_part_of_a_balance_of_forces(motion):
 @pytest.mark.parametrize(
     ("wrong", "error"),
     [
-        ({"mass": 0.0}, ModelError), ({"mass": -1.0}, ModelError), ({"stiffness": -5}, ModelError),
-        ({"mass": float("nan")}, StickslipError), ({"mass": "3 mm"}, StickslipError), ({"damper": "wall"}, ModelError),
-        ({"contact": "wall"}, ModelError), ({"method": "spline"}, EstimateError), ({"bandwidth": 1e4}, EstimateError),
-        ({"bandwidth": "x"}, RecordError), ({"bandwidth": [3]}, RecordError),
+        ({"mass": 0.0}, ModelError),
+        ({"mass": -1.0}, ModelError),
+        ({"stiffness": -5}, ModelError),
+        ({"mass": float("nan")}, StickslipError),
+        ({"mass": "3 mm"}, StickslipError),
+        ({"damper": "wall"}, ModelError),
+        ({"contact": "wall"}, ModelError),
+        ({"method": "spline"}, EstimateError),
+        ({"bandwidth": 1e4}, EstimateError),
+        ({"bandwidth": "x"}, RecordError),
+        ({"bandwidth": [3]}, RecordError),
     ],
-)  # fmt: skip
+)
 def test_wrong_constants_are_refused_in_a_sentence(wrong, error):
     record = Record.of({"x": np.sin(np.arange(200.0))}, fs=100.0, units=UNITS)
     with pytest.raises(error) as caught:

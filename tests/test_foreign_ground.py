@@ -66,8 +66,11 @@ def abroad(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     place.mkdir()
     (ground / "sitecustomize.py").write_text(FOREIGN, encoding="utf-8")
     for name, value in {
-        "PYTHONPATH": str(ground), "PYTHONUTF8": "0", "PYTHONIOENCODING": "cp1252", "PYTHONWARNDEFAULTENCODING": "1",
-    }.items():  # fmt: skip
+        "PYTHONPATH": str(ground),
+        "PYTHONUTF8": "0",
+        "PYTHONIOENCODING": "cp1252",
+        "PYTHONWARNDEFAULTENCODING": "1",
+    }.items():
         monkeypatch.setenv(name, value)
     (place / "slider.toml").write_text(SLIDER, encoding="utf-8")
     (place / "grid.toml").write_text(GRID, encoding="utf-8")

@@ -124,10 +124,19 @@ def test_real_tdms_cut_at_every_byte_is_refused(dataset: Formats, tmp_path: Path
 
 @pytest.mark.parametrize(
     ("folder", "name"),
-    [("formats", "raw1.tdms"), ("formats", "Digital_Input.tdms"), ("formats", "v7.mat"), ("formats", "v73.mat"),
-     ("formats", "testhdf5_7.4_GLNX86.mat"), ("frame_base_excited", "s_b_250g_x.mat"), ("emps", "DATA_EMPS.mat"),
-     ("audio", "canary_01.ogg"), ("formats", "Sample_UFF58b_bin.uff"), ("formats", "Sample_UFF58_ascii.uff")],
-)  # fmt: skip
+    [
+        ("formats", "raw1.tdms"),
+        ("formats", "Digital_Input.tdms"),
+        ("formats", "v7.mat"),
+        ("formats", "v73.mat"),
+        ("formats", "testhdf5_7.4_GLNX86.mat"),
+        ("frame_base_excited", "s_b_250g_x.mat"),
+        ("emps", "DATA_EMPS.mat"),
+        ("audio", "canary_01.ogg"),
+        ("formats", "Sample_UFF58b_bin.uff"),
+        ("formats", "Sample_UFF58_ascii.uff"),
+    ],
+)
 def test_real_file_cut_is_refused(dataset: Formats, tmp_path: Path, folder: str, name: str) -> None:
     data = (dataset(folder) / name).read_bytes()
     path = tmp_path / name

@@ -112,9 +112,14 @@ def test_the_smoother_is_the_least_squares_of_all_readings() -> None:
     size, count = 3, 12
     transition = np.eye(size) + 0.1 * rng.standard_normal((size, size))
     motion = Motion(
-        transition[None], rng.standard_normal((1, size)), rng.standard_normal((2, size)), np.array([0.3, 0.5]),
-        rng.standard_normal(size), np.array([1.0, 2.0, 3.0]), np.array([0.0, 0.4, 0.0]),
-    )  # fmt: skip
+        transition[None],
+        rng.standard_normal((1, size)),
+        rng.standard_normal((2, size)),
+        np.array([0.3, 0.5]),
+        rng.standard_normal(size),
+        np.array([1.0, 2.0, 3.0]),
+        np.array([0.0, 0.4, 0.0]),
+    )
     readings, inputs = rng.standard_normal((count, 2)), rng.standard_normal((count, size))
     readings[4, 1] = np.nan
     unknown = rng.uniform(0.1, 2.0, count)

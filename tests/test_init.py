@@ -96,8 +96,10 @@ def test_at_a_terminal_it_asks_and_takes_what_is_typed() -> None:
     assert "rig.toml is written." in text, text
     data = tomllib.loads(Path("rig.toml").read_text())
     assert data == {
-        "mass": "2 kg", "stiffness": "2.31 N/mm", "channels": {"x": "`Kanal A` [mm]", "friction": "`Kanal B` [N]"}
-    }  # fmt: skip
+        "mass": "2 kg",
+        "stiffness": "2.31 N/mm",
+        "channels": {"x": "`Kanal A` [mm]", "friction": "`Kanal B` [N]"},
+    }
 
 
 def typed(command: list[str], answers: list[tuple[str, str]], patience: float = 600.0) -> str:

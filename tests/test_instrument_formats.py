@@ -271,14 +271,25 @@ def test_uff_keeps_time_histories_beside_spectra_and_uneven_time(tmp_path: Path)
     }  # fmt: skip
     frequency = np.arange(8.0)
     spectrum = pyuff.prepare_58(
-        **common, func_type=4, data=np.ones(8) + 1j, x=frequency, abscissa_spacing=1, abscissa_spec_data_type=18,
+        **common,
+        func_type=4,
+        data=np.ones(8) + 1j,
+        x=frequency,
+        abscissa_spacing=1,
+        abscissa_spec_data_type=18,
         ordinate_spec_data_type=12,
-    )  # fmt: skip
+    )
     stamps = np.array([0.0, 0.1, 0.3, 0.6])
     uneven = pyuff.prepare_58(
-        **common, func_type=1, data=stamps**2, x=stamps, abscissa_spacing=0, abscissa_spec_data_type=17,
-        ordinate_spec_data_type=8, ordinate_axis_units_lab="mm",
-    )  # fmt: skip
+        **common,
+        func_type=1,
+        data=stamps**2,
+        x=stamps,
+        abscissa_spacing=0,
+        abscissa_spec_data_type=17,
+        ordinate_spec_data_type=8,
+        ordinate_axis_units_lab="mm",
+    )
     pyuff.UFF(str(path)).write_sets([spectrum, uneven], mode="add")
     table = read(path)
     assert [column.name for column in table.columns] == ["1+Z", "2+Z", "7+X time", "7+X"]

@@ -144,8 +144,13 @@ def test_a_robots_temperature_is_in_degrees_celsius_unless_it_says():
     samples = {"position": q, "effort": torque(q, v, a), "present_temperature": np.linspace(30, 40, q.size)}
     written = axis_record(ss.Record.of(samples, fs=200.0, units={"position": "rad", "effort": "N m"}))
     assert written["temperature"][0] == pytest.approx(303.15)
-    two = axis_record(ss.Record.of({**samples, "motor_temperature": np.linspace(30, 50, q.size)}, fs=200.0,
-                      units={"position": "rad", "effort": "N m"}))  # fmt: skip
+    two = axis_record(
+        ss.Record.of(
+            {**samples, "motor_temperature": np.linspace(30, 50, q.size)},
+            fs=200.0,
+            units={"position": "rad", "effort": "N m"},
+        )
+    )
     assert "temperature" not in two
 
 
@@ -349,10 +354,13 @@ def test_emps_is_predicted_inside_its_loop(dataset):
         (("shoulder/position", "elbow/position", "elbow/effort"), "elbow", ["theta", "force"]),
         (("observation.state.0", "observation.state.1", "action.0", "action.1"), "1", ["theta", "reference"]),
         (("qpos", "qvel", "ctrl", "actuator_force"), None, ["theta", "reference", "force"]),
-        (("present_position", "goal_position", "present_current", "goal_current", "present_load"), None,
-         ["theta", "reference", "current"]),
+        (
+            ("present_position", "goal_position", "present_current", "goal_current", "present_load"),
+            None,
+            ["theta", "reference", "current"],
+        ),
     ],
-)  # fmt: skip
+)
 def test_columns_are_known_by_the_names_that_tools_write(tmp_path, columns, axis, expected):
     path = tmp_path / "log.csv"
     rows = [",".join(["time", *columns]), *(",".join([str(i / 100)] + [str(i % 7)] * len(columns)) for i in range(50))]
@@ -375,9 +383,16 @@ def test_several_axes_are_asked_for_one():
 
 @pytest.mark.parametrize(
     ("text", "scale", "si"),
-    [("N m/A", 1.0, "N m/A"), ("mNm/A", 1e-3, "N m/A"), ("Nm s/rad", 1.0, "N m s/rad"), ("g cm^2", 1e-7, "kg m^2"),
-     ("rev/min", np.pi / 30, "rad/s"), ("oz in", 7.0615518e-3, "N m"), ("kgf cm", 0.0980665, "N m")],
-)  # fmt: skip
+    [
+        ("N m/A", 1.0, "N m/A"),
+        ("mNm/A", 1e-3, "N m/A"),
+        ("Nm s/rad", 1.0, "N m s/rad"),
+        ("g cm^2", 1e-7, "kg m^2"),
+        ("rev/min", np.pi / 30, "rad/s"),
+        ("oz in", 7.0615518e-3, "N m"),
+        ("kgf cm", 0.0980665, "N m"),
+    ],
+)
 def test_units_of_what_turns(text, scale, si):
     unit = parse_unit(text)
     assert unit.scale == pytest.approx(scale, rel=1e-7)
@@ -443,8 +458,9 @@ def test_the_motion_proposed_tells_what_the_log_did_not(written, tmp_path, monke
     size = 2 * np.pi / 2**14
     followed = ss.Record.of(
         {"theta": np.round(angle / size) * size, "force": motor, "reference": reference[:-1]},
-        fs=1000.0, units={"force": "N m", "reference": "rad"},
-    )  # fmt: skip
+        fs=1000.0,
+        units={"force": "N m", "reference": "rad"},
+    )
     regression = regress_joint(followed)
     assert not regression.left_out
     for name, value in {"forward": 0.05, "back": 0.06, "load": 0.2, "viscous": 0.03, "inertia": 0.03}.items():

@@ -175,8 +175,11 @@ def test_a_slider_follows_a_value_in_another_unit(page: Page, lab: Lab) -> None:
     number.fill("0.25 lbf")
     number.press("Tab")
     place = 500 + 500 * np.log10(0.25 * 4.4482216152605 / 1.1)
-    page.wait_for_function("([knob, place]) => Math.abs(document.querySelector(knob).value - place) < 1",
-                           arg=[KINETIC, place], timeout=PATIENCE)  # fmt: skip
+    page.wait_for_function(
+        "([knob, place]) => Math.abs(document.querySelector(knob).value - place) < 1",
+        arg=[KINETIC, place],
+        timeout=PATIENCE,
+    )
     assert slider.get_attribute("aria-valuetext") == "1.11206 N"
     frequency = page.locator("#drive-frequency")
     frequency.fill("180 rpm")

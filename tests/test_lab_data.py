@@ -103,10 +103,12 @@ def written(folder: Path, ending: str) -> Path:
     elif ending == ".tdms":
         told = {"wf_increment": 1 / FS, "wf_samples": len(x)}
         with TdmsWriter(path) as writer:
-            writer.write_segment([
-                ChannelObject("rig", name, values, properties={**told, "unit_string": unit})
-                for name, values, unit in (("x", x, "m"), ("friction", friction, "N"))
-            ])  # fmt: skip
+            writer.write_segment(
+                [
+                    ChannelObject("rig", name, values, properties={**told, "unit_string": unit})
+                    for name, values, unit in (("x", x, "m"), ("friction", friction, "N"))
+                ]
+            )
     elif ending == ".uff":
         sets = [uff_set(1, "x", x, "m"), uff_set(2, "friction", friction, "N")]
         pyuff.UFF(str(path)).write_sets(sets, mode="add")
@@ -130,12 +132,25 @@ LVM_HEAD = (
 
 def uff_set(node: int, name: str, values: np.ndarray, unit: str) -> dict[str, Any]:
     return pyuff.prepare_58(
-        binary=0, func_type=1, rsp_node=node, rsp_dir=3, ref_dir=0, ref_node=0, data=values,
-        x=np.arange(len(values)) / FS, id1=name, rsp_ent_name=name, ref_ent_name="NONE",
-        abscissa_spacing=1, abscissa_spec_data_type=17,
-        abscissa_axis_units_lab="s", ordinate_spec_data_type=12, ordinate_axis_units_lab=unit,
-        orddenom_spec_data_type=0, z_axis_spec_data_type=0,
-    )  # fmt: skip
+        binary=0,
+        func_type=1,
+        rsp_node=node,
+        rsp_dir=3,
+        ref_dir=0,
+        ref_node=0,
+        data=values,
+        x=np.arange(len(values)) / FS,
+        id1=name,
+        rsp_ent_name=name,
+        ref_ent_name="NONE",
+        abscissa_spacing=1,
+        abscissa_spec_data_type=17,
+        abscissa_axis_units_lab="s",
+        ordinate_spec_data_type=12,
+        ordinate_axis_units_lab=unit,
+        orddenom_spec_data_type=0,
+        z_axis_spec_data_type=0,
+    )
 
 
 ENDINGS = (".csv", ".txt", ".h5", ".parquet", ".mat", ".tdms", ".uff", ".wav", ".lvm", ".json")
@@ -273,10 +288,14 @@ def test_files_of_one_record_are_read_together(client: Client, tmp_path: Path) -
 
 @pytest.mark.parametrize(
     ("name", "contents"),
-    [("run.tdms", b"TDSm" + b"\xff" * 300), ("run.csv", b"\x00\x01\x02\xff" * 100),
-     ("run.mat", b"MATLAB 5.0" + b"?" * 500), ("run.json", b"[" * 100_000),
-     ("run.h5", b"\x89HDF\r\n\x1a\n" + b"\x00" * 600)],
-)  # fmt: skip
+    [
+        ("run.tdms", b"TDSm" + b"\xff" * 300),
+        ("run.csv", b"\x00\x01\x02\xff" * 100),
+        ("run.mat", b"MATLAB 5.0" + b"?" * 500),
+        ("run.json", b"[" * 100_000),
+        ("run.h5", b"\x89HDF\r\n\x1a\n" + b"\x00" * 600),
+    ],
+)
 def test_a_bad_file_is_one_sentence_with_its_own_name(client: Client, name: str, contents: bytes) -> None:
     answer = client.post("/files", params={"name": name}, content=contents)
     result = ended(client, ask(client, "describe", answer.json()["id"]))
@@ -391,10 +410,14 @@ def test_a_worker_that_fails_is_one_message_to_one_user(
 
 @pytest.mark.parametrize(
     "deed",
-    ["import socket; socket.create_connection(('127.0.0.1', 9))", "import os; os.system('true')",
-     "import subprocess; subprocess.run(['true'])", "import os; os.fork()",
-     "import urllib.request; urllib.request.urlopen('http://127.0.0.1:9')"],
-)  # fmt: skip
+    [
+        "import socket; socket.create_connection(('127.0.0.1', 9))",
+        "import os; os.system('true')",
+        "import subprocess; subprocess.run(['true'])",
+        "import os; os.fork()",
+        "import urllib.request; urllib.request.urlopen('http://127.0.0.1:9')",
+    ],
+)
 def test_an_analysis_reaches_no_network_and_starts_no_program(deed: str) -> None:
     begin = "from stickslip.lab.task import limit; limit(memory=1 << 30, processor=5, written=1 << 20)"
     code = f"{begin}\ntry:\n    {deed}\nexcept OSError as error:\n    print(error)"
@@ -520,11 +543,15 @@ def test_the_example_is_there_to_try(client: Client) -> None:
 
 @pytest.mark.parametrize(
     ("change", "field"),
-    [({"question": "rm -rf"}, "question"), ({"records": []}, "records"),
-     ({"records": [["../../etc/passwd"]]}, "records"),
-     ({"reading": {"config": "/etc/passwd"}}, "reading.config"), ({"options": {"output": "/tmp"}}, "output"),
-     ({"options": {"mass": float("1e400")}}, "mass")],
-)  # fmt: skip
+    [
+        ({"question": "rm -rf"}, "question"),
+        ({"records": []}, "records"),
+        ({"records": [["../../etc/passwd"]]}, "records"),
+        ({"reading": {"config": "/etc/passwd"}}, "reading.config"),
+        ({"options": {"output": "/tmp"}}, "output"),
+        ({"options": {"mass": float("1e400")}}, "mass"),
+    ],
+)
 def test_a_question_that_makes_no_sense_is_refused_with_its_field(
     client: Client, change: dict[str, Any], field: str
 ) -> None:

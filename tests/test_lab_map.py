@@ -68,8 +68,13 @@ def test_borders_are_refined_to_where_they_are(parts: list[tuple[dict[str, Any],
     cells = [arrays for header, arrays in parts if header["level"] == "fine"]
     assert cells
     b, border = next(each[::2] for each in ss.scenarios.grid("DH-2")["boundary"] if each[:2] == [1.1, 0.0])
-    column = [(y, value) for arrays in cells for i, x in enumerate(arrays["x"]) if abs(2 * math.pi * x - b) < 1e-9
-              for y, value in zip(arrays["y"], arrays["values"].reshape(9, -1)[i], strict=True)]  # fmt: skip
+    column = [
+        (y, value)
+        for arrays in cells
+        for i, x in enumerate(arrays["x"])
+        if abs(2 * math.pi * x - b) < 1e-9
+        for y, value in zip(arrays["y"], arrays["values"].reshape(9, -1)[i], strict=True)
+    ]
     slides, stops = max(y for y, value in column if value == 0), min(y for y, value in column if value > 0)
     assert slides <= border <= stops
     assert stops - slides == pytest.approx(0.14 / 8)
@@ -101,12 +106,16 @@ def test_a_map_can_be_cancelled_and_another_asked(client: TestClient) -> None:
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        ({"x": None}, "x has a name"), ({"x": {**ASKED["x"], "to": 0.0}}, "from a number to a larger one"),
-        ({"y": {**ASKED["y"], "count": 10_000}}, "2 to 64 points"), ({"measure": "beauty"}, "beauty"),
-        ({"x": {**ASKED["y"]}}, "different"), ({"x": {**ASKED["x"], "name": "nobody"}}, "nobody"),
-        ({"state": {"system": 3}}, "system"), ({"x": {**ASKED["x"], "from": "a"}}, "x has a name"),
+        ({"x": None}, "x has a name"),
+        ({"x": {**ASKED["x"], "to": 0.0}}, "from a number to a larger one"),
+        ({"y": {**ASKED["y"], "count": 10_000}}, "2 to 64 points"),
+        ({"measure": "beauty"}, "beauty"),
+        ({"x": {**ASKED["y"]}}, "different"),
+        ({"x": {**ASKED["x"], "name": "nobody"}}, "nobody"),
+        ({"state": {"system": 3}}, "system"),
+        ({"x": {**ASKED["x"], "from": "a"}}, "x has a name"),
     ],
-)  # fmt: skip
+)
 def test_a_map_that_can_not_be_drawn_is_refused_in_one_sentence(client: TestClient, change: Any, words: str) -> None:
     header, _ = drawn(client, {**ASKED, **change})[-1]
     assert header["kind"] == "error"

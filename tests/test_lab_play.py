@@ -149,12 +149,15 @@ def test_a_state_may_hold_text_with_units(client: TestClient) -> None:
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        ({"law": {"name": "Coulomb", "kinetic": -1}}, "kinetic"), ({"system": {"mass": 0, "stiffness": 1}}, "mass"),
-        ({"law": {"name": "Nobody"}}, "Nobody"), ({"run": {"cycles": 1e6}}, "5000 cycles"),
+        ({"law": {"name": "Coulomb", "kinetic": -1}}, "kinetic"),
+        ({"system": {"mass": 0, "stiffness": 1}}, "mass"),
+        ({"law": {"name": "Nobody"}}, "Nobody"),
+        ({"run": {"cycles": 1e6}}, "5000 cycles"),
         ({"drive": {"name": "Recorded", "record": "/etc/passwd", "channel": "x"}}, "hold the samples"),
-        ({"law": {"name": "FrictionCurve", "curve": "__import__('os')"}}, "curve"), ({"nonsense": 1}, "nonsense"),
+        ({"law": {"name": "FrictionCurve", "curve": "__import__('os')"}}, "curve"),
+        ({"nonsense": 1}, "nonsense"),
     ],
-)  # fmt: skip
+)
 def test_what_the_library_refuses_is_told_in_its_sentence(client: TestClient, change: Any, words: str) -> None:
     header, _ = asked(client, "run", {**STATE, **change})
     assert header["kind"] == "error"

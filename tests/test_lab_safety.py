@@ -151,9 +151,16 @@ def test_a_report_runs_nothing_whatever_it_is_called(client: httpx.Client, tmp_p
 
 @pytest.mark.parametrize(
     "path",
-    ["/../pyproject.toml", "/%2e%2e/%2e%2e/server.py", "/..%2fserver.py", "//etc/passwd", "/jobs/../../etc/passwd",
-     "/jobs/%2e%2e%2f%2e%2e/report", "/vendor/../../server.py"],
-)  # fmt: skip
+    [
+        "/../pyproject.toml",
+        "/%2e%2e/%2e%2e/server.py",
+        "/..%2fserver.py",
+        "//etc/passwd",
+        "/jobs/../../etc/passwd",
+        "/jobs/%2e%2e%2f%2e%2e/report",
+        "/vendor/../../server.py",
+    ],
+)
 def test_no_path_leads_out_of_the_page(lab: Lab, path: str) -> None:
     with closing(http.client.HTTPConnection("127.0.0.1", lab.port)) as door:
         door.request("GET", path, headers=lab.headers)
@@ -344,9 +351,11 @@ def impatient(monkeypatch: pytest.MonkeyPatch) -> Iterator[int]:
         door.bind(("127.0.0.1", 0))
         door.listen()
         port = door.getsockname()[1]
-        app = Starlette(routes=[Route("/alive", reads), Route("/jobs", reads, methods=["POST"])],
-                        middleware=[Middleware(gate.Guard, token="t", port=port)],
-                        exception_handlers=lab_app(token="t", port=port).exception_handlers)  # fmt: skip
+        app = Starlette(
+            routes=[Route("/alive", reads), Route("/jobs", reads, methods=["POST"])],
+            middleware=[Middleware(gate.Guard, token="t", port=port)],
+            exception_handlers=lab_app(token="t", port=port).exception_handlers,
+        )
         server = uvicorn.Server(uvicorn.Config(app, http=PatientProtocol, lifespan="off", log_config=None))
         serving = threading.Thread(target=server.run, kwargs={"sockets": [door]})
         serving.start()

@@ -180,13 +180,19 @@ def test_what_is_too_large_is_refused_while_it_streams(client: TestClient) -> No
 @pytest.mark.parametrize(
     ("method", "path", "body", "status"),
     [
-        ("GET", "/nothing", None, 404), ("GET", "/../../etc/passwd", None, 404),
+        ("GET", "/nothing", None, 404),
+        ("GET", "/../../etc/passwd", None, 404),
         ("GET", "/%2e%2e/server.py", None, 404),
-        ("DELETE", "/alive", None, 405), ("GET", "/scenarios/nope", None, 422), ("POST", "/export", b"{", 400),
-        ("POST", "/export", b"[" * 100_000, 400), ("POST", "/export", b"[]", 422), ("POST", "/export", b"{}", 422),
-        ("POST", "/open", b"\xff\xfe", 422), ("POST", "/open", b"a = .3", 422),
+        ("DELETE", "/alive", None, 405),
+        ("GET", "/scenarios/nope", None, 422),
+        ("POST", "/export", b"{", 400),
+        ("POST", "/export", b"[" * 100_000, 400),
+        ("POST", "/export", b"[]", 422),
+        ("POST", "/export", b"{}", 422),
+        ("POST", "/open", b"\xff\xfe", 422),
+        ("POST", "/open", b"a = .3", 422),
     ],
-)  # fmt: skip
+)
 def test_what_has_no_answer_gets_one_sentence(
     client: TestClient, method: str, path: str, body: Any, status: int
 ) -> None:

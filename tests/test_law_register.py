@@ -141,8 +141,9 @@ def test_it_is_fitted() -> None:
     fit = ss.fit_law(measured(), slider(AsymmetricCoulomb(1.0, back=1.0)))
     own = {name: each for name, each in fit.parameters.items() if name in ("forward", "back")}
     assert {name: each.name for name, each in own.items()} == {
-        "forward": "sliding friction forward", "back": "sliding friction back",
-    }  # fmt: skip
+        "forward": "sliding friction forward",
+        "back": "sliding friction back",
+    }
     assert {each.unit for each in own.values()} == {"N"}
     # an offset of x is the same as a difference between the two, so that the records tell their mean
     assert (fit.law.forward + fit.law.back) / 2 == pytest.approx(1.0, rel=5e-3)
@@ -254,9 +255,11 @@ def test_the_lab_has_a_form_for_it() -> None:
         "Rigid dry friction with a level of its own in each direction.",
     )
     assert form["parameters"][1] == {
-        "name": "back", "label": "sliding friction back", "unit": "N",
+        "name": "back",
+        "label": "sliding friction back",
+        "unit": "N",
         "words": "against motion to negative x",
-    }  # fmt: skip
+    }
 
 
 def test_the_pages_have_a_row_for_it(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -149,9 +149,12 @@ def _state_variable(seed: int) -> tuple[ss.Oscillator, dict[str, float], float]:
         ss.drives.Release(),
     ][seed % 4]
     system = ss.Oscillator(
-        mass, stiffness, ss.laws.StateVariable(level, 10.0 ** draw.uniform(0, 3) * natural / level), drive,
+        mass,
+        stiffness,
+        ss.laws.StateVariable(level, 10.0 ** draw.uniform(0, 3) * natural / level),
+        drive,
         damping=2 * math.sqrt(stiffness * mass) * float(draw.choice([0.0, 0.01, 0.1])),
-    )  # fmt: skip
+    )
     return system, {"x": level / stiffness * 10.0 ** draw.uniform(0, 1.5)} if seed % 4 == 3 else {}, 1 / natural
 
 

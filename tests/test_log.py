@@ -43,9 +43,13 @@ def test_what_is_derived_keeps_it(record: ss.Record) -> None:
 
 @pytest.mark.parametrize(
     ("entry", "value", "said"),
-    [("humidity", "140 %", "0 to 100 %"), ("temperature", "-300 °C", "not below zero"), ("surface", 3, "in words"),
-     ("weather", "fine", "a log has surface")],
-)  # fmt: skip
+    [
+        ("humidity", "140 %", "0 to 100 %"),
+        ("temperature", "-300 °C", "not below zero"),
+        ("surface", 3, "in words"),
+        ("weather", "fine", "a log has surface"),
+    ],
+)
 def test_what_has_no_meaning_is_refused(entry: str, value: object, said: str) -> None:
     with pytest.raises(ss.errors.RecordError, match=said):
         Log.of({entry: value})

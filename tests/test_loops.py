@@ -165,8 +165,9 @@ def test_artefacts_at_reversals_have_no_say():
 def test_motion_that_does_not_repeat_is_cut_at_its_onsets():
     rng = np.random.default_rng(4)
     legs = rng.uniform(0.3, 1.1, 24)
-    v = np.concatenate([(-1) ** i * 0.05 * np.sin(np.pi * np.arange(round(leg * FS)) / (leg * FS)) for i, leg in
-                        enumerate(legs)])  # fmt: skip
+    v = np.concatenate(
+        [(-1) ** i * 0.05 * np.sin(np.pi * np.arange(round(leg * FS)) / (leg * FS)) for i, leg in enumerate(legs)]
+    )
     x = np.cumsum(v) / FS + 1e-6 * rng.standard_normal(v.size)
     friction = 2.0 * np.sign(v) + 0.05 * rng.standard_normal(v.size)
     loops = friction_loops(Record.of({"x": x, "friction": friction}, fs=FS))
@@ -303,8 +304,11 @@ def test_frame_on_a_shaken_base(dataset, weight, level):
 
 def test_demonstration_record_holds_its_truth():
     record = datasets.demo()
-    loops = friction_loops(friction_force(record, mass=record.truth["mass"], stiffness=record.truth["stiffness"],
-                                          damping=record.truth["damping"]))  # fmt: skip
+    loops = friction_loops(
+        friction_force(
+            record, mass=record.truth["mass"], stiffness=record.truth["stiffness"], damping=record.truth["damping"]
+        )
+    )
     assert loops.level.value == pytest.approx(1.1, rel=0.02)
     assert loops.frequency.value == pytest.approx(2.5, rel=1e-4)
     assert loops.energy_per_cycle.value == pytest.approx(record.truth["energy per cycle"], rel=0.02)

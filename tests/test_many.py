@@ -34,8 +34,14 @@ def written(count: int = COUNT) -> None:
         rng = np.random.default_rng(number)
         force = (1 + number / 10) * np.sign(np.cos(2 * np.pi * TIME)) + 0.01 * rng.standard_normal(TIME.size)
         rows = np.column_stack([TIME, 0.01 * np.sin(2 * np.pi * TIME), force])
-        np.savetxt(f"run_{number:02d}.csv", rows[: 19 if number == count - 1 else None], delimiter=",",
-                   header="t [s],x [m],friction [N]", comments="", fmt="%.7g")  # fmt: skip
+        np.savetxt(
+            f"run_{number:02d}.csv",
+            rows[: 19 if number == count - 1 else None],
+            delimiter=",",
+            header="t [s],x [m],friction [N]",
+            comments="",
+            fmt="%.7g",
+        )
     shutil.copy("run_00.csv", f"run_{count - 2:02d}.csv")
 
 

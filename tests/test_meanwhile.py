@@ -94,8 +94,10 @@ def test_python_runs_what_the_compiled_kernels_do(name: str, count: int, uncompi
     assert signatures == (len(kernel.march.signatures), len(kernel.course.signatures))  # none is compiled anew
     assert count < 10**6 or compiled.meanwhile._ready.isdisjoint((kernel.march, kernel.course))
     assert (run.modes.tolist(), run.exits.tolist(), run.status) == (
-        whole.modes.tolist(), whole.exits.tolist(), whole.status
-    )  # fmt: skip
+        whole.modes.tolist(),
+        whole.exits.tolist(),
+        whole.status,
+    )
     np.testing.assert_allclose(run.starts, whole.starts, rtol=1e-12, atol=1e-12)
     largest = np.abs(expected).max(axis=1, keepdims=True)
     assert np.max(np.abs(values - expected) / largest) < 1e-12

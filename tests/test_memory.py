@@ -98,7 +98,7 @@ def shaken(law: object, hz: float, base: float, *, noise: float = 0.0) -> Record
     """A slider shaken slowly, where a rigid contact sticks, or fast; 8 cycles, run in."""
     slider = ss.Oscillator(
         mass=2.42, stiffness=2310, damping=0.12, law=law, drive=ss.drives.HarmonicBase(base, frequency=hz)
-    )  # fmt: skip
+    )
     run = ss.simulate(slider, cycles=12).record(fs=4000)
     run, rng = run.rows(round(4000 * 4 / hz), len(run)), np.random.default_rng(1)
     x, friction = (run[name] + noise * np.ptp(run[name]) * rng.standard_normal(len(run)) for name in ("x", "friction"))

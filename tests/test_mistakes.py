@@ -296,9 +296,11 @@ def _correct(rng: np.random.Generator) -> Amplitudes:
     friction = 10 ** rng.uniform(-2, 0) * stiffness * base * min(1, abs(1 - r * r) + 0.2)
     soft = {"stiffness": stiffness * 10 ** rng.uniform(0, 3), "damping": 0.025 * critical}
     law = [
-        ss.laws.Coulomb(friction), ss.laws.Coulomb(friction, static=1.3 * friction),
-        ss.laws.CompliantContact(friction, **soft), ss.laws.CompliantContact(5 * stiffness * base, **soft),
-    ][rng.integers(4)]  # fmt: skip
+        ss.laws.Coulomb(friction),
+        ss.laws.Coulomb(friction, static=1.3 * friction),
+        ss.laws.CompliantContact(friction, **soft),
+        ss.laws.CompliantContact(5 * stiffness * base, **soft),
+    ][rng.integers(4)]
     drive = ss.drives.HarmonicBase(base, frequency)
     slider = ss.Oscillator(mass=mass, stiffness=stiffness, damping=damping, law=law, drive=drive)
     time = (np.arange(1024) / 256 + 35) / frequency

@@ -50,9 +50,16 @@ def by_scipy(p: np.ndarray, pendulum: bool) -> np.ndarray:
 
         turning.terminal, turning.direction = True, 1
         run = solve_ivp(
-            rates, (0, 10), [top, -1e-300], method="DOP853", rtol=1e-12, atol=1e-14, events=turning, dense_output=True,
+            rates,
+            (0, 10),
+            [top, -1e-300],
+            method="DOP853",
+            rtol=1e-12,
+            atol=1e-14,
+            events=turning,
+            dense_output=True,
             max_step=0.1 / w,
-        )  # fmt: skip
+        )
         length, end = run.t_events[0][0], run.y_events[0][0][0]
         rows = (start < TIMES) & (start + length >= TIMES)
         if rows.any():

@@ -46,15 +46,22 @@ def test_every_figure_of_the_demonstration_is_drawn_once_without_pyplot(demo: Fi
     before = dict(mpl.rcParams)
     plates = summary(demo).plates
     assert [plate.name for plate in plates] == [
-        "friction-velocity", "friction-displacement", "record", "close-up", "force-balance", "sticks"
-    ]  # fmt: skip
+        "friction-velocity",
+        "friction-displacement",
+        "record",
+        "close-up",
+        "force-balance",
+        "sticks",
+    ]
     assert dict(mpl.rcParams) == before, "the user's own settings stay as they were"
     for plate in plates:
         assert isinstance(plate.figure, Figure)
         assert plate.figure.canvas.manager is None, "not known to pyplot"
         assert plate.caption.endswith(".")
-        assert all(axes.get_xlabel() or axes.get_shared_x_axes().joined(axes, plate.figure.axes[-1])
-                   for axes in plate.figure.axes)  # fmt: skip
+        assert all(
+            axes.get_xlabel() or axes.get_shared_x_axes().joined(axes, plate.figure.axes[-1])
+            for axes in plate.figure.axes
+        )
 
 
 def test_a_stick_or_slip_that_the_record_cuts_is_not_counted(demo: Findings, plates: tuple[Plate, ...]) -> None:
@@ -148,9 +155,13 @@ def test_each_term_of_the_balance_is_drawn_as_itself(damper: str) -> None:
 
 def test_a_balance_by_all_sensors_with_the_damper_on_the_base_is_drawn() -> None:
     slider = ss.Oscillator(
-        mass=2.0, stiffness=800, damping=4.0, damper="base", law=ss.laws.Coulomb(1.0),
+        mass=2.0,
+        stiffness=800,
+        damping=4.0,
+        damper="base",
+        law=ss.laws.Coulomb(1.0),
         drive=ss.drives.HarmonicBase(4e-3, frequency=2.0),
-    )  # fmt: skip
+    )
     rig = ss.Rig.perfect("x", "z", "a").having("x", white=1e-6)
     record = rig.measure(ss.simulate(slider, duration=3), fs=1000, rng=1)
     constants = {"mass": 2.0, "stiffness": 800, "damping": 4.0, "damper": "base"}
@@ -232,10 +243,22 @@ def test_thinning_keeps_both_ends(count: int, limit: int) -> None:
 
 @pytest.mark.parametrize(
     ("peak", "unit", "shown"),
-    [(0.0123, "m", "mm"), (2e-5, "m/s", "µm/s"), (0.3, "N", "N"), (4500.0, "N", "kN"), (0.002, "J", "mJ"),
-     (120.0, "s", "s"), (0.5, "rad", "rad"), (2.0, "m/s^2", "m/s²"), (0.0, "m", "m"), (0.29, "1", "1"),
-     (199014.0, "N/m", "N/m"), (4.2e6, "N/m", "MN/m"), (15656605923.0, "N/m", "GN/m")],
-)  # fmt: skip
+    [
+        (0.0123, "m", "mm"),
+        (2e-5, "m/s", "µm/s"),
+        (0.3, "N", "N"),
+        (4500.0, "N", "kN"),
+        (0.002, "J", "mJ"),
+        (120.0, "s", "s"),
+        (0.5, "rad", "rad"),
+        (2.0, "m/s^2", "m/s²"),
+        (0.0, "m", "m"),
+        (0.29, "1", "1"),
+        (199014.0, "N/m", "N/m"),
+        (4.2e6, "N/m", "MN/m"),
+        (15656605923.0, "N/m", "GN/m"),
+    ],
+)
 def test_units_are_chosen_to_be_read(peak: float, unit: str, shown: str) -> None:
     assert prefixed(peak, unit)[1] == shown
 

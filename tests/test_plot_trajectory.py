@@ -40,8 +40,12 @@ def test_every_figure_is_drawn_without_pyplot(sticking: Trajectory) -> None:
     before = dict(mpl.rcParams)
     plates = summary(sticking).plates
     assert [plate.name for plate in plates] == [
-        "whole-run", "motion", "friction-displacement", "friction-velocity", "phase-portrait"
-    ]  # fmt: skip
+        "whole-run",
+        "motion",
+        "friction-displacement",
+        "friction-velocity",
+        "phase-portrait",
+    ]
     assert dict(mpl.rcParams) == before
     for plate, again in zip(plates, summary(sticking).plates, strict=True):
         assert plate.figure.canvas.manager is None
@@ -178,9 +182,13 @@ def test_each_contact_has_its_own_loop_and_shades() -> None:
     run = ss.simulate(system, cycles=10)
     names = [plate.name for plate in summary(run).plates]
     assert names[2:] == [
-        "friction-displacement-1", "friction-velocity-1", "friction-displacement-2", "friction-velocity-2",
-        "phase-portrait-x1", "phase-portrait-x2",
-    ]  # fmt: skip
+        "friction-displacement-1",
+        "friction-velocity-1",
+        "friction-displacement-2",
+        "friction-velocity-2",
+        "phase-portrait-x1",
+        "phase-portrait-x2",
+    ]
     line = next(line for line in plot_loop(run, contact=1).get_lines() if line.get_label() == "last cycle")
     assert np.abs(np.asarray(line.get_ydata(), dtype=float)).max() == pytest.approx(0.2, rel=1e-9)
     assert len(stretches(run, "stick", first=0, last=run.duration, contact=1)) == 0

@@ -68,10 +68,18 @@ def reference(system: ss.Oscillator, speed: float, end: float) -> dict[str, floa
         y[1] = held if abs(held) < most else math.copysign(most + 1e-3, held)
 
 
-FORCED = [(ratio, law, 1e-2, ss.drives.HarmonicForce(1.2, f), 0.1, 1.2 / f)
-          for ratio, law, f in [(60, "aging", 0.05), (60, "slip", 0.15), (100, "slip", 0.05), (20, "aging", 0.1),
-                                (150, "aging", 0.05), (300, "aging", 0.05), (300, "slip", 0.15)]
-]  # fmt: skip
+FORCED = [
+    (ratio, law, 1e-2, ss.drives.HarmonicForce(1.2, f), 0.1, 1.2 / f)
+    for ratio, law, f in [
+        (60, "aging", 0.05),
+        (60, "slip", 0.15),
+        (100, "slip", 0.05),
+        (20, "aging", 0.1),
+        (150, "aging", 0.05),
+        (300, "aging", 0.05),
+        (300, "slip", 0.15),
+    ]
+]
 BELT = [(ratio, law, 1e-6, ss.drives.Belt(0.1), 0.0, 6.0) for ratio in (60, 300) for law in ("aging", "slip")]
 
 

@@ -45,12 +45,25 @@ def test_rows_share_the_samples_of_their_record() -> None:
 @pytest.mark.parametrize(
     "details",
     [
-        {"delay": math.nan}, {"delay": math.inf}, {"delay": "x"}, {"delay": None}, {"delay": True},
-        {"noise": -1.0}, {"noise": math.nan}, {"noise": "x"}, {"sensitivity": 5}, {"quantity": None},
-        {"gain_sd": -0.01}, {"gain_sd": math.nan}, {"gain_sd": 1.0}, {"gain_sd": "1 %"},
-        {"foo": 1}, {"name": "y"}, {"unit": "mm"},
+        {"delay": math.nan},
+        {"delay": math.inf},
+        {"delay": "x"},
+        {"delay": None},
+        {"delay": True},
+        {"noise": -1.0},
+        {"noise": math.nan},
+        {"noise": "x"},
+        {"sensitivity": 5},
+        {"quantity": None},
+        {"gain_sd": -0.01},
+        {"gain_sd": math.nan},
+        {"gain_sd": 1.0},
+        {"gain_sd": "1 %"},
+        {"foo": 1},
+        {"name": "y"},
+        {"unit": "mm"},
     ],
-)  # fmt: skip
+)
 def test_details_that_make_no_sense_are_refused(details: dict[str, Any]) -> None:
     with pytest.raises(ss.errors.RecordError):
         Record.of({"x": [1.0, 2.0]}, fs=1.0).with_details("x", **details)
@@ -128,7 +141,9 @@ def test_a_record_is_pickled_and_copied_read_only() -> None:
     for again in (pickle.loads(pickle.dumps(record)), copy.deepcopy(record)):
         assert (again["x"] == record["x"]).all()
         assert (dict(again.channels), again.history, again.truth) == (
-            dict(record.channels), record.history, record.truth,
-        )  # fmt: skip
+            dict(record.channels),
+            record.history,
+            record.truth,
+        )
         with pytest.raises(ValueError, match="read-only"):
             again["x"][0] = 1.0

@@ -244,9 +244,14 @@ def test_the_figures_show_what_was_found() -> None:
 
 def test_the_figures_tell_an_angle_in_radians() -> None:
     lever = ss.Structure(
-        [[1.0]], [[0.1]], [[1.0]], contacts=[ss.Contact(ss.laws.Coulomb(0.8), [1.0])], acts_on=[1.0], rotations=[1],
+        [[1.0]],
+        [[0.1]],
+        [[1.0]],
+        contacts=[ss.Contact(ss.laws.Coulomb(0.8), [1.0])],
+        acts_on=[1.0],
+        rotations=[1],
         drive=ss.drives.HarmonicForce(1.0, frequency=0.08),
-    )  # fmt: skip
+    )
     map_ = ss.figures.plot_basins(ss.basins(lever, grid={"x": [-1.0, 1.0], "v": [-1.0, 1.0]}))
     assert (map_.get_xlabel(), map_.get_ylabel()) == ("x [rad]", "v [rad/s]")
     diagram = ss.figures.plot_bifurcation(ss.bifurcation(lever, "drive.amplitude", values=[1.0, 1.2]))

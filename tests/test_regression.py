@@ -40,8 +40,11 @@ def test_truth_without_noise():
     assert regression.status == "ok"
     assert regression.explained == pytest.approx(regression.measured, abs=0.2)
     assert [regression.inertia.unit, regression.viscous.unit, regression.coulomb.unit, regression.offset.unit] == [
-        "kg", "N s/m", "N", "N",
-    ]  # fmt: skip
+        "kg",
+        "N s/m",
+        "N",
+        "N",
+    ]
 
 
 @pytest.mark.parametrize(("trials", "least"), [(15, 0.78), pytest.param(40, 0.85, marks=pytest.mark.soak)])

@@ -25,9 +25,12 @@ def rests(law: str, seed: int, *, roughness: float = 0.03, excess: float = EXCES
         speeds += [np.zeros(len(held)), side * sliding]
         friction += [side * held, side * curve * (1 + roughness * rough / rough.std())]
     return Rests.of(
-        factor * np.concatenate(speeds), factor * np.concatenate(friction), fs=FS,
-        frequency=2 * np.pi * FREQUENCY, unsure=0.0,
-    )  # fmt: skip
+        factor * np.concatenate(speeds),
+        factor * np.concatenate(friction),
+        fs=FS,
+        frequency=2 * np.pi * FREQUENCY,
+        unsure=0.0,
+    )
 
 
 @pytest.mark.parametrize("law", ["Coulomb", "static", "Stribeck"])

@@ -101,11 +101,20 @@ def test_the_page_asks_nothing_of_a_network(page: str) -> None:
 
 def test_the_page_tells_a_person_first_and_everything_after(page: str, demo: Findings) -> None:
     text = Page(page).text
-    places = [text.index(part) for part in (
-        "The contact slides against 1.1", "True value", "What else does it show?", "Which numbers were found, and how?",
-        "Friction against velocity", "Is anything wrong with the record?", "Which settings were used?",
-        "What was done, in order?", "Made by stickslip",
-    )]  # fmt: skip
+    places = [
+        text.index(part)
+        for part in (
+            "The contact slides against 1.1",
+            "True value",
+            "What else does it show?",
+            "Which numbers were found, and how?",
+            "Friction against velocity",
+            "Is anything wrong with the record?",
+            "Which settings were used?",
+            "What was done, in order?",
+            "Made by stickslip",
+        )
+    ]
     assert places == sorted(places)
     assert "mass 2.42" in text
     assert all(step.action in text for step in demo.record.history)
@@ -312,8 +321,9 @@ def test_few_cycles_are_told_once_and_last() -> None:
     ]
     wrong = Estimate.normal("four", 1.0, sd=0.1, unit="N", method="m", status="z has the wrong sign")
     assert doubts([*few, wrong]) == [
-        "Four: z has the wrong sign.", "One, two, three: only 6 to 7 cycles: the interval is crude.",
-    ]  # fmt: skip
+        "Four: z has the wrong sign.",
+        "One, two, three: only 6 to 7 cycles: the interval is crude.",
+    ]
     alone = replace(few[0], status=Status(Doubt.few(5, "turn")))
     assert doubts([alone]) == ["One: only 5 turns: the interval is crude."]
 

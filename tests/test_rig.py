@@ -150,9 +150,12 @@ def test_the_presets_are_the_rigs_of_the_thesis() -> None:
 
 def test_the_normal_direction_of_a_structure_is_heard() -> None:
     block = ss.Structure(
-        mass=np.diag([1.0, 1.0]), damping=np.diag([0.1, 0.1]), stiffness=np.diag([100.0, 400.0]), contacts=(),
+        mass=np.diag([1.0, 1.0]),
+        damping=np.diag([0.1, 0.1]),
+        stiffness=np.diag([100.0, 400.0]),
+        contacts=(),
         drive=ss.drives.Release(),
-    )  # fmt: skip
+    )
     motion = ss.simulate(block, start={"x1": 1e-2, "x2": 1e-2}, duration=2.0)
     rig = ss.Rig.linear_bearing().having("ay", of="a2", white=0.0).having("a", of="a1")
     record = rig.measure(motion, fs=10_000, rng=1)

@@ -100,10 +100,14 @@ def test_a_stop_of_a_millionth_of_a_period_is_seen() -> None:
         first = run.pieces[0]
         assert first.mode == "forward"
         late = ss.simulate(
-            ss.Oscillator(mass=1, stiffness=0, law=ss.laws.Coulomb(0.5, static=level),
-                          drive=ss.drives.HarmonicForce(1.0, 1 / period, -wait - 1e-6 * period)),
+            ss.Oscillator(
+                mass=1,
+                stiffness=0,
+                law=ss.laws.Coulomb(0.5, static=level),
+                drive=ss.drives.HarmonicForce(1.0, 1 / period, -wait - 1e-6 * period),
+            ),
             duration=period,
-        )  # fmt: skip
+        )
         assert late.pieces[0].mode == "stuck"
         assert late.pieces[0].duration == pytest.approx(1e-6 * period, rel=1e-9 if loaded > 1e-9 else 1e-4)
         assert late.pieces[1].mode == "forward"
@@ -113,8 +117,9 @@ def test_exits_at_one_instant_follow_the_law_s_order() -> None:
     """Two equal contacts of a symmetric structure break away and stop together, and stay equal."""
     drive = ss.drives.HarmonicForce(1.0, frequency=0.13)
     contacts = [ss.Contact(ss.laws.Coulomb(0.4, static=0.5), row) for row in ([1.0, 0.0], [0.0, 1.0])]
-    pair = ss.Structure(np.eye(2), 0.02 * np.eye(2), [[2.0, -0.5], [-0.5, 2.0]], contacts=contacts, drive=drive,
-                        acts_on=[1.0, 1.0])  # fmt: skip
+    pair = ss.Structure(
+        np.eye(2), 0.02 * np.eye(2), [[2.0, -0.5], [-0.5, 2.0]], contacts=contacts, drive=drive, acts_on=[1.0, 1.0]
+    )
     alone = ss.Oscillator(mass=1, stiffness=1.5, damping=0.02, law=ss.laws.Coulomb(0.4, static=0.5), drive=drive)
     run, one = ss.simulate(pair, cycles=5), ss.simulate(alone, cycles=5)
     times = np.linspace(0, run.duration, 2001)

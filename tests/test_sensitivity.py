@@ -37,9 +37,7 @@ def test_a_motion_changes_as_its_neighbours_differ(name: str, drive: Any) -> Non
         return system.having(**{name: value * (1 + share)})
 
     run = ss.simulate(system, duration=0.8, start=start)
-    told = sensitivity(
-        run, [moved(name, STEP) for name in free], step=STEP, starts={}, scaled=[], outputs=("x", "a")
-    )  # fmt: skip
+    told = sensitivity(run, [moved(name, STEP) for name in free], step=STEP, starts={}, scaled=[], outputs=("x", "a"))
     for k, parameter in enumerate(free):
         near = [ss.simulate(moved(parameter, share), duration=0.8, start=start) for share in (-1e-4, 1e-4)]
         for output in ("x", "a"):

@@ -104,9 +104,14 @@ def test_falling_friction_behind_a_contact_as_scipy_has_it() -> None:
     m, k, kinetic, static, slope, contact, damping = 1.3, 1.7, 0.5, 0.6, -0.1, 50.0, 0.6
     drive = HarmonicForce(1.2, frequency=0.13)
     run = simulate(
-        Oscillator(mass=m, stiffness=k, drive=drive,
-                   law=InSeries(LinearSlope(kinetic, slope=slope, static=static), contact, damping)), duration=60.0
-    )  # fmt: skip
+        Oscillator(
+            mass=m,
+            stiffness=k,
+            drive=drive,
+            law=InSeries(LinearSlope(kinetic, slope=slope, static=static), contact, damping),
+        ),
+        duration=60.0,
+    )
 
     def slips(y: np.ndarray, side: int) -> float:
         return float((contact * (y[0] - y[2]) + damping * y[1] - side * kinetic) / (slope + damping))

@@ -80,9 +80,12 @@ def test_a_contact_mass_with_two_fast_rates_is_split_where_both_are_behind(monke
     force, stiffness, damping = 26.555645105020904, 2297261522527.2607, 81806.7746916635
     light = laws.InertialContact(force, stiffness, 1.564546886139168e-06, damping)
     system = ss.Oscillator(
-        0.40396298776840983, 24642310.779102024, light, drives.HarmonicForce(120.11152897477314, 9.748099098479683),
+        0.40396298776840983,
+        24642310.779102024,
+        light,
+        drives.HarmonicForce(120.11152897477314, 9.748099098479683),
         damping=631.0176380369647,
-    )  # fmt: skip
+    )
     run = ss.simulate(system, duration=0.0096)
     assert run.table.settling
     assert ss.solve.energy(run).residual < 1e-9

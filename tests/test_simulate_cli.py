@@ -193,8 +193,11 @@ def test_the_moving_picture_shows_what_the_contact_does() -> None:
         for frame in range(0, 150, 5):
             picture.seek(frame)
             shown = np.asarray(picture.convert("RGB"))[30:150]
-            colours |= {name for name, colour in {"slip": (213, 94, 0), "stick": (0, 114, 178)}.items()
-                        if (np.abs(shown - np.array(colour)).max(axis=2) < 12).sum() > 1000}  # fmt: skip
+            colours |= {
+                name
+                for name, colour in {"slip": (213, 94, 0), "stick": (0, 114, 178)}.items()
+                if (np.abs(shown - np.array(colour)).max(axis=2) < 12).sum() > 1000
+            }
     assert colours == {"slip", "stick"}
 
 
@@ -261,8 +264,9 @@ def test_a_run_that_can_not_be_trusted_ends_with_1(monkeypatch: pytest.MonkeyPat
     monkeypatch.setattr(simulation, "simulate", trembling)
     result = run("FD-4")
     assert (result.exit_code, result.stderr) == (
-        1, "stickslip: too many events; a period has at most 10000; check the law.\n"
-    )  # fmt: skip
+        1,
+        "stickslip: too many events; a period has at most 10000; check the law.\n",
+    )
 
 
 @pytest.mark.figures

@@ -55,8 +55,10 @@ def test_the_four_conditions_show_the_four_observations() -> None:
     found = {condition.name: condition for condition in compared().conditions}
     assert compared().squeaking == ("wet, 6.13 N",)
     assert {name: each.trend for name, each in found.items() if name != "wet, 6.13 N"} == {
-        "dry, 6.13 N": "rises", "dry, 1.23 N": "rises", "wet, 1.23 N": "falls",
-    }  # fmt: skip
+        "dry, 6.13 N": "rises",
+        "dry, 1.23 N": "rises",
+        "wet, 1.23 N": "falls",
+    }
     assert found["wet, 6.13 N"].slope.value < 0
     for load in ("6.13 N", "1.23 N"):  # water lowers friction
         assert found[f"wet, {load}"].level.value < 0.5 * found[f"dry, {load}"].level.value
@@ -129,8 +131,9 @@ def test_bursts_that_are_not_told_are_counted_among_all() -> None:
     t = np.arange(int(FS)) / FS
     ring = np.where(t > 0.1, np.exp(-(t - 0.1) / 0.02), 0.0) * np.sin(2 * np.pi * 900 * t)
     pipe = np.sin(2 * np.pi * 800 * t) * np.exp(-(((t - 0.65) / 0.1) ** 2))
-    alone, both = (of_sound(each + 1e-4 * np.random.default_rng(0).standard_normal(t.size), "Pipe")
-                   for each in (pipe, ring + pipe))  # fmt: skip
+    alone, both = (
+        of_sound(each + 1e-4 * np.random.default_rng(0).standard_normal(t.size), "Pipe") for each in (pipe, ring + pipe)
+    )
     assert ss.summary(alone).headline[0].endswith("one tonal burst may be friction's, or not.")
     assert ss.summary(both).headline[0].endswith("of 2 tonal bursts 1 may be friction's, or not; the other one is not.")
 
@@ -174,8 +177,13 @@ def test_channels_without_a_tie_are_below_chance_as_often_as_said() -> None:
     rng = np.random.default_rng(1)
     t = np.arange(40_000) / FS
     gate = (t > 1) & (t < 3)
-    record = ss.Record.of({"sound": gate * np.sin(2 * np.pi * 500 * t) + 0.1 * rng.standard_normal(t.size),
-                           "a": rng.standard_normal(t.size)}, fs=FS)  # fmt: skip
+    record = ss.Record.of(
+        {
+            "sound": gate * np.sin(2 * np.pi * 500 * t) + 0.1 * rng.standard_normal(t.size),
+            "a": rng.standard_normal(t.size),
+        },
+        fs=FS,
+    )
     spectra = ss.squeak.burst_spectra(record)
     beyond = np.mean(spectra.coherence["a", "sound"][2:-2] > spectra.significant)
     assert 0.02 < beyond < 0.09

@@ -15,8 +15,9 @@ W1, W2 = 200 * math.pi, 150 * math.pi
 
 def inclined(friction: float = 0.3, preload: float = 10.0, **law: float) -> ss.Structure:
     """MC-1: two inclined springs and a contact spring on a belt."""
-    pad = ss.Contact(ss.laws.LinearSlope(friction, **{"slope": 0.0, **law}), [1, 0], normal=[0, 1], stiffness=11.0,
-                     preload=preload)  # fmt: skip
+    pad = ss.Contact(
+        ss.laws.LinearSlope(friction, **{"slope": 0.0, **law}), [1, 0], normal=[0, 1], stiffness=11.0, preload=preload
+    )
     stiffness = [[23.25, 3.8971143170299739], [3.8971143170299739, 7.75]]
     return ss.Structure(np.eye(2), np.zeros((2, 2)), stiffness, contacts=[pad], drive=ss.drives.Belt(1.0))
 
@@ -62,8 +63,9 @@ def test_damping_may_lower_the_threshold_of_coupling(
     assert found.frequency == pytest.approx(frequency, rel=1e-12)
 
 
-@pytest.mark.parametrize(("exponent", "band"), [(1.0, (0.0, 0.23025850929940457)),
-                                                (2.0, (0.0050125787690136614, 0.19084020979734697))])  # fmt: skip
+@pytest.mark.parametrize(
+    ("exponent", "band"), [(1.0, (0.0, 0.23025850929940457)), (2.0, (0.0050125787690136614, 0.19084020979734697))]
+)
 def test_a_falling_curve_feeds_motion_in_its_band(exponent: float, band: tuple[float, float]) -> None:
     """ST-1: c + F'(V) = 0 at its ends."""
     law = ss.laws.Stribeck(1.0, 1.5, speed=0.1, exponent=exponent, viscous=0.2)
@@ -211,7 +213,7 @@ def test_a_contact_that_would_lift_off_is_named() -> None:
         (lambda: ss.squeak.stability_map(inclined(), grid={}), "a map has values"),
         (lambda: ss.squeak.stability_map(inclined(), grid={"kinetic": []}), "a map has values"),
     ],
-)  # fmt: skip
+)
 def test_what_has_no_answer_is_refused(call: Any, words: str) -> None:
     with pytest.raises(ss.errors.ModelError) as refused:
         call()

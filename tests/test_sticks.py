@@ -107,8 +107,9 @@ def test_contact_on_the_base_sticks_while_carried():
     base = 0.02 * np.sin(2 * np.pi * t + 0.7)
     x = np.cumsum(v) / FS + base
     rng = np.random.default_rng(2)
-    record = Record.of({"x": x + 1e-6 * rng.standard_normal(x.size), "z": base + 1e-6 * rng.standard_normal(x.size)},
-                       fs=FS)  # fmt: skip
+    record = Record.of(
+        {"x": x + 1e-6 * rng.standard_normal(x.size), "z": base + 1e-6 * rng.standard_normal(x.size)}, fs=FS
+    )
     assert find_sticks(record, contact="base").share.value == pytest.approx(1 / 3, abs=0.03)
     assert find_sticks(record, contact="ground").share.value < 0.1
 

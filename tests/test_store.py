@@ -168,10 +168,16 @@ def named(measure: Any) -> Callable[..., float]:
 def test_the_checksum_is_the_same_in_every_process() -> None:
     code = "from test_store import *; print(checksum(held), checksum(named(partial(held, part=2.0))))"
     told = {
-        subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True,
-                       cwd=Path(__file__).parent, env={**os.environ, "PYTHONHASHSEED": seed}).stdout
+        subprocess.run(
+            [sys.executable, "-c", code],
+            check=True,
+            capture_output=True,
+            text=True,
+            cwd=Path(__file__).parent,
+            env={**os.environ, "PYTHONHASHSEED": seed},
+        ).stdout
         for seed in ("1", "2")
-    }  # fmt: skip
+    }
     assert told == {f"{checksum(held)} {checksum(named(partial(held, part=2.0)))}\n"}
 
 

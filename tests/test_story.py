@@ -36,9 +36,18 @@ def test_results_json_of_a_record_keeps_its_keys() -> None:
     way = np.linspace(0, 6 * np.pi, 600)
     findings = ss.analyze(ss.Record.of({"x": np.sin(way), "friction": np.sign(np.cos(way))}, fs=100))
     assert set(ss.summary(findings).data()) == {
-        "name", "faults", "contradiction", "settings", "normal_load", "log", "estimates", "regression_residual",
-        "truth", "notes", "history",
-    }  # fmt: skip
+        "name",
+        "faults",
+        "contradiction",
+        "settings",
+        "normal_load",
+        "log",
+        "estimates",
+        "regression_residual",
+        "truth",
+        "notes",
+        "history",
+    }
     assert set(ss.summary([LEVEL]).data()) == {"estimates"}
 
 

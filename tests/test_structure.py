@@ -73,9 +73,12 @@ def test_one_degree_of_freedom_is_the_oscillator(law: Law, drive: Drive) -> None
 def test_what_is_not_coupled_does_not_know_of_each_other(laws: tuple[Law, Law]) -> None:
     drive = HarmonicForce(1.2, frequency=0.13)
     both = Structure(
-        np.diag([1.3, 0.7]), np.diag([0.03, 0.05]), np.diag([1.7, 2.9]), drive=drive,
+        np.diag([1.3, 0.7]),
+        np.diag([0.03, 0.05]),
+        np.diag([1.7, 2.9]),
+        drive=drive,
         contacts=[Contact(laws[0], [1, 0]), Contact(laws[1], [0, 1])],
-    )  # fmt: skip
+    )
     run = simulate(both, duration=60)
     for j, (m, c, k) in enumerate(((1.3, 0.03, 1.7), (0.7, 0.05, 2.9))):
         alone = simulate(Oscillator(mass=m, stiffness=k, damping=c, law=laws[j], drive=drive), duration=60)
@@ -93,8 +96,13 @@ def test_stops_are_counted_at_each_contact() -> None:
         HarmonicForce(1.0, frequency=0.1 / (2 * math.pi)),
         (Coulomb(0.4), CompliantContact(0.5, stiffness=50.0)),
     )
-    both = Structure(np.eye(2), np.zeros((2, 2)), np.eye(2), drive=drive,
-                     contacts=[Contact(laws[0], [1, 0]), Contact(laws[1], [0, 1])])  # fmt: skip
+    both = Structure(
+        np.eye(2),
+        np.zeros((2, 2)),
+        np.eye(2),
+        drive=drive,
+        contacts=[Contact(laws[0], [1, 0]), Contact(laws[1], [0, 1])],
+    )
     orbit = steady_state(both)
     for contact, law in enumerate(laws):
         alone = steady_state(Oscillator(mass=1, stiffness=1, law=law, drive=drive))
@@ -142,11 +150,14 @@ def some_structure(seed: int) -> Structure:
         follows = rng.random() < 0.6
         contacts.append(
             Contact(
-                laws[int(rng.integers(2))], rng.normal(size=size) if rng.random() < 0.5 else np.eye(size)[j],
-                normal=rng.normal(size=size) if follows else None, stiffness=rng.uniform(0.5, 5) if follows else 0.0,
-                preload=rng.uniform(0.2, 1.0), carried=rng.uniform(-1, 1),
+                laws[int(rng.integers(2))],
+                rng.normal(size=size) if rng.random() < 0.5 else np.eye(size)[j],
+                normal=rng.normal(size=size) if follows else None,
+                stiffness=rng.uniform(0.5, 5) if follows else 0.0,
+                preload=rng.uniform(0.2, 1.0),
+                carried=rng.uniform(-1, 1),
             )
-        )  # fmt: skip
+        )
     drives: list[Drive] = [
         Belt(0.3),
         HarmonicForce(1.0, frequency=0.2),
@@ -311,10 +322,12 @@ def test_rounding_does_not_decide_which_contacts_let_go() -> None:
                 stiffness=26.42518335, preload=0.68725912, carried=-1.0),
     ]  # fmt: skip
     system = Structure(
-        [[0.79583862, -0.88669992], [-0.88669992, 2.43713904]], np.zeros((2, 2)),
-        [[3.49942177, 1.29017092], [1.29017092, 2.02142097]], contacts=contacts,
+        [[0.79583862, -0.88669992], [-0.88669992, 2.43713904]],
+        np.zeros((2, 2)),
+        [[3.49942177, 1.29017092], [1.29017092, 2.02142097]],
+        contacts=contacts,
         drive=MultiTone([(1.0, 0.2, 0.0), (0.3, 3.0, 1.0)], on="face"),
-    )  # fmt: skip
+    )
     run = simulate(system, duration=10.0)
     assert run.pieces[0].mode == "stuck + back"
     friction, load, slip = (run.sample([1e-6], (name,))[0][:, 0] for name in ("friction", "load", "slip"))
@@ -345,9 +358,10 @@ def test_hard_structures_never_hang(seed: int) -> None:
                 np.eye(size)[j] if rng.random() < 0.3 else rng.normal(size=size),
                 normal=rng.normal(size=size) if follows else None,
                 stiffness=10 ** rng.uniform(-1, 3) if follows else 0.0,
-                preload=rng.uniform(0.1, 2), carried=float(rng.choice([0, 1, -1])),
+                preload=rng.uniform(0.1, 2),
+                carried=float(rng.choice([0, 1, -1])),
             )
-        )  # fmt: skip
+        )
     system = Structure(
         mass, -0.2 * damping if seed % 7 == 0 else damping, stiffness, contacts=contacts, drive=DRIVES[seed % 6]
     )
@@ -396,7 +410,7 @@ STATE = StateVariable(1.1, rate=2.0)
         (lambda: simulate(Structure(**GOOD), duration=1.0, start={"x3": 1.0}), "x3"),
         (lambda: simulate(Structure(**{**GOOD, "stiffness": np.zeros((2, 2))}), cycles=1), "no cycles"),
     ],
-)  # fmt: skip
+)
 def test_what_has_no_meaning_is_refused(call: Any, words: str) -> None:
     with pytest.raises(ModelError) as refused:
         call()

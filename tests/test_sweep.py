@@ -43,8 +43,13 @@ def test_amplitudes_are_den_hartogs() -> None:
 
 
 def test_a_map_is_its_points_one_by_one() -> None:
-    swept = ss.sweep(RIGID, {"frequency": [2.5, 5.61], "kinetic": [0.9, 1.1]}, settle=300, cycles=10,
-                     measures=["stops", "amplitude", "stick_share", "period", "multipliers"])  # fmt: skip
+    swept = ss.sweep(
+        RIGID,
+        {"frequency": [2.5, 5.61], "kinetic": [0.9, 1.1]},
+        settle=300,
+        cycles=10,
+        measures=["stops", "amplitude", "stick_share", "period", "multipliers"],
+    )
     for f in (2.5, 5.61):
         for level in (0.9, 1.1):
             orbit, here = (
@@ -59,8 +64,13 @@ def test_a_map_is_its_points_one_by_one() -> None:
 
 def test_micro_slips_and_transition_speed_are_those_of_the_contact() -> None:
     """Thesis, the 2.5 Hz case: two micro-slips in each of two sticks a cycle."""
-    swept = ss.sweep(COMPLIANT, {"kinetic": [1.1]}, settle=20, cycles=4,
-                     measures=["micro_slips", "transition_speed", "energy", "stick_share"])  # fmt: skip
+    swept = ss.sweep(
+        COMPLIANT,
+        {"kinetic": [1.1]},
+        settle=20,
+        cycles=4,
+        measures=["micro_slips", "transition_speed", "energy", "stick_share"],
+    )
     orbit = ss.steady_state(COMPLIANT)
     assert float(swept.micro_slips[0]) == 4
     assert float(swept.transition_speed[0]) == pytest.approx(orbit.transition_speed, rel=1e-9)

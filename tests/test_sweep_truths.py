@@ -25,9 +25,12 @@ pytest.importorskip("xarray")
 CIRCLE = 2 * math.pi
 SHAW = 0.72697564257968176  # friction over force at which sliding begins to stick, b = 0.8, static 1.5 of kinetic
 STRIBECK = ss.Oscillator(
-    mass=1, stiffness=1, damping=0.3, drive=ss.drives.Belt(0.1),
+    mass=1,
+    stiffness=1,
+    damping=0.3,
+    drive=ss.drives.Belt(0.1),
     law=ss.laws.Stribeck(kinetic=1.0, static=1.5, speed=0.1, exponent=2.0, viscous=0.2),
-)  # fmt: skip
+)
 BAND = (0.0050125787690136614, 0.19084020979734697)  # belt speeds [m/s] between which its steady sliding is lost
 CHAOS = ss.scenarios.get("FM-1").system
 STUCK = ss.scenarios.get("FM-1").known["stuck_positions"]
@@ -188,8 +191,10 @@ def simulated(tmp_path_factory: pytest.TempPathFactory) -> dict[str, dict[str, A
     environment = os.environ | {"NUMBA_ENABLE_CUDASIM": "1", "NUMBA_DISABLE_JIT": "1"}
     run = subprocess.run(
         [sys.executable, "-W", "error", __file__, str(folder)],
-        capture_output=True, text=True, env=environment,
-    )  # fmt: skip
+        capture_output=True,
+        text=True,
+        env=environment,
+    )
     assert run.returncode == 0, run.stderr[-3000:]
     return {name: dict(np.load(folder / f"{name}.npz")) for name in CASES}
 

@@ -51,9 +51,12 @@ def written(folder: Path, text: str) -> Path:
 def test_a_whole_file_is_read_into_si(tmp_path: Path) -> None:
     case = read_system(written(tmp_path, WHOLE))
     assert case.system == ss.Oscillator(
-        mass=2.42, stiffness=2310, damping=0.12, drive=case.system.drive,
+        mass=2.42,
+        stiffness=2310,
+        damping=0.12,
+        drive=case.system.drive,
         law=ss.laws.CompliantContact(kinetic=1.1, stiffness=192000, damping=23.9),
-    )  # fmt: skip
+    )
     assert isinstance(case.system.drive, ss.drives.HarmonicBase)
     assert case.system.drive.amplitude == pytest.approx(0.65e-3, rel=1e-15)
     assert (case.name, case.run, case.fs, case.start) == ("slider", {"cycles": 40.0}, 4000.0, {"x": 1e-4})
@@ -64,9 +67,10 @@ def test_the_motion_is_that_of_the_same_system_in_python(tmp_path: Path) -> None
     law = ss.laws.CompliantContact(kinetic=1.1, stiffness=192000, damping=23.9)
     drive = ss.drives.HarmonicBase(0.65e-3, frequency=2.5)
     system = ss.Oscillator(mass=2.42, stiffness=2310, damping=0.12, law=law, drive=drive)
-    assert ss.simulate(case.system, start=case.start, **case.run).events == ss.simulate(
-        system, start={"x": 1e-4}, cycles=40
-    ).events  # fmt: skip
+    assert (
+        ss.simulate(case.system, start=case.start, **case.run).events
+        == ss.simulate(system, start={"x": 1e-4}, cycles=40).events
+    )
 
 
 @pytest.mark.parametrize(
@@ -99,7 +103,7 @@ def test_the_motion_is_that_of_the_same_system_in_python(tmp_path: Path) -> None
         ("[law]", "[laws]", ["line 6", "'laws'", "perhaps law is meant"]),
         ("[law]", "law", ["line 6", "not TOML"]),
     ],
-)  # fmt: skip
+)
 def test_a_mistake_is_one_sentence_that_names_the_line(tmp_path: Path, old: str, new: str, told: list[str]) -> None:
     assert old in WHOLE
     with pytest.raises(ModelError) as caught:
@@ -201,9 +205,13 @@ def test_a_structure_is_read_as_python_makes_it(tmp_path: Path) -> None:
         ss.Contact(ss.laws.Coulomb(0.2, static=0.3), [-1, 1], normal=[0, 1], stiffness=2.0, preload=5.0),
     ]
     system = ss.Structure(
-        np.diag([1.3, 700 * 1e-3]), np.diag([0.05, 0.05]), [[3.0, -1.3], [-1.3, 2.9]], contacts=pads, acts_on=[1, 0],
+        np.diag([1.3, 700 * 1e-3]),
+        np.diag([0.05, 0.05]),
+        [[3.0, -1.3], [-1.3, 2.9]],
+        contacts=pads,
+        acts_on=[1, 0],
         drive=ss.drives.HarmonicForce(1.2, frequency=0.13),
-    )  # fmt: skip
+    )
     assert isinstance(case.system, ss.Structure)
     assert (case.start, case.run) == ({"x2": 0.1, "anchor1": 0.0}, {"cycles": 20.0})
     run = ss.simulate(case.system, start=case.start, **case.run)
@@ -228,7 +236,7 @@ def test_a_structure_is_read_as_python_makes_it(tmp_path: Path) -> None:
         ("[drive]", "[law]\nname = 'Coulomb'\n[drive]", ["line 18", "each contact of a structure has its own"]),
         ("x2 = 0.1", "x3 = 0.1", ["line 23", "known are x1, x2, v1, v2, anchor1, mode"]),
     ],
-)  # fmt: skip
+)
 def test_a_mistake_in_a_structure_is_told_alike(tmp_path: Path, old: str, new: str, told: list[str]) -> None:
     assert old in TWO
     with pytest.raises(ModelError) as caught:
@@ -260,8 +268,11 @@ def test_a_law_behind_a_compliant_contact_is_a_table_within(tmp_path: Path) -> N
     assert case.system.law == law  # type: ignore[union-attr]
     changed = case.having(**{"law.stiffness": "1 N/um", "slope": -4}).system
     assert changed.law == ss.laws.InSeries(ss.laws.LinearSlope(1.1, slope=-4.0), stiffness=1e6, damping=24.0)  # type: ignore[union-attr]
-    for old, new, told in (("slope = -5", "slop = -5", "law.law.slop"), ("slope = -5", "slope = -50", "raise damping"),
-                           ('name = "LinearSlope"', 'name = "Linear"', "line 11,")):  # fmt: skip
+    for old, new, told in (
+        ("slope = -5", "slop = -5", "law.law.slop"),
+        ("slope = -5", "slope = -50", "raise damping"),
+        ('name = "LinearSlope"', 'name = "Linear"', "line 11,"),
+    ):
         with pytest.raises(ModelError, match=told):
             read_system(written(tmp_path, text.replace(old, new)))
 
@@ -277,9 +288,16 @@ def test_a_curve_is_a_formula_of_the_speed(tmp_path: Path) -> None:
     law = read_system(written(tmp_path, text)).system.law  # type: ignore[union-attr]
     assert isinstance(law, ss.laws.FrictionCurve)
     assert law.friction(0.7) == pytest.approx(3 / (1 + 1.42 * 0.7) + 1 + 0.1 * 0.49, rel=1e-15)
-    for curve, told in (("1 / v", "no value at rest"), ("v^2", r"has '\^'"), ("w", "has 'w'"), ("1 +", "read"),
-                        ("__import__('os')", "has"), ("v ** v", "has"), ("9**9**9**9", "has no value"),
-                        ("1" * 400, "400")):  # fmt: skip
+    for curve, told in (
+        ("1 / v", "no value at rest"),
+        ("v^2", r"has '\^'"),
+        ("w", "has 'w'"),
+        ("1 +", "read"),
+        ("__import__('os')", "has"),
+        ("v ** v", "has"),
+        ("9**9**9**9", "has no value"),
+        ("1" * 400, "400"),
+    ):
         with pytest.raises(ModelError, match=f"(?s)line 8.*{told}"):
             read_system(written(tmp_path, text.replace("3 / (1 + 1.42 * v) + 1 + 0.1 * v**2", curve)))
 
@@ -295,9 +313,13 @@ def one_sentence(make: Callable[[], Case]) -> str | None:
 
 KEYS = [(table, key) for table in ("system", "law", "drive", "start", "run") for key in ("name", "mass", "x", "cycles")]
 VALUES = st.one_of(
-    st.integers(), st.floats(), st.booleans(), st.text(max_size=5), st.lists(st.floats(), max_size=3),
+    st.integers(),
+    st.floats(),
+    st.booleans(),
+    st.text(max_size=5),
+    st.lists(st.floats(), max_size=3),
     st.sampled_from(["Coulomb", "Belt", "ElastoSlip", "1 kg", "stuck"]),
-)  # fmt: skip
+)
 
 
 @settings(suppress_health_check=[HealthCheck.too_slow])  # the first case compiles the engine

@@ -13,13 +13,18 @@ from scipy.integrate import solve_ivp
 import stickslip as ss
 
 BELT = ss.Oscillator(
-    mass=1.3, stiffness=2.0, damping=0.1, drive=ss.drives.Belt(1.0),
+    mass=1.3,
+    stiffness=2.0,
+    damping=0.1,
+    drive=ss.drives.Belt(1.0),
     law=ss.laws.TimeDelay(ss.laws.LinearSlope(1.0, slope=-0.4, static=1.3), lag=0.3),
-)  # fmt: skip
+)
 SHAKEN = ss.Oscillator(
-    mass=2.42, stiffness=2310, drive=ss.drives.HarmonicBase(0.65e-3, 2.5),
+    mass=2.42,
+    stiffness=2310,
+    drive=ss.drives.HarmonicBase(0.65e-3, 2.5),
     law=ss.laws.TimeDelay(ss.laws.Stribeck(1.1, 1.3, speed=4e-3, exponent=1.0, viscous=4.0), lag=7e-3),
-)  # fmt: skip
+)
 
 
 class Steps:
@@ -72,8 +77,17 @@ class Steps:
         while self.time < until:
             self.since = self.events[-1][0] if self.events else -1.0
             end = min([b for b in self.breaks if b > self.time + 1e-12] + [self.time + self.law.lag, until])
-            step = solve_ivp(self.rate, (self.time, end), self.state, method="DOP853", rtol=1e-13, atol=1e-16,
-                             dense_output=True, events=self.leave, max_step=self.law.lag)  # fmt: skip
+            step = solve_ivp(
+                self.rate,
+                (self.time, end),
+                self.state,
+                method="DOP853",
+                rtol=1e-13,
+                atol=1e-16,
+                dense_output=True,
+                events=self.leave,
+                max_step=self.law.lag,
+            )
             now = float(step.t[-1])
             self.known.append((self.time, now, self.mode, step.sol))
             self.time, self.state = now, list(step.y[:, -1])
@@ -122,9 +136,11 @@ def test_the_motion_is_that_of_the_method_of_steps(
 def characteristic_root(system: ss.Oscillator, slope: float, guess: complex) -> complex:
     """Of m s^2 + (c + F' exp(-s lag)) s + k: what a small difference from steady sliding grows by."""
     lag = system.law.lag
-    return complex(mpmath.findroot(
-        lambda s: system.mass * s**2 + (system.damping + slope * mpmath.exp(-s * lag)) * s + system.stiffness, guess
-    ))  # fmt: skip
+    return complex(
+        mpmath.findroot(
+            lambda s: system.mass * s**2 + (system.damping + slope * mpmath.exp(-s * lag)) * s + system.stiffness, guess
+        )
+    )
 
 
 @pytest.mark.parametrize(("lag", "grows"), [(0.05, True), (1.3, False), (2.5, True)])
@@ -197,12 +213,15 @@ def test_the_answer_does_not_hang_on_tolerance_samples_or_units() -> None:
     coarse, fine = run.record(fs=100), run.record(fs=1000)
     assert coarse["friction"] == pytest.approx(fine["friction"][::10], rel=1e-12)
     length, time, force = 1e6, 1e-3, 1e-4
-    curve = ss.laws.Stribeck(1.1 * force, 1.3 * force, speed=4e-3 * length / time, exponent=1.0,
-                        viscous=4.0 * force * time / length)  # fmt: skip
+    curve = ss.laws.Stribeck(
+        1.1 * force, 1.3 * force, speed=4e-3 * length / time, exponent=1.0, viscous=4.0 * force * time / length
+    )
     scaled = ss.Oscillator(
-        mass=2.42 * force * time**2 / length, stiffness=2310 * force / length,
-        law=ss.laws.TimeDelay(curve, lag=7e-3 * time), drive=ss.drives.HarmonicBase(0.65e-3 * length, 2.5 / time),
-    )  # fmt: skip
+        mass=2.42 * force * time**2 / length,
+        stiffness=2310 * force / length,
+        law=ss.laws.TimeDelay(curve, lag=7e-3 * time),
+        drive=ss.drives.HarmonicBase(0.65e-3 * length, 2.5 / time),
+    )
     other = ss.simulate(scaled, cycles=20)
     assert [e.mode for e in other.events] == [e.mode for e in run.events]
     assert [e.time / time for e in other.events] == pytest.approx([e.time for e in run.events], rel=1e-12)

@@ -60,8 +60,10 @@ def test_a_title_is_name_and_unit_in_every_format(tmp_path: Path, name: str) -> 
     WRITERS[name](tmp_path / name)
     record = ss.read_record(tmp_path / name)
     assert {one: record.channels[one].unit for one in record} == {
-        "plate": "m", "rig_acc": "m/s^2", "drive": "counts/rev",
-    }  # fmt: skip
+        "plate": "m",
+        "rig_acc": "m/s^2",
+        "drive": "counts/rev",
+    }
     assert record.fs == pytest.approx(200)
     np.testing.assert_allclose(record["plate"], 1e-3 * COLUMNS["plate [mm]"], rtol=1e-12)
     np.testing.assert_allclose(record["rig_acc"], COLUMNS["rig acc [m/s^2]"], rtol=1e-12)

@@ -110,8 +110,14 @@ def test_negative_damping_loses_stability() -> None:
         turn = orbit.rotation_numbers[0] if orbit.rotation_numbers else np.angle(orbit.multipliers[0]) / (2 * math.pi)
         turns.append(math.cos(2 * math.pi * turn))
     assert turns[0] == pytest.approx(turns[1], abs=0.02)
-    law = [abs(steady_state(scenarios.forced(1.3, 0.4, damping_ratio=critical * f), start={"x": 1.2, "v": 0.0},
-                            transient=1).multipliers[0]) for f in (0.999, 1.0)]  # fmt: skip
+    law = [
+        abs(
+            steady_state(
+                scenarios.forced(1.3, 0.4, damping_ratio=critical * f), start={"x": 1.2, "v": 0.0}, transient=1
+            ).multipliers[0]
+        )
+        for f in (0.999, 1.0)
+    ]
     assert law[0] < 1
     assert law[1] == pytest.approx(1.0, abs=1e-9)
 
@@ -205,12 +211,30 @@ def test_the_energy_of_resonance(name: str, load: float, given: float, friction:
 @pytest.mark.parametrize(
     ("name", "values"),
     [
-        ("BS-2", {"slip": 0.17156718657531491, "stick": 0.034632034632034632, "end": 0.00064935064935064935,
-                  "most": 0.00084326860184054256, "least": 0.00010911235054040982, "slowest": -0.011341142633122203}),
-        ("BS-3", {"slip": 2.6112592541013096, "stick": 5.0, "end": 0.75, "most": 0.75980762113533159,
-                  "least": 0.24019237886466841, "slowest": -0.36742346141747671}),
+        (
+            "BS-2",
+            {
+                "slip": 0.17156718657531491,
+                "stick": 0.034632034632034632,
+                "end": 0.00064935064935064935,
+                "most": 0.00084326860184054256,
+                "least": 0.00010911235054040982,
+                "slowest": -0.011341142633122203,
+            },
+        ),
+        (
+            "BS-3",
+            {
+                "slip": 2.6112592541013096,
+                "stick": 5.0,
+                "end": 0.75,
+                "most": 0.75980762113533159,
+                "least": 0.24019237886466841,
+                "slowest": -0.36742346141747671,
+            },
+        ),
     ],
-)  # fmt: skip
+)
 def test_stick_slip_on_a_belt(name: str, values: dict[str, float]) -> None:
     """BS: lengths of stick and slip, where the stick ends, and the extremes of displacement and velocity."""
     scenario = scenarios.get(name)
@@ -247,8 +271,10 @@ def test_where_the_inertial_contact_stops(name: str, places: tuple[float, ...], 
     assert short == pytest.approx(sorted(2 * places), rel=1e-9)
     if misses:
         orbit = steady.orbit
-        j = max((j for j in range(1, len(orbit.modes) - 1) if orbit.table.modes[orbit.modes[j]].kind == "slip"),
-                key=lambda j: orbit.durations[j])  # fmt: skip
+        j = max(
+            (j for j in range(1, len(orbit.modes) - 1) if orbit.table.modes[orbit.modes[j]].kind == "slip"),
+            key=lambda j: orbit.durations[j],
+        )
         times = np.linspace(orbit.starts[j], orbit.starts[j] + orbit.durations[j], 400_001)[1:-1]
         speed = np.abs(orbit.sample(times, ("v",))[0][0])
         dips = speed[1:-1][(speed[1:-1] < speed[:-2]) & (speed[1:-1] < speed[2:])]

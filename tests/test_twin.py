@@ -204,9 +204,19 @@ def test_a_friction_that_lags_is_no_contact_that_gives_way() -> None:
 @cache
 def bristled() -> ss.answers.Findings:
     """What is found of a contact of bristles."""
-    rig = stepped.Rig("LuGre", 2.0, 800.0, 1.0, 4e-3, 2.4, kinetic=0.96, static=1.3, speed=8e-3, contact=8000.0,
+    rig = stepped.Rig(
+        "LuGre",
+        2.0,
+        800.0,
+        1.0,
+        4e-3,
+        2.4,
+        kinetic=0.96,
+        static=1.3,
+        speed=8e-3,
+        contact=8000.0,
         exponent=2.0,
-    )  # fmt: skip
+    )
     record = stepped.record(rig, np.random.default_rng(11), noise=1e-4)
     return ss.tried(ss.analyze(record, **rig.stated), twins=8)
 
@@ -249,9 +259,7 @@ def off_as_stated(rig: stepped.Rig, seed: int, *, off: float) -> ss.Record:
 
 def test_a_rig_near_its_resonance_is_found_from_constants_that_are_off() -> None:
     # half a per cent of mass or spring moves x by a tenth there: the search led the constants 70 deviations away
-    rig = stepped.Rig(
-        "Stribeck", 0.19, 482.5, 0.0857, 5.99e-4, 10.88, kinetic=0.1289, static=0.196, speed=0.0104
-    )  # fmt: skip
+    rig = stepped.Rig("Stribeck", 0.19, 482.5, 0.0857, 5.99e-4, 10.88, kinetic=0.1289, static=0.196, speed=0.0104)
     belief = believe(off_as_stated(rig, 5, off=0.005))
     assert belief.like_noise
     assert belief.strain < 3.0
@@ -284,7 +292,7 @@ def test_the_stiffness_of_bristles_counts_what_x_does_not_show_of_their_fall() -
     # a spring that slides leaves x as well explained, with a stiffness a fifth too low and sure within a per cent
     rig = stepped.Rig(
         "LuGre", 2.594, 4513.0, 3.15, 3.875e-3, 5.01, kinetic=5.79, static=9.24, speed=0.0341, contact=1.173e5
-    )  # fmt: skip
+    )
     record = stepped.record(rig, np.random.default_rng(11), noise=5e-3)
     tried = ss.tried(ss.analyze(record, **rig.stated), twins=8)
     assert estimate(tried, "presliding stiffness").includes(rig.contact)

@@ -74,9 +74,7 @@ def test_one_of_two_that_are_left_is_surer_than_either() -> None:
 
 def test_a_misfit_within_the_noise_decides_nothing() -> None:
     quiet = Evidence({("x", 0): 30.0}, {("x", 0): 1e-6})
-    ranking, _ = standings(
-        [Misfit("Coulomb", 1, {("x", 0): 1e-14}), Misfit("compliant", 3, {("x", 0): 1e-15})], quiet
-    )  # fmt: skip
+    ranking, _ = standings([Misfit("Coulomb", 1, {("x", 0): 1e-14}), Misfit("compliant", 3, {("x", 0): 1e-15})], quiet)
     assert all(law.kept for law in ranking)
     assert ranking[0].name == "Coulomb"
 
@@ -111,7 +109,7 @@ def stiff(name: str, count: int, size: float) -> Misfit:
 def test_a_contact_next_to_rigid_is_no_other_family() -> None:
     ranking, confidence = standings(
         [misfit("Coulomb", 1, 1.0), stiff("compliant", 3, 0.9), misfit("LuGre", 5, 50.0)], EVIDENCE
-    )  # fmt: skip
+    )
     assert [law.name for law in ranking if law.kept] == ["Coulomb"]
     assert next(law for law in ranking if law.name == "compliant").limit
     assert confidence > 0.9
@@ -132,6 +130,8 @@ def test_a_stiff_contact_stands_beside_a_law_of_another_family_that_leads() -> N
     """A state variable led a rigid law by 1.7 times, and a contact that gave way and left no more was excluded."""
     stiff_contact = stiff("compliant", 3, 1.0)
     assert kept(misfit("state variable", 3, 1.0), misfit("Coulomb", 1, 1.6), stiff_contact)[0] == {
-        "state variable", "Coulomb", "compliant",
-    }  # fmt: skip
+        "state variable",
+        "Coulomb",
+        "compliant",
+    }
     assert "compliant" not in kept(misfit("state variable", 3, 1.0), misfit("Coulomb", 1, 1.0), stiff_contact)[0]

@@ -35,10 +35,12 @@ def plain(values: np.ndarray, fs: float, scales: np.ndarray, normalisation: str)
         next_fast_len(len(values) + math.ceil(10 * scales.max() * fs)) | 1
     )  # odd: half the rate is no frequency of it
     spectrum, turn = fft(values, size), 2 * np.pi * np.fft.fftfreq(size, 1 / fs)
-    return np.array([
-        ifft(spectrum * normalised_gain(a, normalisation) * np.exp(-0.5 * (a * turn - CENTRE) ** 2))[: len(values)]
-        for a in scales
-    ])  # fmt: skip
+    return np.array(
+        [
+            ifft(spectrum * normalised_gain(a, normalisation) * np.exp(-0.5 * (a * turn - CENTRE) ** 2))[: len(values)]
+            for a in scales
+        ]
+    )
 
 
 @pytest.mark.parametrize("normalisation", ["energy", "amplitude"])
@@ -66,10 +68,15 @@ def test_a_tone_is_its_closed_form() -> None:
     t = np.arange(16000) / fs
     wavelets = ss.wavelet_map(of(np.cos(2 * np.pi * f0 * t + phase), fs), "a", frequencies=np.linspace(30, 80, 26))
     a, turn = wavelets.scale.values[:, None], 2 * np.pi * f0
-    true = np.sqrt(a) * np.pi**-0.25 * np.sqrt(np.pi / 2) * (
-        np.exp(1j * (turn * t + phase)) * np.exp(-((a * turn - CENTRE) ** 2) / 2)
-        + np.exp(-1j * (turn * t + phase)) * np.exp(-((a * turn + CENTRE) ** 2) / 2)
-    )  # fmt: skip
+    true = (
+        np.sqrt(a)
+        * np.pi**-0.25
+        * np.sqrt(np.pi / 2)
+        * (
+            np.exp(1j * (turn * t + phase)) * np.exp(-((a * turn - CENTRE) ** 2) / 2)
+            + np.exp(-1j * (turn * t + phase)) * np.exp(-((a * turn + CENTRE) ** 2) / 2)
+        )
+    )
     inside = (t > 0.5) & (t < 7.5)
     assert worst(wavelets.values[:, inside], true[:, inside]) < 1e-9
 
@@ -139,9 +146,9 @@ def test_a_tone_reads_its_own_frequency(centre: float, normalisation: str) -> No
     t = np.arange(40000) / 2000.0
     tone = of(0.7 * np.sin(2 * np.pi * 47 * t + 1), 2000.0)
     near = 47 * np.linspace(0.98, 1.02, 401)
-    found = abs(
-        ss.wavelet_map(tone, "a", frequencies=near, wavelet_frequency=centre, normalisation=normalisation)
-    ).sel(time=10.0)  # fmt: skip
+    found = abs(ss.wavelet_map(tone, "a", frequencies=near, wavelet_frequency=centre, normalisation=normalisation)).sel(
+        time=10.0
+    )
     assert float(found.idxmax()) == pytest.approx(47, rel=2e-4)
     if normalisation == "amplitude":
         assert float(found.max()) == pytest.approx(0.7, rel=1e-6)
@@ -158,8 +165,9 @@ def test_the_stated_bandwidth_is_that_at_half_power() -> None:
     t = np.arange(40000) / 2000.0
     row = ss.wavelet_map(of(np.zeros(40000), 2000.0), "a", frequencies=[46.0, 47.0, 48.0], normalisation="amplitude")
     edge = 47 + float(row.bandwidth.sel(frequency=47.0)) / 2
-    wavelets = ss.wavelet_map(of(np.sin(2 * np.pi * edge * t), 2000.0), "a", frequencies=[46.0, 47.0, 48.0],
-                           normalisation="amplitude")  # fmt: skip
+    wavelets = ss.wavelet_map(
+        of(np.sin(2 * np.pi * edge * t), 2000.0), "a", frequencies=[46.0, 47.0, 48.0], normalisation="amplitude"
+    )
     assert float(abs(wavelets.sel(frequency=47.0, time=10.0))) == pytest.approx(math.sqrt(0.5), rel=1e-6)
 
 

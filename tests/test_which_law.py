@@ -66,9 +66,11 @@ def test_a_search_begins_near_the_truth(name: str) -> None:
 def test_a_compliant_contact_is_told_from_a_rigid_one() -> None:
     shares: list[float] = []
     comparison = ss.compare_laws(
-        [record("compliant"), record("compliant", 11.1, 2e-3)], slider(), laws=["Coulomb", "compliant"],
+        [record("compliant"), record("compliant", 11.1, 2e-3)],
+        slider(),
+        laws=["Coulomb", "compliant"],
         progress=shares.append,
-    )  # fmt: skip
+    )
     assert (comparison.law, comparison.family, comparison.kept) == ("compliant", "compliant", ("compliant",))
     assert comparison.confidence > 0.95
     assert comparison.status == "ok"
@@ -97,8 +99,9 @@ def test_the_best_law_says_what_it_leaves() -> None:
     """It was called the friction's law, and its verdict was "best", whatever it left of the motion."""
     lagging = ss.Oscillator(
         law=ss.laws.SmoothStateVariable(1.0, rate=60.0, steepness=2000.0),
-        drive=ss.drives.HarmonicBase(1.1e-3, frequency=2.5), **RIG,
-    )  # fmt: skip
+        drive=ss.drives.HarmonicBase(1.1e-3, frequency=2.5),
+        **RIG,
+    )
     rig = ss.Rig.perfect("x", "z").having("x", white=1e-6).having("z", white=1e-6)
     record = rig.measure(ss.simulate(lagging, duration=3.0), fs=500, rng=1, start=1.0)
     comparison = ss.compare_laws(record, slider(), laws=["Coulomb"], nuisance=[])
@@ -282,7 +285,7 @@ def test_a_contacts_damping_is_searched_where_the_friction_of_two_records_shows_
     laws = {"kinetic": 1.1, "stiffness": 192000.0, "damping": 23.9}
     system = ss.Oscillator(
         law=ss.laws.CompliantContact(**laws), drive=ss.drives.HarmonicBase(0.65e-3, frequency=2.5), **RIG
-    )  # fmt: skip
+    )
     runs = [ss.simulate(system.having(frequency=each), duration=2).record(fs=2000) for each in (2.5, 8.7)]
     comparison = ss.compare_laws(runs, system, laws=["compliant"])
     for name, true in laws.items():
@@ -392,9 +395,10 @@ def test_a_sensor_that_nobody_stated_is_left_out() -> None:
     rig = ss.Rig.perfect("x", "z", "a").having("x", white=1e-6).having("z", white=1e-6)
     rig = rig.having("a", mount=ss.rig.Mount(60.0, 0.05))
     comparison = ss.compare_laws(
-        rig.measure(ss.simulate(clean, duration=2.5, rtol=1e-9), fs=FS, rng=3, start=2.0), slider(),
+        rig.measure(ss.simulate(clean, duration=2.5, rtol=1e-9), fs=FS, rng=3, start=2.0),
+        slider(),
         laws=["Coulomb", "compliant"],
-    )  # fmt: skip
+    )
     assert "a is left out" in comparison.status
     assert set(comparison.best.left) == {"x"}
     assert comparison.fit.law.kinetic == pytest.approx(0.95, rel=0.02)
@@ -458,9 +462,22 @@ def test_one_way_without_a_stop_is_refused() -> None:
 def test_the_command_fits_and_writes_a_page(tmp_path: Path) -> None:
     file = ss.write_record(record("compliant"), tmp_path / "run.csv")
     answer = CliRunner().invoke(
-        main, ["fit", str(file), "--mass", "2.42", "--stiffness", "2310", "--damping", "0.12", "--laws",
-               "Coulomb, compliant", "--output", str(tmp_path / "out")],
-    )  # fmt: skip
+        main,
+        [
+            "fit",
+            str(file),
+            "--mass",
+            "2.42",
+            "--stiffness",
+            "2310",
+            "--damping",
+            "0.12",
+            "--laws",
+            "Coulomb, compliant",
+            "--output",
+            str(tmp_path / "out"),
+        ],
+    )
     assert answer.exit_code == 0, answer.output
     assert "compliant contact" in answer.output
     data = json.loads((tmp_path / "out" / "results.json").read_text("utf-8"))

@@ -36,8 +36,16 @@ def test_the_model_is_chosen_from_the_record_alone(damping: float, dry: float, m
         assert wide.includes(truth)
     assert choice.frequency.value == pytest.approx(1.0, abs=1e-3)
     assert {name for name, _, _ in choice.candidates} == {
-        "viscous", "dry", "both", "static", "air", "quadratic", "stribeck", "curved spring", "micro-slip",
-    }  # fmt: skip
+        "viscous",
+        "dry",
+        "both",
+        "static",
+        "air",
+        "quadratic",
+        "stribeck",
+        "curved spring",
+        "micro-slip",
+    }
 
 
 def test_a_pendulum_is_told_from_a_straight_spring() -> None:
@@ -136,8 +144,12 @@ def test_whichever_motion_it_was_leaves_out_what_the_record_speaks_against() -> 
     zeta, drag, turn = 0.004, 7.2, 4 * np.pi  # viscous damping and air drag, without any dry friction
     moved = solve_ivp(
         lambda _, y: [y[1], -(turn**2) * y[0] - 2 * zeta * turn * y[1] - drag * abs(y[1]) * y[1]],
-        (0, 14), [0.02, 0.0], t_eval=np.arange(0, 14, 1 / 200), rtol=1e-9, atol=1e-12,
-    ).y[0]  # fmt: skip
+        (0, 14),
+        [0.02, 0.0],
+        t_eval=np.arange(0, 14, 1 / 200),
+        rtol=1e-9,
+        atol=1e-12,
+    ).y[0]
     noisy = moved + 2e-5 * np.random.default_rng(1).standard_normal(len(moved))
     decay = ss.analyze_decay(ss.Record.of({"x": noisy}, fs=200), stiffness=1000.0).decay
     ratio, dry = decay.whichever

@@ -217,9 +217,15 @@ def mean_of_cycles(
         scatter = f"{present.std(ddof=1):.3g}{'' if unit == '1' else ' ' + unit}"
         check = f"{count} {of}s, scatter between them {scatter}"
     return Estimate.normal(
-        name, present.mean(), sd=sd, unit=unit, method=method, quantile=student(freedom), status=status,
+        name,
+        present.mean(),
+        sd=sd,
+        unit=unit,
+        method=method,
+        quantile=student(freedom),
+        status=status,
         checks=(check, *checks),
-    )  # fmt: skip
+    )
 
 
 def disagreement(estimates: Sequence[Estimate]) -> float:
@@ -256,10 +262,15 @@ def weighted_mean(estimates: Sequence[Estimate], *, of: str, status: str = "ok")
     mean = float(weights @ values / weights.sum())
     quantile = student(len(values) - 1) if excess > 1 else NORMAL_95
     return Estimate.normal(
-        first.name, mean, sd=max(1.0, excess) / math.sqrt(float(weights.sum())), unit=first.unit,
-        method=f"weighted mean of {len(values)} {of}", quantile=quantile, status=status,
+        first.name,
+        mean,
+        sd=max(1.0, excess) / math.sqrt(float(weights.sum())),
+        unit=first.unit,
+        method=f"weighted mean of {len(values)} {of}",
+        quantile=quantile,
+        status=status,
         checks=(f"they differ by {excess:.2g} times what their own intervals allow",),
-    )  # fmt: skip
+    )
 
 
 def _values(estimates: Sequence[Estimate]) -> tuple[Array, Array]:

@@ -129,8 +129,10 @@ def base_for(given: Given, case: int) -> float:
     section = given["sliding"]
     root = brentq(
         lambda base: sliding(given, case, base=base).amplitude - section["amplitude"][case],
-        0.98 * section["base"][case], 1.15 * section["base"][case], xtol=1e-9,
-    )  # fmt: skip
+        0.98 * section["base"][case],
+        1.15 * section["base"][case],
+        xtol=1e-9,
+    )
     return float(root)
 
 
@@ -169,8 +171,10 @@ def harmonics(given: Given) -> Harmonics:
 
 
 def _of_orbit(orbit: ss.solve.SteadyState) -> str:
-    return (f"Steady motion by the exact solver: the mass moves {1e3 * orbit.amplitude:.3f} mm, and sliding begins at "
-            f"{1e3 * orbit.transition_speed:.2f} mm/s.")  # fmt: skip
+    return (
+        f"Steady motion by the exact solver: the mass moves {1e3 * orbit.amplitude:.3f} mm, and sliding begins at "
+        f"{1e3 * orbit.transition_speed:.2f} mm/s."
+    )
 
 
 def imposed(law: Any, memory: tuple[str, ...] = ()) -> tuple[Array, dict[str, Array]]:
@@ -193,8 +197,10 @@ def _two_phases(ax: Axes, across: Array, up: Array, sliding_now: Array) -> None:
 def _schematics(given: Given) -> Iterator[Plate]:
     """Figures 3.2 to 3.7, computed with a contact much softer than the rig's, so that its give can be seen."""
     soft = given["schematic"]
-    words = (f"Computed, not sketched: the model under an imposed motion, with a contact so soft that 2f_k/K_y is "
-             f"{2 / soft['stiffness']:.2g} of the amplitude. ")  # fmt: skip
+    words = (
+        f"Computed, not sketched: the model under an imposed motion, with a contact so soft that 2f_k/K_y is "
+        f"{2 / soft['stiffness']:.2g} of the amplitude. "
+    )
     time, motion = imposed(ss.laws.CompliantContact(1.0, stiffness=soft["stiffness"]))
     yield figure("3.2", _hypothetical(time, motion), words.strip())
     for number, axis, label in (("3.3", "x", "x / X_m"), ("3.4", "v", "ẋ / ωX_m")):

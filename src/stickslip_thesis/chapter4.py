@@ -147,9 +147,15 @@ def _readings(given: Given) -> Any:
             pair = counts(section, reading, stiffness=stiffness, kinetic=kinetic)
             as_printed = pair == COUNTS
             ax.text(
-                kinetic, place, f"{pair[0]}·{pair[1]}", ha="center", va="center", fontsize=7,
-                color=BLUE if as_printed else INK, fontweight="bold" if as_printed else "normal",
-            )  # fmt: skip
+                kinetic,
+                place,
+                f"{pair[0]}·{pair[1]}",
+                ha="center",
+                va="center",
+                fontsize=7,
+                color=BLUE if as_printed else INK,
+                fontweight="bold" if as_printed else "normal",
+            )
         label = f"{reading.formula}, {stiffness / 1e3:g} kN/m"
         ax.text(FRICTIONS[0] - 0.02, place, label, ha="right", va="center", fontsize=7)
     ax.set(xlabel="friction f_k [N]", xlim=(FRICTIONS[0] - 0.12, FRICTIONS[-1] + 0.02), ylim=(len(rows) - 0.4, -0.6))

@@ -71,8 +71,9 @@ def _wall(ax: Axes, start: Place, length: float, *, upright: bool = False, side:
         ax.plot(
             [foot[0], foot[0] + across[0] + 0.15 * (not upright)],
             [foot[1], foot[1] + across[1] + 0.15 * upright],
-            color=FAINT, linewidth=0.9,
-        )  # fmt: skip
+            color=FAINT,
+            linewidth=0.9,
+        )
 
 
 def _spring(ax: Axes, start: Place, end: Place, words: str = "", *, coils: int = 6) -> None:
@@ -105,26 +106,41 @@ def _beside(ax: Axes, start: Place, end: Place, words: str) -> None:
     upright = abs(end[0] - start[0]) < abs(end[1] - start[1])
     x, y = (start[0] + end[0]) / 2, (start[1] + end[1]) / 2
     ax.text(
-        x + 0.3 * upright, y + 0.28 * (not upright), words, ha="left" if upright else "center",
-        va="center" if upright else "bottom", fontsize=8,
-    )  # fmt: skip
+        x + 0.3 * upright,
+        y + 0.28 * (not upright),
+        words,
+        ha="left" if upright else "center",
+        va="center" if upright else "bottom",
+        fontsize=8,
+    )
 
 
 def _arrow(ax: Axes, start: Place, end: Place, words: str, *, colour: str = BLUE) -> None:
     ax.annotate("", xy=end, xytext=start, arrowprops={"arrowstyle": "->", "color": colour, "linewidth": 1.2})
     upright = abs(end[0] - start[0]) < abs(end[1] - start[1])
     ax.text(
-        (start[0] + end[0]) / 2 + 0.12 * upright, (start[1] + end[1]) / 2 + 0.12 * (not upright), words, color=colour,
-        ha="left" if upright else "center", va="center" if upright else "bottom", fontsize=8,
-    )  # fmt: skip
+        (start[0] + end[0]) / 2 + 0.12 * upright,
+        (start[1] + end[1]) / 2 + 0.12 * (not upright),
+        words,
+        color=colour,
+        ha="left" if upright else "center",
+        va="center" if upright else "bottom",
+        fontsize=8,
+    )
 
 
 def _annotate(ax: Axes, at: Place, place: Place, words: str, *, colour: str = PURPLE) -> None:
     """Words beside the drawing, with a line to what they are about."""
     ax.annotate(
-        words, xy=at, xytext=place, fontsize=8, color=colour, ha="center", va="center",
+        words,
+        xy=at,
+        xytext=place,
+        fontsize=8,
+        color=colour,
+        ha="center",
+        va="center",
         arrowprops={"arrowstyle": "-", "color": colour, "linewidth": 0.8},
-    )  # fmt: skip
+    )
 
 
 def _number(value: float, unit: str) -> str:
@@ -161,9 +177,11 @@ def apparatus(given: Given) -> Any:
     _annotate(ax, (4.9, 1.6), (4.9, 0.5), "LVDT, S1")
     _annotate(ax, (5.9, 2.7), (5.6, 4.3), f"accelerometer, S2,\non a mount of {a.mount.frequency:g} Hz")
     _annotate(
-        ax, (9.27, 2.45), (9.2, 4.3),
+        ax,
+        (9.27, 2.45),
+        (9.2, 4.3),
         f"load cell, discharge {load.discharge:g} s,\nbehind a flange of {load.mount.frequency:g} Hz",
-    )  # fmt: skip
+    )
     _annotate(ax, (7.4, 1.84), (7.0, 0.5), f"friction contact, f = {section['kinetic']:g} N", colour=ORANGE)
     ax.text(2.6, 4.3, f"natural frequency {section['natural']:g} rad/s", fontsize=8, ha="center")
     return drawn
@@ -186,9 +204,14 @@ def massless_contact(given: Given) -> Any:
     ax.plot([8.68, 8.68], [1.55, 1.75], color=INK, linewidth=1.2)
     _arrow(ax, (7.6, 4.0), (8.6, 4.0), "x(t) - y(t)", colour=ORANGE)
     _annotate(ax, (8.68, 1.75), (9.7, 2.5), f"massless,\nf_k = {section['kinetic'][1]:g} N", colour=ORANGE)
-    ax.text(1.6, 0.7, f"at {section['frequency'][1]:g} Hz: the base moves by {1e3 * section['base'][1]:g} mm, "
-            f"the contact gives way by f_k / K_y = {1e6 * section['kinetic'][1] / section['stiffness'][1]:.2f} µm",
-            fontsize=8, ha="left")  # fmt: skip
+    ax.text(
+        1.6,
+        0.7,
+        f"at {section['frequency'][1]:g} Hz: the base moves by {1e3 * section['base'][1]:g} mm, "
+        f"the contact gives way by f_k / K_y = {1e6 * section['kinetic'][1] / section['stiffness'][1]:.2f} µm",
+        fontsize=8,
+        ha="left",
+    )
     return drawn
 
 
@@ -231,10 +254,19 @@ def system_i(given: Given) -> Any:
     for y, sign in ((2.05, 1), (1.95, -1)):
         _block(ax, (7.2, y - 0.2 * (sign < 0)), 0.5, 0.2, colour=ORANGE)
     cases = [section["case1"], section["case2"]]
-    _annotate(ax, (7.9, 2.9), (8.2, 4.4), "damper, switched on: ζ = "
-          + " or ".join(f"{case['damping_ratio']:g}" for case in cases))  # fmt: skip
-    _annotate(ax, (7.45, 1.75), (7.6, 0.5), "paper, switched on: f_k = "
-          + " or ".join(f"{section['stiffness'] * case['dry']:.3f} N" for case in cases), colour=ORANGE)  # fmt: skip
+    _annotate(
+        ax,
+        (7.9, 2.9),
+        (8.2, 4.4),
+        "damper, switched on: ζ = " + " or ".join(f"{case['damping_ratio']:g}" for case in cases),
+    )
+    _annotate(
+        ax,
+        (7.45, 1.75),
+        (7.6, 0.5),
+        "paper, switched on: f_k = " + " or ".join(f"{section['stiffness'] * case['dry']:.3f} N" for case in cases),
+        colour=ORANGE,
+    )
     _moves(ax, (4.4, 3.5), 1.0, (2.6, 4.4), section["resolution"])
     return drawn
 

@@ -294,8 +294,10 @@ def _swings(orbit: ss.solve.SteadyState) -> float:
     time, motion = around(orbit, cycles=2)
     slow = np.abs(motion["v"]) < 0.1 * np.max(np.abs(motion["v"]))
     edges = np.flatnonzero(np.diff(slow.astype(int)))
-    begin, end = max(pairwise([0, *edges, len(time) - 1]), key=lambda pair: np.mean(slow[pair[0] + 1 : pair[1]]) * (
-        time[pair[1]] - time[pair[0]]))  # fmt: skip
+    begin, end = max(
+        pairwise([0, *edges, len(time) - 1]),
+        key=lambda pair: np.mean(slow[pair[0] + 1 : pair[1]]) * (time[pair[1]] - time[pair[0]]),
+    )
     steps = np.sign(np.diff(motion["friction"][begin:end]))
     return float(np.sum(np.diff(steps[steps != 0]) != 0))
 

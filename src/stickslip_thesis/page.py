@@ -63,12 +63,17 @@ def starts(given: Given) -> list[Start]:
     """
     notes = remarks()
     return [
-        Start(_words(name), notes.get((name, ""), ""), tuple(
-            (words, value, notes.get((name, key), "")) for key, value in values.items()
-            for words, value in _entries(name, key, value, contact="spring" in values)
-        ))
+        Start(
+            _words(name),
+            notes.get((name, ""), ""),
+            tuple(
+                (words, value, notes.get((name, key), ""))
+                for key, value in values.items()
+                for words, value in _entries(name, key, value, contact="spring" in values)
+            ),
+        )
         for name, values in given.items()
-    ]  # fmt: skip
+    ]
 
 
 def _entries(section: str, key: str, value: Any, *, contact: bool) -> Iterator[tuple[str, str]]:
@@ -172,10 +177,17 @@ class Chapter:
             for row, entries in zip(table.rows, rows, strict=True):
                 for number, (value, verdict) in zip(row.numbers, entries, strict=True):
                     yield {
-                        "chapter": self.name, "place": table.name, "quantity": row.quantity, "entry": number.label,
-                        "unit": row.unit, "printed": number.printed, "ours": value, "verdict": verdict,
-                        "why": number.why, "again": row.again,
-                    }  # fmt: skip
+                        "chapter": self.name,
+                        "place": table.name,
+                        "quantity": row.quantity,
+                        "entry": number.label,
+                        "unit": row.unit,
+                        "printed": number.printed,
+                        "ours": value,
+                        "verdict": verdict,
+                        "why": number.why,
+                        "again": row.again,
+                    }
 
 
 def run_chapter(name: str, *, start: Given | None = None, draw: bool = True, tell: Tell | None = None) -> Chapter:

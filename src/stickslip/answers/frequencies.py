@@ -87,10 +87,15 @@ class TimeFrequency(Result):
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON: the answers, not the map."""
         ridges = [
-            {"from": float(r.time[0]), "to": float(r.time[-1]), "frequency": float(np.median(r.frequency)),
-             "lowest": float(r.frequency.min()), "highest": float(r.frequency.max())}
+            {
+                "from": float(r.time[0]),
+                "to": float(r.time[-1]),
+                "frequency": float(np.median(r.frequency)),
+                "lowest": float(r.frequency.min()),
+                "highest": float(r.frequency.max()),
+            }
             for r in self.ridges
-        ]  # fmt: skip
+        ]
         return {
             "name": self.name,
             "channel": self.channel,

@@ -26,10 +26,15 @@ VIBRATING = (*HEARD, "torsion_velocity", "load")
 
 
 def analyze_squeaks(
-    record: Record, *, name: str | None = None, channel: str | None = None,
-    frequencies: tuple[float, float] | str | None = None, contact: str | None = None,
-    normal: float | str | None = None, lever: float | str | None = None,
-) -> Findings:  # fmt: skip
+    record: Record,
+    *,
+    name: str | None = None,
+    channel: str | None = None,
+    frequencies: tuple[float, float] | str | None = None,
+    contact: str | None = None,
+    normal: float | str | None = None,
+    lever: float | str | None = None,
+) -> Findings:
     """Does it squeak, how does it sound, what moves together then, and how does friction change with speed?
 
     The check-up, the bursts (:func:`find_squeaks`) in the sound and in every channel that vibrates, their spectra
@@ -266,14 +271,23 @@ def _condition(findings: Findings) -> Condition:
     levels = [burst.level for burst in heard if np.isfinite(burst.level)]
     path = next((channel for channel in ("x", "theta") if channel in record), None)
     return Condition(
-        name=findings.name, normal=findings.normal, forcing=squeaks.forcing,
+        name=findings.name,
+        normal=findings.normal,
+        forcing=squeaks.forcing,
         stroke=float(np.nanmax(record[path]) - np.nanmin(record[path])) / 2 if path else float("nan"),
-        level=None if loops is None else loops.level, slope=None if loops is None else loops.slope,
-        coefficient=findings.coefficient, slope_of_coefficient=findings.slope_of_coefficient,
-        answer=squeaks.answer, kind=squeaks.kind, count=len(heard), rate=len(heard) / record.duration,
+        level=None if loops is None else loops.level,
+        slope=None if loops is None else loops.slope,
+        coefficient=findings.coefficient,
+        slope_of_coefficient=findings.slope_of_coefficient,
+        answer=squeaks.answer,
+        kind=squeaks.kind,
+        count=len(heard),
+        rate=len(heard) / record.duration,
         pulses=max(squeaks.of("creak"), key=lambda burst: burst.duration).rate if squeaks.of("creak") else float("nan"),
-        frequency=squeaks.frequency, sound=max(levels, default=float("nan")), reference=squeaks.reference,
-    )  # fmt: skip
+        frequency=squeaks.frequency,
+        sound=max(levels, default=float("nan")),
+        reference=squeaks.reference,
+    )
 
 
 def _verdicts(conditions: Sequence[Condition]) -> list[str]:

@@ -343,15 +343,25 @@ def pulled_slider(record: Record, *, channel: str = "load") -> Pull:
     levels = calm.values
     every = mean_of_cycles("period", np.diff(tops) / record.fs, unit="s", method="from slip to slip")
     frequency = Estimate(
-        "slips per second", 1 / every.value, (1 / every.interval[1], _over(every.interval[0])),
-        every.sd / every.value**2, "Hz", "mean time from slip to slip", every.status, every.checks,
-    ).within(0.0, record.fs / 2)  # fmt: skip
+        "slips per second",
+        1 / every.value,
+        (1 / every.interval[1], _over(every.interval[0])),
+        every.sd / every.value**2,
+        "Hz",
+        "mean time from slip to slip",
+        every.status,
+        every.checks,
+    ).within(0.0, record.fs / 2)
     return Pull(
         rate,
         mean_of_cycles("force at breakaway", levels[tops], unit=unit, method="largest force before each slip, mean"),
         mean_of_cycles("drop of the force", levels[tops] - levels[bottoms], unit=unit, method="in each slip, mean"),
-        frequency, shape, "stick-slip" if sticks else "inertial", record.start + tops / record.fs, rate.status,
-    )  # fmt: skip
+        frequency,
+        shape,
+        "stick-slip" if sticks else "inertial",
+        record.start + tops / record.fs,
+        rate.status,
+    )
 
 
 def _over(value: float) -> float:

@@ -145,12 +145,15 @@ def mass_and_stiffness(
         )
     return tuple(
         Estimate.normal(
-            name, values.mean(), sd=mean_uncertainty(values)[0], unit=unit,
+            name,
+            values.mean(),
+            sd=mean_uncertainty(values)[0],
+            unit=unit,
             method=f"least squares on {HARMONICS} harmonics of what the load cell measures, over {len(values)} cycles",
             checks=(f"{100 * left_over:.1f} % of the force is left over",),
         )
         for name, values, unit in (("mass", mass, "kg"), ("stiffness", stiffness, "N/m"))
-    )  # type: ignore[return-value]  # fmt: skip
+    )  # type: ignore[return-value]
 
 
 def _fitted(stretch: Complex, acceleration: Complex, felt: Complex) -> tuple[Array, float]:

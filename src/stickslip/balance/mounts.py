@@ -125,10 +125,15 @@ def _mean_lines(lines: Lines, record: Record, balance: Balance) -> _MeanLines:
     heard &= lines.frequency < 0.4 * record.fs
     size = int(heard.sum())
     return _MeanLines(
-        lines.frequency[heard], mean["a"][heard], mean["load"][heard], pull[heard],
-        np.full(size, math.hypot(level["a"], pulled / balance.mass)), np.full(size, level["load"]),
-        balance.mass, record.channels["load"].inertia,
-    )  # fmt: skip
+        lines.frequency[heard],
+        mean["a"][heard],
+        mean["load"][heard],
+        pull[heard],
+        np.full(size, math.hypot(level["a"], pulled / balance.mass)),
+        np.full(size, level["load"]),
+        balance.mass,
+        record.channels["load"].inertia,
+    )
 
 
 @dataclass(frozen=True, eq=False)

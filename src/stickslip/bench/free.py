@@ -196,9 +196,14 @@ def _lead(delay: SensorDelay, name: str, frequency: Estimate, unsure: float) -> 
     """By which time, and which angle, a sensor leads; its mount is not known better than `unsure` [s]."""
     late = delay.delay
     lead = Estimate.normal(
-        f"lead of {name} over x", -late.value, sd=math.hypot(late.spread, unsure), unit="s", method=late.method,
-        status=late.status, checks=late.checks,
-    )  # fmt: skip
+        f"lead of {name} over x",
+        -late.value,
+        sd=math.hypot(late.spread, unsure),
+        unit="s",
+        method=late.method,
+        status=late.status,
+        checks=late.checks,
+    )
     # any free vibration repeats itself: of the delays a period apart the shortest is meant
     lead = replace(lead, status=Status(*(doubt for doubt in doubts_of(lead.status) if doubt.kind != REPEATS)))
     turn = 2 * math.pi * frequency.value

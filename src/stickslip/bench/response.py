@@ -418,5 +418,10 @@ def _modal_of(lines: _Lines, p: Array, cover: Array, given: dict[str, Estimate],
         of("mass", m, [1, 0, 0, 0], "kg"),
         of("spring stiffness", k, [0, 0, 0, 1], "N/m"),
         of("viscous damping", c, [0, 1, 0, 0], "N s/m").within(0.0),
-        delay, None, len(lines.turn), None, lines.damper, status,
-    )  # fmt: skip
+        delay,
+        None,
+        len(lines.turn),
+        None,
+        lines.damper,
+        status,
+    )

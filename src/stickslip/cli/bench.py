@@ -190,9 +190,13 @@ TRIGGER = re.compile(r"\s*(\w+)\s*([<>])\s*(\S+)\s*")
 
 @click.command()
 @click.option(
-    "--device", "names", multiple=True, required=True, metavar="NAME",
+    "--device",
+    "names",
+    multiple=True,
+    required=True,
+    metavar="NAME",
     help="A table [devices.NAME] of the configuration, or a kind of device. Repeatable.",
-)  # fmt: skip
+)
 @click.option("--config", type=click.Path(path_type=Path), metavar="RIG.TOML", help="File of the rig and its devices.")
 @click.option("--seconds", type=click.FloatRange(min=0, min_open=True), help="How long; until Ctrl-C unless given.")
 @click.option(
@@ -352,9 +356,13 @@ def simulated_bench() -> None:
 @click.option("--fast", is_flag=True, help="As fast as the computer can, and not in the time that a rig would take.")
 @click.option("--seed", type=click.IntRange(min=0), default=1, show_default=True, help="Draws gains, zeros and noise.")
 @click.option(
-    "--output", type=click.Path(path_type=Path), default=Path("bench-tour"), show_default=True, metavar="DIR",
+    "--output",
+    type=click.Path(path_type=Path),
+    default=Path("bench-tour"),
+    show_default=True,
+    metavar="DIR",
     help="Folder of records, rig.toml, next.toml and report.",
-)  # fmt: skip
+)
 @click.option("--json", "as_json", is_flag=True, help="Print the results as JSON and nothing else.")
 @all_option
 def tour(fast: bool, seed: int, output: Path, as_json: bool, everything: bool) -> None:
@@ -380,9 +388,14 @@ def tour(fast: bool, seed: int, output: Path, as_json: bool, everything: bool) -
 @click.option("--output", type=click.Path(path_type=Path), metavar="RUNS.TOML", help="Write the runs, for acquire.")
 @click.option("--json", "as_json", is_flag=True, help="Print the runs as JSON and nothing else.")
 def following(
-    laws: tuple[str, ...], config: Path | None, count: int, seconds: float, done: tuple[str, ...], output: Path | None,
+    laws: tuple[str, ...],
+    config: Path | None,
+    count: int,
+    seconds: float,
+    done: tuple[str, ...],
+    output: Path | None,
     as_json: bool,
-) -> None:  # fmt: skip
+) -> None:
     """Which runs would tell most about the law that is left open?
 
     LAW is the folder of a fit's results, its law.toml, or a system's file; two or more, those that are left. Every

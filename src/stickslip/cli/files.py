@@ -98,8 +98,14 @@ CONSTANTS = {
 @click.argument("files", nargs=-1, required=True, metavar="FILES...")
 @constants_options()
 @click.option("--yes", is_flag=True, help="Ask nothing: take what was recognised and what the options say.")
-@click.option("--output", type=click.Path(path_type=Path), default=Path(RIG_FILE), show_default=True, metavar="FILE",
-              help="The file to write.")  # fmt: skip
+@click.option(
+    "--output",
+    type=click.Path(path_type=Path),
+    default=Path(RIG_FILE),
+    show_default=True,
+    metavar="FILE",
+    help="The file to write.",
+)
 @click.option("--force", is_flag=True, help="Write over it if it is there.")
 @reading_options
 def init(files: tuple[str, ...], yes: bool, output: Path, force: bool, **options: Any) -> None:

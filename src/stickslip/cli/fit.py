@@ -63,10 +63,16 @@ CURVES = (
 @result_options("FILE-fit")
 @reading_options
 def fit(
-    files: tuple[str, ...], output: Path | None, as_json: bool, everything: bool, laws: str | None, calibration: float,
-    curve: str | None, system: Path | None,
+    files: tuple[str, ...],
+    output: Path | None,
+    as_json: bool,
+    everything: bool,
+    laws: str | None,
+    calibration: float,
+    curve: str | None,
+    system: Path | None,
     **rig_options: Any,
-) -> None:  # fmt: skip
+) -> None:
     """Find which friction law it is, with its parameters.
 
     FILES are records of one rig, best at several excitations: displacement or velocity of the mass, the base's motion
@@ -95,9 +101,14 @@ def fit(
         mistaken = None if curve is not None else ss.answers.stated_wrongly(records, rig=rig)
         try:
             result, records = ss.answers.fit_records(
-                records, rig=rig, curve=curve, laws=names, system=_oscillator(system), calibration=calibration,
+                records,
+                rig=rig,
+                curve=curve,
+                laws=names,
+                system=_oscillator(system),
+                calibration=calibration,
                 progress=lambda share: tell(f"fitting and comparing {count}, {100 * share:.0f} %", 1 + share),
-            )  # fmt: skip
+            )
         except ss.StickslipError as error:
             raise _caused(error, mistaken) from error
     context: dict[str, Any] = {} if mistaken is None else {"mistaken": mistaken, "options": options}

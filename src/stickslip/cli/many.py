@@ -25,14 +25,26 @@ SHOWN = 3.0  # cycles in it, where there are cycles
 
 # Of hundreds of records.
 many_options = together(
-    click.option("--workers", type=click.IntRange(min=1), metavar="N",
-                 help=f"Processes for more than {MANY} records, all processors unless given."),
-    click.option("--engine", metavar="NAME", default="processes", show_default=True,
-                 help="Where many records are worked on: processes, cluster (Dask, on this machine) or "
-                 "cluster://HOST:PORT."),
-    click.option("--table", type=click.Path(path_type=Path), metavar="FILE",
-                 help="Write one row a record into FILE.csv, FILE.parquet or FILE.xlsx."),
-)  # fmt: skip
+    click.option(
+        "--workers",
+        type=click.IntRange(min=1),
+        metavar="N",
+        help=f"Processes for more than {MANY} records, all processors unless given.",
+    ),
+    click.option(
+        "--engine",
+        metavar="NAME",
+        default="processes",
+        show_default=True,
+        help="Where many records are worked on: processes, cluster (Dask, on this machine) or cluster://HOST:PORT.",
+    ),
+    click.option(
+        "--table",
+        type=click.Path(path_type=Path),
+        metavar="FILE",
+        help="Write one row a record into FILE.csv, FILE.parquet or FILE.xlsx.",
+    ),
+)
 
 
 @dataclass(frozen=True)

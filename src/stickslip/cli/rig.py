@@ -174,8 +174,14 @@ def _planned(
     "--offset", metavar="TIME", help="Time to add to SECOND's clock in s, or with its unit; found unless given."
 )
 @click.option("--drift", is_flag=True, help="Find how much faster one clock runs, too.")
-@click.option("--format", "form", type=click.Choice(["csv", "h5", "parquet"]), default="csv", show_default=True,
-              help="Format of the record.")  # fmt: skip
+@click.option(
+    "--format",
+    "form",
+    type=click.Choice(["csv", "h5", "parquet"]),
+    default="csv",
+    show_default=True,
+    help="Format of the record.",
+)
 @result_options("FIRST-joined")
 @reading_options
 def join(first: str, second: str, output: Path | None, as_json: bool, everything: bool, **options: Any) -> None:

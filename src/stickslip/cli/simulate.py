@@ -49,9 +49,13 @@ LIST_WIDTH = 100
 @click.option("--fs", metavar="HZ", help="Sampling rate of the record; fine enough for the motion unless given.")
 @form_option
 @click.option("--animate", "animation", type=click.Choice(["gif", "mp4"]), help="Add a moving picture; mp4 by ffmpeg.")
-@click.option("--fmu", type=click.Path(path_type=Path), metavar="FILE.fmu",
-              help="Also write the mass with its friction as a functional mock-up unit (FMI 3), which a C compiler "
-              "here compiles; force and z are its inputs.")  # fmt: skip
+@click.option(
+    "--fmu",
+    type=click.Path(path_type=Path),
+    metavar="FILE.fmu",
+    help="Also write the mass with its friction as a functional mock-up unit (FMI 3), which a C compiler "
+    "here compiles; force and z are its inputs.",
+)
 @click.option("--sound", is_flag=True, help="Add what is heard, sound.wav; of a squeak rig its sensors' record too.")
 @result_options("NAME-stickslip")
 def simulate(
@@ -139,12 +143,26 @@ CASE = click.argument("case", metavar="SCENARIO|FILE.toml")
 
 @click.command()
 @click.argument("file", type=click.Path(path_type=Path))
-@click.option("--engine", default="threads", show_default=True, metavar="NAME",
-              help="Where it runs: serial, threads, dask, dask://HOST:PORT or cuda.")  # fmt: skip
-@click.option("--store", type=click.Path(path_type=Path), metavar="MAP.ZARR",
-              help="Where what is done is kept, and goes on after an end; FILE.zarr unless given.")  # fmt: skip
-@click.option("--output", type=click.Path(path_type=Path), callback=usable, metavar="DIR",
-              help="Folder for the report and its figures; none unless given.")  # fmt: skip
+@click.option(
+    "--engine",
+    default="threads",
+    show_default=True,
+    metavar="NAME",
+    help="Where it runs: serial, threads, dask, dask://HOST:PORT or cuda.",
+)
+@click.option(
+    "--store",
+    type=click.Path(path_type=Path),
+    metavar="MAP.ZARR",
+    help="Where what is done is kept, and goes on after an end; FILE.zarr unless given.",
+)
+@click.option(
+    "--output",
+    type=click.Path(path_type=Path),
+    callback=usable,
+    metavar="DIR",
+    help="Folder for the report and its figures; none unless given.",
+)
 @click.option("--json", "as_json", is_flag=True, help="Print the results as JSON and nothing else.")
 @all_option
 def sweep(file: Path, engine: str, store: Path | None, output: Path | None, as_json: bool, everything: bool) -> None:
@@ -240,9 +258,13 @@ def bifurcation(
     values = [low + (high - low) * place / last for place in range(last + 1)]
     chosen = {key: options[key] for key in ("transient", "branches")}
     _answer(
-        wanted, "bifurcation", lambda: ss.bifurcation(wanted.system, parameter, values=values, **chosen),
-        output, as_json, everything,
-    )  # fmt: skip
+        wanted,
+        "bifurcation",
+        lambda: ss.bifurcation(wanted.system, parameter, values=values, **chosen),
+        output,
+        as_json,
+        everything,
+    )
 
 
 @click.command()
@@ -254,8 +276,13 @@ def bifurcation(
     metavar="HZ",
     help="Of the dither; a fast one unless given. Repeatable.",
 )
-@click.option("--on", type=click.Choice(["face", "base", "force"]), default="face", show_default=True,
-              help="What the dither moves: the counter-face, the spring's end, or the mass by a force.")  # fmt: skip
+@click.option(
+    "--on",
+    type=click.Choice(["face", "base", "force"]),
+    default="face",
+    show_default=True,
+    help="What the dither moves: the counter-face, the spring's end, or the mass by a force.",
+)
 @click.option(
     "--cycles",
     type=click.IntRange(min=1),
@@ -263,8 +290,13 @@ def bifurcation(
     show_default=True,
     help="Length of a run in periods of the slow motion.",
 )
-@click.option("--precision", type=click.FloatRange(min=0, max=1, min_open=True), default=0.02, show_default=True,
-              help="Relative width left of the amplitude's range.")  # fmt: skip
+@click.option(
+    "--precision",
+    type=click.FloatRange(min=0, max=1, min_open=True),
+    default=0.02,
+    show_default=True,
+    help="Relative width left of the amplitude's range.",
+)
 @changes_option
 @result_options("NAME-dither")
 def dither(case: str, output: Path | None, as_json: bool, everything: bool, **options: Any) -> None:
@@ -283,9 +315,13 @@ def dither(case: str, output: Path | None, as_json: bool, everything: bool, **op
     tones = [number_of(frequency, "Hz", "--frequency") for frequency in options["frequencies"]] or None
     chosen = {key: options[key] for key in ("on", "cycles", "precision")}
     _answer(
-        wanted, "dither", lambda: ss.dither(system, frequency=tones, start=wanted.start or None, **chosen),
-        output, as_json, everything,
-    )  # fmt: skip
+        wanted,
+        "dither",
+        lambda: ss.dither(system, frequency=tones, start=wanted.start or None, **chosen),
+        output,
+        as_json,
+        everything,
+    )
 
 
 def _case(name: str, changes: Sequence[str]) -> Case:

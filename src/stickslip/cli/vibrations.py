@@ -44,9 +44,11 @@ BLOCK = 1_000_000  # rows of a part that is mapped: spikes and sticks are asked 
 @click.option("--gravity/--no-gravity", default=None, help="Whether gravity acts on it; of an angle yes unless said.")
 @click.option("--axis", metavar="NAME", help="Which axis of a log of several: a part of its columns' names.")
 @click.option(
-    "--propose", type=click.Path(path_type=Path, dir_okay=False), metavar="FILE",
+    "--propose",
+    type=click.Path(path_type=Path, dir_okay=False),
+    metavar="FILE",
     help="Write a motion into FILE that would tell what this log does not, within its range and speed.",
-)  # fmt: skip
+)
 @result_options("LOG-joint")
 @reading_options
 def joint(

@@ -255,11 +255,16 @@ def sampling_check(record: Record, seen: Seen) -> Check:
     mean = float(sum(last - first for first, last in turning)) / turns
     rate = max(record.fs * LEAST_SAMPLES / max(mean, FEWEST), RINGS * _coupled(record["x"], force, turning, seen))
     check = compared(
-        name, LEAST_SAMPLES, mean, sd=max(0.25, seen.tolerance), unit="1", bound=True,
+        name,
+        LEAST_SAMPLES,
+        mean,
+        sd=max(0.25, seen.tolerance),
+        unit="1",
+        bound=True,
         holds="enough to see how the friction turns round",
         fails=f"a reversal has {mean:.2g} sample{'' if mean == 1 else 's'} on the average, too few to see how the "
         f"friction turns round: sample at {_round_up(rate):.0f} Hz or more, or the contact is rigid",
-    )  # fmt: skip
+    )
     return replace(check, verdict=UNTOLD) if check.verdict == FAILS else check  # a rigid contact contradicts nothing
 
 

@@ -158,10 +158,14 @@ def _derivative(seen: Seen, channel: str, name: str, unit: str) -> Check:
     turned = -1.0 if (complex(read.mean()) * complex(moved.mean()).conjugate()).real < 0 else 1.0
     sd = math.hypot(seen.sd(read - moved), math.sqrt(2) * seen.tolerance * right)
     return judged(
-        name, turned * float(left), float(right), abs(complex((read - moved).mean())) / sd, unit=unit,
+        name,
+        turned * float(left),
+        float(right),
+        abs(complex((read - moved).mean())) / sd,
+        unit=unit,
         holds=f"amplitude and phase of {channel} are those of x",
         fails=_off(channel, "x", complex(read.mean() / moved.mean()), seen),
-    )  # fmt: skip
+    )
 
 
 def _off(name: str, other: str, ratio: complex, seen: Seen) -> str:
@@ -198,10 +202,14 @@ def forces_check(seen: Seen) -> Check:
     sd = math.hypot(seen.sd(felt - computed), math.sqrt(2) * seen.tolerance * float(np.linalg.norm(sizes)))
     rest = complex((felt - computed).mean())
     return judged(
-        name, float(abs(felt.mean())), float(abs(computed.mean())), abs(rest) / sd,
-        unit="N", holds="the load cell measures what the motion leaves over",
+        name,
+        float(abs(felt.mean())),
+        float(abs(computed.mean())),
+        abs(rest) / sd,
+        unit="N",
+        holds="the load cell measures what the motion leaves over",
         fails=_unbalanced(rest, complex(felt.mean()), complex((inertia / m).mean()), complex((z - x).mean()), seen, sd),
-    )  # fmt: skip
+    )
 
 
 def _unbalanced(rest: complex, felt: complex, acceleration: complex, stretch: complex, seen: Seen, sd: float) -> str:
@@ -242,12 +250,17 @@ def energy_check(seen: Seen) -> Check:
     size = math.sqrt(2) * seen.tolerance * math.hypot(left, right)
     turned = min(left, right) < 0
     return compared(
-        ENERGY, left, right, sd=math.hypot(seen.sd(given - taken), size), unit="J",
+        ENERGY,
+        left,
+        right,
+        sd=math.hypot(seen.sd(given - taken), size),
+        unit="J",
         holds="friction and damper take what the drive gives",
-        fails="energy runs the wrong way: a channel has the wrong sign, or two are exchanged" if turned else
-        f"friction and damper take {100 * abs(right / left - 1):.0f} % {'more' if right > left else 'less'} than the "
-        "drive gives: a calibration, the spring or a delay is off",
-    )  # fmt: skip
+        fails="energy runs the wrong way: a channel has the wrong sign, or two are exchanged"
+        if turned
+        else f"friction and damper take {100 * abs(right / left - 1):.0f} % {'more' if right > left else 'less'} than "
+        "the drive gives: a calibration, the spring or a delay is off",
+    )
 
 
 def _energy_without_cycles(seen: Seen) -> Check:
@@ -255,10 +268,15 @@ def _energy_without_cycles(seen: Seen) -> Check:
     if abs(seen.trips) < FEW_TRIPS:
         return untold(ENERGY, "the motion does not repeat")
     return compared(
-        ENERGY, 0.0, seen.trips, sd=1.0, unit="1", bound=True,
+        ENERGY,
+        0.0,
+        seen.trips,
+        sd=1.0,
+        unit="1",
+        bound=True,
         holds="over the record friction takes energy, though no cycle is like another",
         fails="friction gives energy: load or x has the wrong sign",
-    )  # fmt: skip
+    )
 
 
 def _given(seen: Seen) -> Array | None:
@@ -273,9 +291,15 @@ def _one_way(energy: Array, seen: Seen, unit: str, holds: str, fails: str) -> Ch
     """Whether an energy of each cycle is positive."""
     mean = float(energy.mean())
     return compared(
-        ENERGY, 0.0, mean, sd=math.hypot(seen.sd(energy), seen.tolerance * abs(mean)), unit=unit, bound=True,
-        holds=holds, fails=f"{fails}: a channel has the wrong sign, or two are exchanged",
-    )  # fmt: skip
+        ENERGY,
+        0.0,
+        mean,
+        sd=math.hypot(seen.sd(energy), seen.tolerance * abs(mean)),
+        unit=unit,
+        bound=True,
+        holds=holds,
+        fails=f"{fails}: a channel has the wrong sign, or two are exchanged",
+    )
 
 
 def momentum_check(seen: Seen) -> Check:
@@ -297,9 +321,14 @@ def momentum_check(seen: Seen) -> Check:
         return untold(name, "neither an accelerometer nor a load cell that keeps its charge, with mass and stiffness")
     sd = math.hypot(seen.sd(np.asarray(left - right)), seen.tolerance * size)
     return compared(
-        name, float(np.mean(left)), float(np.mean(right)), sd=sd, unit=unit,
-        holds="what acts on the mass has no mean over whole cycles", fails=sentence,
-    )  # fmt: skip
+        name,
+        float(np.mean(left)),
+        float(np.mean(right)),
+        sd=sd,
+        unit=unit,
+        holds="what acts on the mass has no mean over whole cycles",
+        fails=sentence,
+    )
 
 
 def zero_off(seen: Seen) -> Slip | None:
@@ -339,10 +368,14 @@ def identity_check(seen: Seen) -> Check:
     first = float(w**2 * seen.work(seen.channels["load"]).mean())
     sd = math.hypot(seen.sd(per_cycle), math.sqrt(2) * seen.tolerance * float(np.linalg.norm(sizes)))
     return compared(
-        name, first + float(per_cycle.mean()), first, sd=sd, unit="N m/s^2",
+        name,
+        first + float(per_cycle.mean()),
+        first,
+        sd=sd,
+        unit="N m/s^2",
         holds="the integrals of -f x''' and w^2 f x' over a cycle are one, as under any friction law",
         fails="load and x are not of one motion under one harmonic drive: a delay, a mount or a second frequency",
-    )  # fmt: skip
+    )
 
 
 def stops_check(seen: Seen) -> Check:
@@ -385,10 +418,16 @@ def _stopping(share: float, least: float, sd: float) -> Check:
 def _sliding_on(share: float, least: float, sd: float, friction: float, drive: float) -> Check:
     """Of a mass that does not stop: whether friction lets it slide on."""
     check = compared(
-        STOPPING, share, math.pi / 4, sd=sd, unit="1", bound=True, holds="it slides on, as this friction allows",
+        STOPPING,
+        share,
+        math.pi / 4,
+        sd=sd,
+        unit="1",
+        bound=True,
+        holds="it slides on, as this friction allows",
         fails=f"it slides on against {friction:.3g} N, and against more than {math.pi * drive / 4:.3g} N (pi k Z / 4) "
         "it can not: friction, base motion or stiffness is wrong",
-    )  # fmt: skip
+    )
     if check.verdict == HOLDS and share > least + APART * sd:
         sentence = (
             f"it slides on where a rigid contact would stop ({least:.3g} of k Z, Den Hartog): the contact is elastic"

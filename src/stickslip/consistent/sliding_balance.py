@@ -231,11 +231,16 @@ def _energy(numbers: Mapping[str, _Number]) -> Check:
     at = _centre(numbers)
     most = math.pi * at["stiffness"] * at["base amplitude"] / 4
     return compared(
-        "energy", loss(at), given(at), sd=_sd(lambda v: loss(v) - given(v), numbers), unit="J", bound=True,
+        "energy",
+        loss(at),
+        given(at),
+        sd=_sd(lambda v: loss(v) - given(v), numbers),
+        unit="J",
+        bound=True,
         holds="friction takes no more from a cycle than the base can give",
         fails=f"friction takes more from a cycle than the base can give at any phase: against {most:.3g} N or more "
         "(pi k Z / 4) it can not slide on",
-    )  # fmt: skip
+    )
 
 
 def _friction(numbers: Mapping[str, _Number]) -> Check:
@@ -245,18 +250,27 @@ def _friction(numbers: Mapping[str, _Number]) -> Check:
     name = "friction that base and amplitude ask for"
     if not math.isfinite(needed):
         return compared(
-            name, at["sliding friction"], 0.0, sd=numbers["sliding friction"].sd or at["sliding friction"] * 1e-3,
-            unit="N", holds="none", fails="no friction keeps this amplitude so small, or allows one so large",
-        )  # fmt: skip
+            name,
+            at["sliding friction"],
+            0.0,
+            sd=numbers["sliding friction"].sd or at["sliding friction"] * 1e-3,
+            unit="N",
+            holds="none",
+            fails="no friction keeps this amplitude so small, or allows one so large",
+        )
     sd = math.hypot(_needed_sd(needed, numbers), numbers["sliding friction"].sd)
     share = at["sliding friction"] / needed - 1
     contact = "an elastic" if "contact stiffness" in at else "a rigid"
     return compared(
-        name, at["sliding friction"], needed, sd=sd, unit="N",
+        name,
+        at["sliding friction"],
+        needed,
+        sd=sd,
+        unit="N",
         holds=f"the stated friction keeps up the stated motion on {contact} contact",
         fails=f"friction, base amplitude and amplitude can not all be true: on {contact} contact this motion needs "
         f"{needed:.3g} N, and {abs(100 * share):.0f} % {'more' if share > 0 else 'less'} is stated",
-    )  # fmt: skip
+    )
 
 
 def _short(values: Values) -> float:
@@ -300,10 +314,15 @@ def _boundary(numbers: Mapping[str, _Number]) -> Check:
 
     at = _centre(numbers)
     check = compared(
-        "sliding without stops", share(at), least(at), sd=_sd(lambda v: share(v) - least(v), numbers), unit="1",
-        bound=True, holds="a rigid contact slides without stops (Den Hartog)",
+        "sliding without stops",
+        share(at),
+        least(at),
+        sd=_sd(lambda v: share(v) - least(v), numbers),
+        unit="1",
+        bound=True,
+        holds="a rigid contact slides without stops (Den Hartog)",
         fails="a rigid contact stops on its way (Den Hartog): this is no motion of sliding alone",
-    )  # fmt: skip
+    )
     elastic = "contact stiffness" in at and share(at) < math.pi / 4
     if check.verdict != HOLDS and elastic:
         sentence = "a rigid contact would stop on its way (Den Hartog); an elastic one may slide on"
@@ -323,10 +342,14 @@ def _transition(numbers: Mapping[str, _Number]) -> Check:
 
     at = _centre(numbers)
     return compared(
-        name, at["transition speed"], follows(at), sd=_sd(lambda v: v["transition speed"] - follows(v), numbers),
-        unit="m/s", holds="it is what friction, amplitude and contact stiffness say (thesis, 3.4)",
+        name,
+        at["transition speed"],
+        follows(at),
+        sd=_sd(lambda v: v["transition speed"] - follows(v), numbers),
+        unit="m/s",
+        holds="it is what friction, amplitude and contact stiffness say (thesis, 3.4)",
         fails="it is not what friction, amplitude and contact stiffness say (thesis, 3.4)",
-    )  # fmt: skip
+    )
 
 
 def what_fails(checks: Sequence[Check]) -> str:

@@ -411,7 +411,11 @@ def _of_curve(speeds: Array, lagging: str, off: float) -> Estimate:
     sd, freedom = mean_uncertainty(speeds)
     scatter = float(np.std(speeds, ddof=1)) if len(speeds) > 1 else math.nan
     speed = Estimate.normal(
-        f"{SPEED} by the curve", float(np.mean(speeds)), sd=sd, unit="m/s", quantile=student(freedom),
+        f"{SPEED} by the curve",
+        float(np.mean(speeds)),
+        sd=sd,
+        unit="m/s",
+        quantile=student(freedom),
         method="curve of friction against velocity, where it reaches the sliding friction",
         status=Status(*([Doubt.few(len(speeds), "turn")] if len(speeds) < FEW else [])),
         checks=(
@@ -419,7 +423,7 @@ def _of_curve(speeds: Array, lagging: str, off: float) -> Estimate:
             lagging,
             f"the smoother rounds the end of the turn: off by {100 * off:.2g} % at most on a rig like the thesis's",
         ),
-    )  # fmt: skip
+    )
     half = (speed.interval[1] - speed.interval[0]) / 2 + off * speed.value
     return replace(speed, interval=(speed.value - half, speed.value + half), sd=half / NORMAL_95)
 

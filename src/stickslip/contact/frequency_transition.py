@@ -296,14 +296,21 @@ def _stick_by_stick(record: Record, channel: str, ringing: Ringing, pooled: Mode
         frequency, damping = own.possible(ringing.fs) if own is not None else _untold_alone(pooled)
         rings.append(
             StickTransition(
-                time=ringing.time(window, begin), duration=event.duration, frequency=frequency, damping=damping,
+                time=ringing.time(window, begin),
+                duration=event.duration,
+                frequency=frequency,
+                damping=damping,
                 amplitude=Estimate.normal(
-                    "transition amplitude", size, sd=sd, unit=record.channels[channel].unit,
+                    "transition amplitude",
+                    size,
+                    sd=sd,
+                    unit=record.channels[channel].unit,
                     method="of the first ring, at its begin",
                 ),
-                wavelet_frequency=peak, rings=len(window.rings),
+                wavelet_frequency=peak,
+                rings=len(window.rings),
             )
-        )  # fmt: skip
+        )
     return tuple(rings)
 
 
@@ -370,9 +377,14 @@ def _stiffness(mode: Mode, mass: Constant | None, spring: Constant | None) -> Es
     quantile = (mode.frequency.interval[1] - mode.frequency.value) / mode.frequency.sd
     status = "ok" if spring is not None else "the spring's own stiffness is part of it"
     return Estimate.normal(
-        "contact stiffness by frequency", kilograms * square - k, sd=kilograms * square * relative, unit="N/m",
-        method="K = m |p|^2 - k", quantile=quantile, status=status,
-    ).within(0.0, otherwise="it rings slower than on its spring alone: mass= or stiffness= is wrong")  # fmt: skip
+        "contact stiffness by frequency",
+        kilograms * square - k,
+        sd=kilograms * square * relative,
+        unit="N/m",
+        method="K = m |p|^2 - k",
+        quantile=quantile,
+        status=status,
+    ).within(0.0, otherwise="it rings slower than on its spring alone: mass= or stiffness= is wrong")
 
 
 def _loop_stiffness(record: Record, ringing: Ringing, mode: Mode) -> Estimate | None:

@@ -272,9 +272,13 @@ def is_late(delay: Estimate) -> bool:
 
 
 def _answer(
-    record: Record, data: JointData, fit: LeastSquares, terms: tuple[str, ...], pull: tuple[float, float],
+    record: Record,
+    data: JointData,
+    fit: LeastSquares,
+    terms: tuple[str, ...],
+    pull: tuple[float, float],
     left_out: tuple[str, ...],
-) -> JointFriction:  # fmt: skip
+) -> JointFriction:
     slides = data.logs[0].sliding
     rows, window = slides.rows, slides.window
     carried = _carried(data, pull)
@@ -294,18 +298,34 @@ def _answer(
     weight += pull[1] * window.apply(np.cos(data.logs[0].position))[rows]
     damped = known["damping"].value * _error_rate(data) if "damping" in known else np.zeros(len(data.raw))
     return JointFriction(
-        level=level.within(0.0), forward=forward, back=back, viscous=known["viscous"], viscous_forward=ways[0],
-        viscous_back=ways[1], load=known.get("load"),
-        inertia=inertia.within(0.0), sine=known.get("sine"), cosine=known.get("cosine"), damping=known.get("damping"),
-        warming=known.get("warming"), thinning=known.get("thinning"),
-        temperature=data.logs[0].about if "warming" in known else None, torque=data.raw + damped,
+        level=level.within(0.0),
+        forward=forward,
+        back=back,
+        viscous=known["viscous"],
+        viscous_forward=ways[0],
+        viscous_back=ways[1],
+        load=known.get("load"),
+        inertia=inertia.within(0.0),
+        sine=known.get("sine"),
+        cosine=known.get("cosine"),
+        damping=known.get("damping"),
+        warming=known.get("warming"),
+        thinning=known.get("thinning"),
+        temperature=data.logs[0].about if "warming" in known else None,
+        torque=data.raw + damped,
         gain=data.stated["kp"].value if data.source == "reference" else 0.0,
-        carried=carried, residual=float(np.linalg.norm(fit.residual) / np.linalg.norm(data.torque)),
-        condition=fit.condition, time=record.start + rows / record.fs, speed=speed, measured=data.torque,
+        carried=carried,
+        residual=float(np.linalg.norm(fit.residual) / np.linalg.norm(data.torque)),
+        condition=fit.condition,
+        time=record.start + rows / record.fs,
+        speed=speed,
+        measured=data.torque,
         explained=data.torque - fit.residual,
         friction=data.torque + damped[rows] - inertia.value * acceleration - weight,
-        left_out=left_out, source=data.source, status=status,
-    )  # fmt: skip
+        left_out=left_out,
+        source=data.source,
+        status=status,
+    )
 
 
 def _carried(data: JointData, pull: tuple[float, float]) -> float:
@@ -537,11 +557,20 @@ def regress_joint_logs(
         for place, (log, record) in enumerate(zip(data, records, strict=True))
     ]
     return JointLogs(
-        known["forward"].within(0.0), known["back"].within(0.0), known["viscous"],
-        load=known.get("load"), inertia=known.get("inertia"), sine=known.get("sine"), cosine=known.get("cosine"),
-        damping=known.get("damping"), warming=known.get("warming"), thinning=known.get("thinning"),
-        predictions=tuple(predictions), left_out=left_out, delay=delay,
-    )  # fmt: skip
+        known["forward"].within(0.0),
+        known["back"].within(0.0),
+        known["viscous"],
+        load=known.get("load"),
+        inertia=known.get("inertia"),
+        sine=known.get("sine"),
+        cosine=known.get("cosine"),
+        damping=known.get("damping"),
+        warming=known.get("warming"),
+        thinning=known.get("thinning"),
+        predictions=tuple(predictions),
+        left_out=left_out,
+        delay=delay,
+    )
 
 
 def _predicted(log: JointData, others: JointData, record: Record) -> JointPrediction:

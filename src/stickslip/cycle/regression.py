@@ -271,9 +271,15 @@ POSITIVE = ("inertia", "coulomb", "stiffness")  # viscous friction may fall with
 
 
 def _answer(
-    record: Record, name: str, fit: LeastSquares, terms: list[str], force: Array, rows: NDArray[np.intp], width: float,
+    record: Record,
+    name: str,
+    fit: LeastSquares,
+    terms: list[str],
+    force: Array,
+    rows: NDArray[np.intp],
+    width: float,
     noisy: float,
-) -> Regression:  # fmt: skip
+) -> Regression:
     turning = record.channels[name].unit == "N m"
     method = f"least squares below {width:.3g} Hz"
     checks = (
@@ -297,13 +303,24 @@ def _answer(
         if word not in known:
             known[word] = _mean_of_both(known[f"{word}_forward"], known[f"{word}_back"], WORDS[word])
     return Regression(
-        inertia=known["inertia"], viscous=known["viscous"], coulomb=known["coulomb"], offset=known.get("offset"),
-        stiffness=known.get("stiffness"), viscous_forward=known.get("viscous_forward"),
-        viscous_back=known.get("viscous_back"), coulomb_forward=known.get("coulomb_forward"),
-        coulomb_back=known.get("coulomb_back"), residual=float(np.linalg.norm(fit.residual) / np.linalg.norm(force)),
-        time=record.start + rows / record.fs, measured=force, explained=force - fit.residual, bandwidth=width,
-        condition=fit.condition, signal=name, status=status,
-    )  # fmt: skip
+        inertia=known["inertia"],
+        viscous=known["viscous"],
+        coulomb=known["coulomb"],
+        offset=known.get("offset"),
+        stiffness=known.get("stiffness"),
+        viscous_forward=known.get("viscous_forward"),
+        viscous_back=known.get("viscous_back"),
+        coulomb_forward=known.get("coulomb_forward"),
+        coulomb_back=known.get("coulomb_back"),
+        residual=float(np.linalg.norm(fit.residual) / np.linalg.norm(force)),
+        time=record.start + rows / record.fs,
+        measured=force,
+        explained=force - fit.residual,
+        bandwidth=width,
+        condition=fit.condition,
+        signal=name,
+        status=status,
+    )
 
 
 def _mean_of_both(forward: Estimate, back: Estimate, name: str) -> Estimate:

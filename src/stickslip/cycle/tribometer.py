@@ -179,10 +179,19 @@ def friction_coefficients(
     }
     position, cycle, forward, back = _map(friction, motion, label, loads)
     return Coefficients(
-        **coefficients, load=load, of_cycles=of_cycles, time=motion.start + cycles.edges[:-1] / motion.fs,
-        wear_in=wear_in, position=position, cycle=cycle, forward=forward, back=back, unit=motion.unit,
-        measured=load.method != "stated", status=status,
-    )  # fmt: skip
+        **coefficients,
+        load=load,
+        of_cycles=of_cycles,
+        time=motion.start + cycles.edges[:-1] / motion.fs,
+        wear_in=wear_in,
+        position=position,
+        cycle=cycle,
+        forward=forward,
+        back=back,
+        unit=motion.unit,
+        measured=load.method != "stated",
+        status=status,
+    )
 
 
 def _called(name: str) -> str:

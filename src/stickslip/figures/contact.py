@@ -278,9 +278,14 @@ def plot_triboscopy(coefficients: Coefficients, *, ax: Axes | None = None) -> Ax
     low, high = np.nanquantile(both, [0.02, 0.98])
     last = len(next(iter(coefficients.of_cycles.values())))
     mesh = ax.imshow(
-        both, aspect="auto", origin="lower", vmin=low, vmax=high, interpolation="nearest",
+        both,
+        aspect="auto",
+        origin="lower",
+        vmin=low,
+        vmax=high,
+        interpolation="nearest",
         extent=(factor * coefficients.position[0], factor * coefficients.position[-1], 1, last),
-    )  # fmt: skip
+    )
     ax.figure.colorbar(mesh, ax=ax, label="friction over load")
     ax.set(xlabel=f"displacement [{unit}]", ylabel="cycle")
     return ax

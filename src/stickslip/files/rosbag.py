@@ -117,14 +117,17 @@ def _titles(streams: Sequence[Stream]) -> list[list[str]]:
     """Of each stream its columns' names: those of joints as they are, others, and what clashes, after the topic."""
     often = Counter(name for stream in streams if stream.named for name in stream.columns)
     titles = iter(
-        unique([
-            "time",
-            *(
-                name if stream.named and often[name] == 1 else f"{stream.topic}/{name}"
-                for stream in streams for name in stream.columns
-            ),
-        ])[1:]
-    )  # fmt: skip
+        unique(
+            [
+                "time",
+                *(
+                    name if stream.named and often[name] == 1 else f"{stream.topic}/{name}"
+                    for stream in streams
+                    for name in stream.columns
+                ),
+            ]
+        )[1:]
+    )
     return [[next(titles) for _ in stream.columns] for stream in streams]
 
 

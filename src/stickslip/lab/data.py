@@ -376,8 +376,14 @@ def _of(request: Request) -> Data:
     return data
 
 
-@described("Keep a file", query={"name": {"type": "string"}}, body={"type": "string", "format": "binary"},
-           media="application/octet-stream", answer=FILE, status=201)  # fmt: skip
+@described(
+    "Keep a file",
+    query={"name": {"type": "string"}},
+    body={"type": "string", "format": "binary"},
+    media="application/octet-stream",
+    answer=FILE,
+    status=201,
+)
 async def send_file(request: Request) -> Response:
     """Keep a file; its own name is a label."""
     stated = request.headers.get("content-length", "")

@@ -331,14 +331,21 @@ async def _preset(request: Request) -> Response:
     return await _answer(request, {"want": "preset", "name": request.path_params["name"]})
 
 
-@described("A state as a system's file in TOML and as a Python program", body=STATE,
-           answer={"type": "object", "required": ["toml", "python"]})  # fmt: skip
+@described(
+    "A state as a system's file in TOML and as a Python program",
+    body=STATE,
+    answer={"type": "object", "required": ["toml", "python"]},
+)
 async def _export(request: Request) -> Response:
     return await _answer(request, {"want": "export", "state": await _body(request)})
 
 
-@described("The state of a system's file", body={"type": "string"}, media="text/plain",
-           answer={"type": "object", "required": ["state"]})  # fmt: skip
+@described(
+    "The state of a system's file",
+    body={"type": "string"},
+    media="text/plain",
+    answer={"type": "object", "required": ["state"]},
+)
 async def _open(request: Request) -> Response:
     return await _answer(request, {"want": "open", "text": (await request.body()).decode("utf-8", "replace")})
 

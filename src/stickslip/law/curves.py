@@ -108,10 +108,13 @@ def _uneven_columns(samples: Samples, logs: Array) -> Array:
 
 
 COULOMB = Family(
-    "f = kinetic sign(v) + offset", "v",
+    "f = kinetic sign(v) + offset",
+    "v",
     lambda samples, logs: _with_offset(samples, np.sign(samples.velocity)),
-    _parameters("kinetic"), _named("kinetic", "offset"), lambda values: Coulomb(values["kinetic"]),
-)  # fmt: skip
+    _parameters("kinetic"),
+    _named("kinetic", "offset"),
+    lambda values: Coulomb(values["kinetic"]),
+)
 VISCOUS = Family(
     "f = kinetic sign(v) + viscous v + offset",
     "v",
@@ -121,21 +124,35 @@ VISCOUS = Family(
     lambda values: LinearSlope(values["kinetic"], slope=values["viscous"]),
 )
 DRY_STRIBECK = Family(
-    "f = (kinetic + (static - kinetic) exp(-(|v|/speed)^exponent)) sign(v) + offset", "v",
-    _stribeck_columns, _parameters("kinetic", "static"),
-    _named("kinetic", "static", "offset", "speed", "exponent"), _stribeck_law, _stribeck_starts, _beware,
-)  # fmt: skip
+    "f = (kinetic + (static - kinetic) exp(-(|v|/speed)^exponent)) sign(v) + offset",
+    "v",
+    _stribeck_columns,
+    _parameters("kinetic", "static"),
+    _named("kinetic", "static", "offset", "speed", "exponent"),
+    _stribeck_law,
+    _stribeck_starts,
+    _beware,
+)
 STRIBECK = Family(
-    "f = (kinetic + (static - kinetic) exp(-(|v|/speed)^exponent)) sign(v) + viscous v + offset", "v",
-    _stribeck_viscous_columns, _parameters("kinetic", "static", "viscous"),
-    _named("kinetic", "static", "viscous", "offset", "speed", "exponent"), _stribeck_law, _stribeck_starts, _beware,
-    instead=DRY_STRIBECK, positive=("viscous",),
-)  # fmt: skip
+    "f = (kinetic + (static - kinetic) exp(-(|v|/speed)^exponent)) sign(v) + viscous v + offset",
+    "v",
+    _stribeck_viscous_columns,
+    _parameters("kinetic", "static", "viscous"),
+    _named("kinetic", "static", "viscous", "offset", "speed", "exponent"),
+    _stribeck_law,
+    _stribeck_starts,
+    _beware,
+    instead=DRY_STRIBECK,
+    positive=("viscous",),
+)
 UNEVEN = Family(
-    "f = kinetic_forward + viscous_forward v where v > 0, -kinetic_back + viscous_back v where v < 0", "v",
-    _uneven_columns, _parameters("kinetic_forward", "viscous_forward", "kinetic_back", "viscous_back"),
-    _named("kinetic_forward", "viscous_forward", "kinetic_back", "viscous_back"), lambda values: None,
-)  # fmt: skip
+    "f = kinetic_forward + viscous_forward v where v > 0, -kinetic_back + viscous_back v where v < 0",
+    "v",
+    _uneven_columns,
+    _parameters("kinetic_forward", "viscous_forward", "kinetic_back", "viscous_back"),
+    _named("kinetic_forward", "viscous_forward", "kinetic_back", "viscous_back"),
+    lambda values: None,
+)
 
 
 def table(samples: Samples, points: int) -> Family:
@@ -153,9 +170,14 @@ def table(samples: Samples, points: int) -> Family:
 
     places = ", ".join(f"{node:.3g}" for node in nodes)
     return Family(
-        f"f = F(|v|) sign(v) + offset, F a polygon through force_1 ... force_{points} at {places} m/s", "v", columns,
-        _parameters(*names), _named(*names, "offset"), law, fitted=lambda made, data: _monotone(made, data, points),
-    )  # fmt: skip
+        f"f = F(|v|) sign(v) + offset, F a polygon through force_1 ... force_{points} at {places} m/s",
+        "v",
+        columns,
+        _parameters(*names),
+        _named(*names, "offset"),
+        law,
+        fitted=lambda made, data: _monotone(made, data, points),
+    )
 
 
 def _monotone(columns: Array, friction: Array, points: int) -> Array:
@@ -365,18 +387,25 @@ def _beware_of_span(*, span: Callable[[dict[str, Estimate]], float]) -> Beware:
 
 
 DAHL = Family(
-    "df/dx = stiffness (1 - f/kinetic sign(v))^exponent, and offset", "x", _of_dahl,
-    lambda c, shape: {"kinetic": c[0], "stiffness": c[0] / shape[0], "offset": c[1], "exponent": shape[1]}, UNITS,
+    "df/dx = stiffness (1 - f/kinetic sign(v))^exponent, and offset",
+    "x",
+    _of_dahl,
+    lambda c, shape: {"kinetic": c[0], "stiffness": c[0] / shape[0], "offset": c[1], "exponent": shape[1]},
+    UNITS,
     lambda values: Dahl(values["kinetic"], stiffness=values["stiffness"], exponent=values["exponent"]),
     lambda samples: (*_lengths(samples), np.log(POWERS)),
     _beware_of_span(span=lambda estimates: DAHL_LENGTHS * estimates["kinetic"].value / estimates["stiffness"].value),
-)  # fmt: skip
+)
 JENKINS = Family(
-    "df/dx = stiffness up to |f| = kinetic, and offset", "x", _of_jenkins,
-    lambda c, shape: {"kinetic": c[0] * shape[0], "stiffness": c[0], "offset": c[1]}, UNITS,
-    lambda values: ElastoSlip([values["stiffness"]], [values["kinetic"]]), _lengths,
+    "df/dx = stiffness up to |f| = kinetic, and offset",
+    "x",
+    _of_jenkins,
+    lambda c, shape: {"kinetic": c[0] * shape[0], "stiffness": c[0], "offset": c[1]},
+    UNITS,
+    lambda values: ElastoSlip([values["stiffness"]], [values["kinetic"]]),
+    _lengths,
     _beware_of_span(span=lambda estimates: estimates["kinetic"].value / estimates["stiffness"].value),
-)  # fmt: skip
+)
 
 
 def iwan(elements: int) -> Family:
@@ -388,11 +417,15 @@ def iwan(elements: int) -> Family:
         return np.column_stack([whole, np.ones(len(whole))])
 
     return Family(
-        f"Iwan's {elements} classes that yield evenly up to width, together of stiffness, and offset", "x", columns,
-        lambda c, shape: {"kinetic": c[0] * shape[0] / 2, "stiffness": c[0], "width": shape[0], "offset": c[1]}, UNITS,
-        lambda values: ElastoSlip.iwan(values["stiffness"], width=values["width"], elements=elements), _lengths,
+        f"Iwan's {elements} classes that yield evenly up to width, together of stiffness, and offset",
+        "x",
+        columns,
+        lambda c, shape: {"kinetic": c[0] * shape[0] / 2, "stiffness": c[0], "width": shape[0], "offset": c[1]},
+        UNITS,
+        lambda values: ElastoSlip.iwan(values["stiffness"], width=values["width"], elements=elements),
+        _lengths,
         _beware_of_span(span=lambda estimates: estimates["width"].value),
-    )  # fmt: skip
+    )
 
 
 def maxwell_slip(samples: Samples, elements: int) -> Family:

@@ -195,11 +195,18 @@ def _of_record(
     place = smooth(motion.displacement, record.fs).values if smoothed else motion.displacement
     share = (rows - edges[label]) / (edges[label + 1] - edges[label])
     samples = Samples(
-        time=record.start + rows / record.fs, displacement=place, velocity=motion.velocity,
-        friction=friction, cycle=label, block=np.clip((BLOCKS * share).astype(np.intp), 0, BLOCKS - 1),
-        cycles=len(edges) - 1, noise=noise_level(friction, record.fs), unit=motion.unit,
-        force=force, blur=motion.blur,
-    )  # fmt: skip
+        time=record.start + rows / record.fs,
+        displacement=place,
+        velocity=motion.velocity,
+        friction=friction,
+        cycle=label,
+        block=np.clip((BLOCKS * share).astype(np.intp), 0, BLOCKS - 1),
+        cycles=len(edges) - 1,
+        noise=noise_level(friction, record.fs),
+        unit=motion.unit,
+        force=force,
+        blur=motion.blur,
+    )
     fast = np.abs(motion.velocity) > max(CREEP * peak, AUDIBLE * motion.noise)
     clear = fast & away_from(~fast, motion.blur)
     sliding = clear if clear.sum() > fast.sum() / 2 else fast
@@ -213,12 +220,17 @@ def _of_loops(loops: Loops) -> tuple[Samples, Samples]:
     """The mean cycle; what it knows of the scatter between cycles is in the noise."""
     count = len(loops.phase_grid)
     samples = Samples(
-        time=loops.phase_grid / loops.frequency.value, displacement=loops.displacement, velocity=loops.velocity,
-        friction=loops.friction, cycle=np.zeros(count, dtype=np.intp),
-        block=(BLOCKS * loops.phase_grid).astype(np.intp), cycles=len(loops.cycles),
-        noise=float(np.median(loops.scatter)) / np.sqrt(len(loops.cycles)), unit=loops.unit,
+        time=loops.phase_grid / loops.frequency.value,
+        displacement=loops.displacement,
+        velocity=loops.velocity,
+        friction=loops.friction,
+        cycle=np.zeros(count, dtype=np.intp),
+        block=(BLOCKS * loops.phase_grid).astype(np.intp),
+        cycles=len(loops.cycles),
+        noise=float(np.median(loops.scatter)) / np.sqrt(len(loops.cycles)),
+        unit=loops.unit,
         force=FORCES[loops.unit],
-    )  # fmt: skip
+    )
     fast = np.abs(loops.velocity) > CREEP * float(np.abs(loops.velocity).max())
     twice = samples.rows(np.tile(np.arange(count), 2))  # once round to set the memory
     return replace(twice, skipped=count), _require_sliding(samples.rows(fast & away_from(~fast, 1)))

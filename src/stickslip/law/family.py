@@ -122,9 +122,12 @@ def _least_squares(family: Family, samples: Samples) -> Member:
     coefficients = _coefficients(family, columns, friction)
     if len(logs):
         minimum = minimise(
-            lambda raw: family.columns(samples, raw[count:])[skip:] @ raw[:count], friction,
-            np.concatenate([coefficients, logs]), settled_at=SETTLED, most=MOST,
-        )  # fmt: skip
+            lambda raw: family.columns(samples, raw[count:])[skip:] @ raw[:count],
+            friction,
+            np.concatenate([coefficients, logs]),
+            settled_at=SETTLED,
+            most=MOST,
+        )
         raw, jacobian, residual = minimum.parameters, minimum.jacobian, minimum.residual
     else:
         raw, jacobian, residual = coefficients, columns, friction - columns @ coefficients

@@ -298,13 +298,21 @@ def _answer(curve: str, family: Family, member: Member, *, filled: float) -> Cur
         rounded = re.sub(r"\d+\.\d{6,}", lambda number: f"{float(number[0]):.6g}", refused.value)
         worries.append(f"no law has these values: {rounded}")
     return CurveFit(
-        curve=curve, parameters=parameters, law=law, formula=family.formula, unit=samples.force,
+        curve=curve,
+        parameters=parameters,
+        law=law,
+        formula=family.formula,
+        unit=samples.force,
         residual=float(np.sqrt(np.mean(left**2))),
-        unexplained=float(np.linalg.norm(left) / np.linalg.norm(samples.friction)), model_error=missed,
-        correlations=member.correlations, along=family.along,
+        unexplained=float(np.linalg.norm(left) / np.linalg.norm(samples.friction)),
+        model_error=missed,
+        correlations=member.correlations,
+        along=family.along,
         at={"v": samples.velocity, "x": samples.displacement, "t": samples.time}[family.along],
-        measured=samples.friction, fitted=member.fitted, status=Status(*worries),
-    )  # fmt: skip
+        measured=samples.friction,
+        fitted=member.fitted,
+        status=Status(*worries),
+    )
 
 
 def _estimate(
@@ -408,10 +416,14 @@ class LoadLine(Result):
             else "ok"
         )
         return Estimate.normal(
-            f"friction under {newtons:.3g} N", float(row @ self.line),
-            sd=math.sqrt(float(row @ self.covariance @ row)), unit="N", method="line through friction over load",
-            quantile=self.quantile, status=far,
-        ).within(0.0, otherwise=LATE)  # fmt: skip
+            f"friction under {newtons:.3g} N",
+            float(row @ self.line),
+            sd=math.sqrt(float(row @ self.covariance @ row)),
+            unit="N",
+            method="line through friction over load",
+            quantile=self.quantile,
+            status=far,
+        ).within(0.0, otherwise=LATE)
 
 
 def friction_over_load(levels: Sequence[Estimate], *, loads: Sequence[float | str]) -> LoadLine:
@@ -473,11 +485,16 @@ def friction_over_load(levels: Sequence[Estimate], *, loads: Sequence[float | st
     named = (("friction without load", "N", LATE), ("coefficient of friction", "1", "friction falls with the load"))
     adhesion, coefficient = (
         Estimate.normal(
-            name, line[row], sd=math.sqrt(covariance[row, row]), unit=unit, method=method, quantile=quantile,
+            name,
+            line[row],
+            sd=math.sqrt(covariance[row, row]),
+            unit=unit,
+            method=method,
+            quantile=quantile,
             checks=checks,
         ).within(0.0, otherwise=why)
         for row, (name, unit, why) in enumerate(named)
-    )  # fmt: skip
+    )
     ratios = tuple(
         level.scaled(1 / float(load), "1", f"friction over load of {load:.3g} N")
         for level, load in zip(levels, weights, strict=True)

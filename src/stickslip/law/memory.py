@@ -155,10 +155,17 @@ def friction_memory(
     misfit = {kind: value for kind, (_, value) in fits.items()}
     memory, reason = _verdict(loops, rotation, misfit)
     return FrictionMemory(
-        memory=memory, rotation=rotation, reason=reason, phases=tuple(loop.phase for loop in loops),
-        frequencies=np.array([loop.frequency for loop in loops]), delay=fits["time delay"][0],
-        time=fits["state variable"][0], give=fits["way"][0], misfit=misfit, status=_status(loops, memory),
-    )  # fmt: skip
+        memory=memory,
+        rotation=rotation,
+        reason=reason,
+        phases=tuple(loop.phase for loop in loops),
+        frequencies=np.array([loop.frequency for loop in loops]),
+        delay=fits["time delay"][0],
+        time=fits["state variable"][0],
+        give=fits["way"][0],
+        misfit=misfit,
+        status=_status(loops, memory),
+    )
 
 
 def _loop(samples: Samples) -> _Loop:

@@ -450,14 +450,20 @@ def concluded(
         f"{', '.join(law.name for law in kept)} not rejected",
     )
     return LawComparison(
-        candidates, kept[0].name if len(kept) == 1 and not doubt else None,
+        candidates,
+        kept[0].name if len(kept) == 1 and not doubt else None,
         families[0] if len(families) == 1 and not doubt else None,
-        tuple(law.name for law in kept), confidence,
-        f"None of the laws tried describes these records: {doubt}." if doubt
+        tuple(law.name for law in kept),
+        confidence,
+        f"None of the laws tried describes these records: {doubt}."
+        if doubt
         else " ".join(_sentences(ranking, families, excess_, calibration, confidence, fit)),
-        fit, excess_, Status(doubt) if doubt else Status(*worries), checks,
+        fit,
+        excess_,
+        Status(doubt) if doubt else Status(*worries),
+        checks,
         (*records[0].history, step),
-    )  # fmt: skip
+    )
 
 
 def doubt_of(fit: LawFit, stated: Oscillator, calibration: float) -> str:

@@ -216,8 +216,10 @@ def model_description(
     for number, key in enumerate(states, start=2):
         rows.append(variable(f"der_{key}", first + number, f'{LOCAL} derivative="{8 + number}"', "", ""))
     mode = first + 2 + len(memory)
-    rows.append(f'<Int32 name="mode" valueReference="{mode}" causality="output" variability="discrete" '
-                'initial="calculated" description="number of the mode of the friction"/>')  # fmt: skip
+    rows.append(
+        f'<Int32 name="mode" valueReference="{mode}" causality="output" variability="discrete" '
+        'initial="calculated" description="number of the mode of the friction"/>'
+    )
     ends = range(mode + 1, mode + 1 + exits)
     for number, reference in enumerate(ends, start=1):
         rows.append(variable(f"exit_{number}", reference, LOCAL, "ends the mode where it rises above zero", ""))
@@ -229,9 +231,13 @@ def model_description(
         *(f'<EventIndicator valueReference="{number}"/>' for number in ends),
     ]
     return XML.format(
-        name=name, token=quoteattr(token), about=quoteattr(about), units="\n".join(UNITS),
-        variables="\n".join(f"    {row}" for row in rows), structure="\n".join(f"    {row}" for row in structure),
-    )  # fmt: skip
+        name=name,
+        token=quoteattr(token),
+        about=quoteattr(about),
+        units="\n".join(UNITS),
+        variables="\n".join(f"    {row}" for row in rows),
+        structure="\n".join(f"    {row}" for row in structure),
+    )
 
 
 def build_description(name: str) -> str:

@@ -203,7 +203,13 @@ class Dahl(Sliding):
         """Slip on either side; they meet where the velocity turns."""
         v, f = symbol("v"), symbol("force_state")
         return tuple(
-            CurvedMode(name, "slip", side, f, (turn,),
-                       {"force_state": self.stiffness * v * (1 - f * (side / self.kinetic)) ** self.exponent})
+            CurvedMode(
+                name,
+                "slip",
+                side,
+                f,
+                (turn,),
+                {"force_state": self.stiffness * v * (1 - f * (side / self.kinetic)) ** self.exponent},
+            )
             for name, side, turn in either_side()
-        )  # fmt: skip
+        )

@@ -274,9 +274,13 @@ def _received(
 
 
 def _anew(
-    arrays: Mapping[str, Array], axis: Array | None, fs: float | None, units: Mapping[str, str],
-    metadata: Mapping[str, Any], step: Step,
-) -> Record:  # fmt: skip
+    arrays: Mapping[str, Array],
+    axis: Array | None,
+    fs: float | None,
+    units: Mapping[str, str],
+    metadata: Mapping[str, Any],
+    step: Step,
+) -> Record:
     """A new record of columns; `units` by column go before what their headers say ("x [mm]")."""
     headers = {name: re.fullmatch(r"(.*?)\s*\[([^\]]*)\]\s*", name) for name in arrays}
     names = {name: _identifier(match[1] if match else name) for name, match in headers.items()}

@@ -448,10 +448,16 @@ class Record:
 
     def _repr_html_(self) -> str:
         rows = [
-            (name, f"[{self.channels[name].unit}]", self.channels[name].quantity, f"{np.nanmin(values):.5g}",
-             f"{np.nanmax(values):.5g}")
-            for name, values in self.samples.items() if np.isfinite(values).any()
-        ]  # fmt: skip
+            (
+                name,
+                f"[{self.channels[name].unit}]",
+                self.channels[name].quantity,
+                f"{np.nanmin(values):.5g}",
+                f"{np.nanmax(values):.5g}",
+            )
+            for name, values in self.samples.items()
+            if np.isfinite(values).any()
+        ]
         clock = f"{len(self)} samples, {self.fs:g} Hz, {self.time[0]:g} to {self.time[-1]:g} s"
         title = f"Record: {clock}{', broken clock' if self.stamps is not None else ''}"
         return html_table(title, ("channel", "unit", "quantity", "least", "greatest"), rows)

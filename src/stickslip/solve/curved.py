@@ -230,9 +230,17 @@ class _Run:
         steps, before, self.fresh = self.room, self.clock.copy(), False
         if follow is None and len(stops.ends) > 1:
             outcome, written, leapt, self.mode, self.stop = march.course(
-                self.implicit, self.clock, self.state, self.big, self.mode, stops, self.stop, self.scale,
-                steps, self.work,
-            )  # fmt: skip
+                self.implicit,
+                self.clock,
+                self.state,
+                self.big,
+                self.mode,
+                stops,
+                self.stop,
+                self.scale,
+                steps,
+                self.work,
+            )
         else:
             outcome, written, leapt, self.mode, self.stop = self._to_stop(stops, follow or self._freely)
         if written:

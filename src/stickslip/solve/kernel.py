@@ -378,9 +378,13 @@ def course(model, clock, state, mode, stops, stop, past, out, work, patience):
     while True:
         end = Clock(stops.ends[stop, 0], stops.ends[stop, 1], 0.0)
         rest = Pieces(
-            out.laps[done:], out.offsets[done:], out.modes[done:], out.durations[done:], out.states[done:],
+            out.laps[done:],
+            out.offsets[done:],
+            out.modes[done:],
+            out.durations[done:],
+            out.states[done:],
             out.exits[done:],
-        )  # fmt: skip
+        )
         status, count, mode, clock = march(model, clock, state, mode, end, past, rest, work, patience)
         done += count
         if status != DONE or stop + 1 == stops.ends.shape[0]:

@@ -233,14 +233,18 @@ class _Builder:
         share, n = np.asarray(whole.acts_on, dtype=np.float64), self.degrees
         stiffness, damping = (np.asarray(part, dtype=np.float64) for part in (whole.stiffness, whole.damping))
         self.push = [
-            combined([
-                (share[i], self.force), (float(stiffness[i] @ share), self.base),
-                *((-stiffness[i, k], ({k: 1.0}, 0.0)) for k in range(n)),
-                *((-damping[i, k], ({n + k: 1.0}, 0.0)) for k in range(n)),
-                (float(damping[i] @ share), damper),
-                *((c.normal[i] * c.contact.preload, ({}, 1.0)) for c in self.contacts if c.normal is not None),
-            ]) for i in range(n)
-        ]  # fmt: skip
+            combined(
+                [
+                    (share[i], self.force),
+                    (float(stiffness[i] @ share), self.base),
+                    *((-stiffness[i, k], ({k: 1.0}, 0.0)) for k in range(n)),
+                    *((-damping[i, k], ({n + k: 1.0}, 0.0)) for k in range(n)),
+                    (float(damping[i] @ share), damper),
+                    *((c.normal[i] * c.contact.preload, ({}, 1.0)) for c in self.contacts if c.normal is not None),
+                ]
+            )
+            for i in range(n)
+        ]
 
     def know(self, contact: _Contact) -> None:
         """What a contact's symbols are: x and v relative to the counter-face, the load for 1, places as x is."""
@@ -327,10 +331,12 @@ class _Builder:
             friction[c] = form
         known = [self.knows(c, part, friction[c], moving) for c, part in enumerate(parts)]
         speeds = [
-            combined([(1.0, self.faced(c, 1)), (1.0, ({}, parts[c].speed))]
-                     + [(1.0, known[c]["v"])] * (getattr(parts[c], "creep", None) is not None))
+            combined(
+                [(1.0, self.faced(c, 1)), (1.0, ({}, parts[c].speed))]
+                + [(1.0, known[c]["v"])] * (getattr(parts[c], "creep", None) is not None)
+            )
             for c in stuck
-        ]  # fmt: skip
+        ]
         rates = dict(enumerate(bound.speed(speeds)))
         rates |= {n + i: form for i, form in enumerate(bound.acceleration(force, [self.faced(c, 2) for c in stuck]))}
         if self.imposed:  # whatever acts on it
@@ -433,10 +439,14 @@ class _Builder:
         exits = self.exits(joints, parts, leaving, quantities)
         operations = [one.moving for one in made]
         guards, sums = guards_of(operations), sums_of(operations, [one.entries for one in made], quantities)
-        modes: tuple[Any, ...] = tuple(own[0] for own in parts) if not self.joint else tuple(
-            JointMode.of(tuple(own), [(own[c].exits[e], c) for c, e in joint.exits])
-            for own, joint in zip(parts, joints, strict=True)
-        )  # fmt: skip
+        modes: tuple[Any, ...] = (
+            tuple(own[0] for own in parts)
+            if not self.joint
+            else tuple(
+                JointMode.of(tuple(own), [(own[c].exits[e], c) for c, e in joint.exits])
+                for own, joint in zip(parts, joints, strict=True)
+            )
+        )
         tones = [(self.names.index(c), self.names.index(s), w, phase) for c, s, w, phase in self.motion.tones]
         slip = np.array([self.row(contact.symbols["v"]) for contact in self.contacts])
         return Tape(

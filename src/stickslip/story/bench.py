@@ -53,10 +53,14 @@ def of_record(record: Record, *, form: str = "csv") -> Story:
         write_record(record, folder / f"record.{form}")
 
     return Story.of_record(
-        record_name(record), record, headline=[repr(record)], faults=faults,
+        record_name(record),
+        record,
+        headline=[repr(record)],
+        faults=faults,
         tables=[*([Table("What is true", ("what is true", "SI"), true)] if true else []), *logged(record)],
-        data=lambda: {"fs": record.fs, "truth": dict(record.truth), "faults": faults}, write=write,
-    )  # fmt: skip
+        data=lambda: {"fs": record.fs, "truth": dict(record.truth), "faults": faults},
+        write=write,
+    )
 
 
 def of_plan(plan: ExperimentPlan, *, needs: Sequence[tuple[str, str]] = ()) -> Story:
@@ -100,9 +104,16 @@ def of_commissioned(done: Commissioned) -> Story:
         (folder / "rig.toml").write_text(known.toml(), encoding="utf-8")
 
     return Story(
-        "Commissioning", [_headline(done)], cautions, lines, tables=_tables(done),
-        settings=_settings(done), draw=lambda: _plates(done), data=lambda: dict(plain(done.to_dict())), write=write,
-    )  # fmt: skip
+        "Commissioning",
+        [_headline(done)],
+        cautions,
+        lines,
+        tables=_tables(done),
+        settings=_settings(done),
+        draw=lambda: _plates(done),
+        data=lambda: dict(plain(done.to_dict())),
+        write=write,
+    )
 
 
 def _headline(done: Commissioned) -> str:
@@ -212,10 +223,15 @@ def of_tour(tour: Tour) -> Story:
             (folder / "next.toml").write_text(run_list(tour.proposals).toml(), encoding="utf-8")
 
     return Story(
-        "Dry friction of an air-track slider", _abstract(tour), lines=_lines(tour),
+        "Dry friction of an air-track slider",
+        _abstract(tour),
+        lines=_lines(tour),
         tables=[_runs(tour), _next(tour)] if tour.proposals else [_runs(tour)],
-        parts=parts, settings=_log_rows(tour), data=lambda: dict(plain(_data(tour))), write=write,
-    )  # fmt: skip
+        parts=parts,
+        settings=_log_rows(tour),
+        data=lambda: dict(plain(_data(tour))),
+        write=write,
+    )
 
 
 def _abstract(tour: Tour) -> list[str]:

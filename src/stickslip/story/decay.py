@@ -40,12 +40,16 @@ def of_findings(findings: Findings) -> Story:
     settings = {"methods": METHODS[chosen["method"]], "channel": chosen["channel"], "spring": chosen["restoring"]}
     stated = {key: number(value, 0.0, units[key]) for key, value in chosen.items() if key in units}
     return Story(
-        findings.name, list(_headline(findings)), cautions(findings),
+        findings.name,
+        list(_headline(findings)),
+        cautions(findings),
         settings={**settings, **stated},
         tables=[*_by_other_ways([*decay.beside, *beside]), *([tried("motion", motions)] if motions else [])],
-        draw=lambda: plates_of(decay), data=lambda: _data(decay), look=lambda: _scope(findings),
+        draw=lambda: plates_of(decay),
+        data=lambda: _data(decay),
+        look=lambda: _scope(findings),
         remedy=_remedy(findings),
-    )  # fmt: skip
+    )
 
 
 def _remedy(findings: Findings) -> str:

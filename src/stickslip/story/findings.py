@@ -183,9 +183,13 @@ def of_several(estimates: Sequence[Estimate], *, record: Record | None = None) -
         return Story("Estimates", lines=lines, data=data)
     faults = record.check()
     return Story.of_record(
-        record_name(record), record, headline=leading(faults), lines=lines, faults=[str(fault) for fault in faults],
+        record_name(record),
+        record,
+        headline=leading(faults),
+        lines=lines,
+        faults=[str(fault) for fault in faults],
         data=data,
-    )  # fmt: skip
+    )
 
 
 LEADING = {  # of each question the quantities of the short table; of others those of most records
@@ -207,10 +211,15 @@ def of_batch(batch: Batch) -> Story:
     ]
     table = Table("Records", ("record", *leading, *(["remark"] if remarked else [])), rows)
     return Story(
-        f"{len(batch.rows)} records", list(_headline(batch, leading)), lines=[Line.of(e) for e in batch.estimates],
-        notes=batch.notes, tables=[table], draw=lambda: plates_of_batch(batch), data=lambda: _rows_of(batch),
+        f"{len(batch.rows)} records",
+        list(_headline(batch, leading)),
+        lines=[Line.of(e) for e in batch.estimates],
+        notes=batch.notes,
+        tables=[table],
+        draw=lambda: plates_of_batch(batch),
+        data=lambda: _rows_of(batch),
         write=lambda folder: write_table(batch, folder / TABLE),
-    )  # fmt: skip
+    )
 
 
 def _headline(batch: Batch, leading: Sequence[str]) -> Iterator[str]:
@@ -255,10 +264,17 @@ def _remark(row: Row) -> str:
 def _rows_of(batch: Batch) -> Mapping[str, Any]:
     together = [estimate.to_dict() for estimate in batch.estimates]
     rows = [
-        {"name": row.name, "sha256": row.key, "answer": row.answer, "refusal": row.refusal, "same_as": row.same_as,
-         "normal_load": row.normal, "estimates": [estimate.to_dict() for estimate in row.estimates]}
+        {
+            "name": row.name,
+            "sha256": row.key,
+            "answer": row.answer,
+            "refusal": row.refusal,
+            "same_as": row.same_as,
+            "normal_load": row.normal,
+            "estimates": [estimate.to_dict() for estimate in row.estimates],
+        }
         for row in batch.rows
-    ]  # fmt: skip
+    ]
     return {"comparison": {"estimates": together, "notes": plain(batch.notes)}, "records": plain(rows)}
 
 

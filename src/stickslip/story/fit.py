@@ -82,9 +82,15 @@ def of_laws(
         headline = [f"Probably {mistaken.contradiction}: until that is mended no law holds.", *headline]
         remedy = corrected(mistaken, mistaken.slips[0], "fit", options)
     return _story(
-        comparison, record, headline, notes=comparison.fit.checks, remedy=remedy,
-        tables=[ranked, why], history=comparison.history, data=comparison.to_dict,
-    )  # fmt: skip
+        comparison,
+        record,
+        headline,
+        notes=comparison.fit.checks,
+        remedy=remedy,
+        tables=[ranked, why],
+        history=comparison.history,
+        data=comparison.to_dict,
+    )
 
 
 def _story(fit: Fit, record: Records, headline: list[str], **content: Any) -> Story:
@@ -104,10 +110,15 @@ def _story(fit: Fit, record: Records, headline: list[str], **content: Any) -> St
         }
     title = record_name(records[0]) if len(records) == 1 else f"{len(records)} records" if records else "Fit"
     return Story(
-        title, [*units, *headline], cautions, lines=list(map(Line.of, fit.estimates)),
-        draw=lambda: law_plates(fit), look=lambda: _scope(fit, records),
-        write=partial(write_law, result=fit, records=records), **content,
-    )  # fmt: skip
+        title,
+        [*units, *headline],
+        cautions,
+        lines=list(map(Line.of, fit.estimates)),
+        draw=lambda: law_plates(fit),
+        look=lambda: _scope(fit, records),
+        write=partial(write_law, result=fit, records=records),
+        **content,
+    )
 
 
 def _scope(result: Fit, records: Sequence[Record]) -> Scope | None:
@@ -247,9 +258,14 @@ def of_predictions(predictions: Predictions) -> Story:
     first = next(iter(predictions.least))
     compared = any(part.plain for part in predictions.parts)
     rows = [
-        (part.name, *(_percent(part.follows.get(name)) for name in predictions.least),
-         *([_percent(part.plain.get(first))] if compared else []), *_stops(part)) for part in predictions.parts
-    ]  # fmt: skip
+        (
+            part.name,
+            *(_percent(part.follows.get(name)) for name in predictions.least),
+            *([_percent(part.plain.get(first))] if compared else []),
+            *_stops(part),
+        )
+        for part in predictions.parts
+    ]
     beside = [f"{first}, Coulomb"] if compared else []
     headings = ("record", *predictions.least, *beside, "stops per cycle", "predicted")
     table = Table("How much is followed", headings, rows, f"{DEFINITION} {COMPARED}" if compared else DEFINITION)
@@ -263,9 +279,15 @@ def _noted(story: Story, predictions: Predictions) -> Story:
 def _of_one(part: Prediction, law: str) -> Story:
     record, fit = part.record, part.fit
     rows = [
-        (name, _percent(value), *([_percent(part.plain.get(name))] if part.plain else []), _left(part, name),
-         f"{fit.misfit[name]:.3g}") for name, value in part.follows.items()
-    ]  # fmt: skip
+        (
+            name,
+            _percent(value),
+            *([_percent(part.plain.get(name))] if part.plain else []),
+            _left(part, name),
+            f"{fit.misfit[name]:.3g}",
+        )
+        for name, value in part.follows.items()
+    ]
     headings = ("channel", "follows", *(["Coulomb"] if part.plain else []), "left (rms)", "over its noise")
     note = f"{DEFINITION} {COMPARED}" if part.plain else DEFINITION
     tables = [Table("How much is followed", headings, rows, note)]
@@ -277,10 +299,15 @@ def _of_one(part: Prediction, law: str) -> Story:
         ]
         tables.append(Table("Stops, by the speed", ("", "measured", "95 %", "predicted", "95 %"), stops))
     return Story.of_record(
-        part.name, record, headline=[*leading(record.check()), *_headline(part, law)],
-        cautions=[*_cautions(part), *doubts(part.estimates[:2])], tables=tables, draw=lambda: law_plates(fit),
-        look=lambda: _scope_of(part, law), data=part.to_dict,
-    )  # fmt: skip
+        part.name,
+        record,
+        headline=[*leading(record.check()), *_headline(part, law)],
+        cautions=[*_cautions(part), *doubts(part.estimates[:2])],
+        tables=tables,
+        draw=lambda: law_plates(fit),
+        look=lambda: _scope_of(part, law),
+        data=part.to_dict,
+    )
 
 
 def _headline(part: Prediction, law: str) -> Iterator[str]:

@@ -101,9 +101,13 @@ def templates(*folders: Path, wording: Callable[[str], str] = str) -> Environmen
     from jinja2 import ChoiceLoader, Environment, FileSystemLoader, PackageLoader, StrictUndefined
 
     environment = Environment(
-        loader=ChoiceLoader([PackageLoader("stickslip.story"), FileSystemLoader(folders)]), autoescape=True,
-        undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True, finalize=partial(_visible, wording),
-    )  # fmt: skip
+        loader=ChoiceLoader([PackageLoader("stickslip.story"), FileSystemLoader(folders)]),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        finalize=partial(_visible, wording),
+    )
     environment.filters.update(
         inline_svg=inline_svg,
         spelled_out=spelled_out,

@@ -36,10 +36,16 @@ def of_findings(findings: Findings) -> Story:
     leading = () if next(_wrong(findings), "") else (findings.breakaway, findings.presliding)
     headed = [estimate for answer in leading if answer is not None for estimate in answer.estimates]
     return Story(
-        findings.name, list(_headline(findings)), cautions(findings, headed), notes=list(_exact(findings)),
-        settings=_settings(findings), draw=lambda: plates_of(findings), data=lambda: _data(findings),
-        look=lambda: scope.of_findings(findings), remedy=_remedy(findings),
-    )  # fmt: skip
+        findings.name,
+        list(_headline(findings)),
+        cautions(findings, headed),
+        notes=list(_exact(findings)),
+        settings=_settings(findings),
+        draw=lambda: plates_of(findings),
+        data=lambda: _data(findings),
+        look=lambda: scope.of_findings(findings),
+        remedy=_remedy(findings),
+    )
 
 
 def of_comparison(comparison: Comparison) -> Story:
@@ -334,15 +340,23 @@ def of_map(findings: TimeFrequency) -> Story:
     """A channel's map, and what its sticks tell."""
     record, faults = findings.record, findings.record.check()
     return Story.of_record(
-        findings.name, record, headline=[*leading(faults), *_of_channel(findings)], cautions=doubts(findings.estimates),
-        lines=list(map(Line.of, findings.estimates)), faults=[str(fault) for fault in faults], notes=findings.notes,
+        findings.name,
+        record,
+        headline=[*leading(faults), *_of_channel(findings)],
+        cautions=doubts(findings.estimates),
+        lines=list(map(Line.of, findings.estimates)),
+        faults=[str(fault) for fault in faults],
+        notes=findings.notes,
         settings={
-            "channel": findings.channel, "wavelet frequency": f"{findings.wavelets.attrs['wavelet_frequency']:g}",
-            "normalisation": str(findings.wavelets.attrs["normalisation"]), "sampling rate": f"{record.fs:g} Hz",
+            "channel": findings.channel,
+            "wavelet frequency": f"{findings.wavelets.attrs['wavelet_frequency']:g}",
+            "normalisation": str(findings.wavelets.attrs["normalisation"]),
+            "sampling rate": f"{record.fs:g} Hz",
             "length": f"{len(record)} samples, {record.duration:g} s",
         },
-        draw=lambda: plates_of_map(findings), data=findings.to_dict,
-    )  # fmt: skip
+        draw=lambda: plates_of_map(findings),
+        data=findings.to_dict,
+    )
 
 
 def _of_channel(findings: TimeFrequency) -> Iterator[str]:

@@ -33,10 +33,14 @@ def of_tribometer(findings: Findings) -> Story:
     """One test."""
     tribometer = findings.tribometer
     return Story(
-        findings.name, list(_of_one_test(findings)), cautions(findings),
+        findings.name,
+        list(_of_one_test(findings)),
+        cautions(findings),
         settings={key: str(value) for key, value in findings.settings.items()},
-        tables=[_definitions(findings)], draw=lambda: tribometer_plates(tribometer), data=lambda: _test_data(findings),
-    )  # fmt: skip
+        tables=[_definitions(findings)],
+        draw=lambda: tribometer_plates(tribometer),
+        data=lambda: _test_data(findings),
+    )
 
 
 def of_tribometers(comparison: Comparison) -> Story:
@@ -93,10 +97,14 @@ def of_joint(findings: Findings) -> Story:
     """One log."""
     joint = findings.joint
     return Story(
-        findings.name, list(_of_one_joint(findings)), [*cautions(findings), *map(Caution, _untold(joint))],
+        findings.name,
+        list(_of_one_joint(findings)),
+        [*cautions(findings), *map(Caution, _untold(joint))],
         settings={key: str(value) for key, value in findings.settings.items()},
-        draw=lambda: plates_of(joint), data=lambda: _joint_data(findings), write=partial(write_joint, joint=joint),
-    )  # fmt: skip
+        draw=lambda: plates_of(joint),
+        data=lambda: _joint_data(findings),
+        write=partial(write_joint, joint=joint),
+    )
 
 
 def of_joints(comparison: Comparison) -> Story:
@@ -113,16 +121,21 @@ def of_joints(comparison: Comparison) -> Story:
         for log, one in logs
     ]
     table = Table(
-        "Each log by the others", ("log", "sliding friction", "95 %", "missed", "by a plain law"), rows,
+        "Each log by the others",
+        ("log", "sliding friction", "95 %", "missed", "by a plain law"),
+        rows,
         "Missed: what the others do not predict of the torque while it slides, over how far the torque varies (norms). "
         "The plain law is Coulomb and viscous friction, alike both ways, beside inertia and gravity.",
-    )  # fmt: skip
+    )
     data = [{"name": log.name, "error": one.error, "plain": one.plain} for log, one in logs]
     return Story(
-        f"{len(logs)} logs of a joint", list(_together(comparison)),
-        list(map(Caution, _untold(comparison.together, "These logs do"))), tables=[table],
-        draw=lambda: plates_together(logs), data=lambda: {"predictions": data},
-    )  # fmt: skip
+        f"{len(logs)} logs of a joint",
+        list(_together(comparison)),
+        list(map(Caution, _untold(comparison.together, "These logs do"))),
+        tables=[table],
+        draw=lambda: plates_together(logs),
+        data=lambda: {"predictions": data},
+    )
 
 
 def _together(comparison: Comparison) -> Iterator[str]:

@@ -37,10 +37,14 @@ def of_map(atlas: Any, *, system: System | None = None) -> Story:
         if name != "status"
     ]
     return Story(
-        "Map", _headline(atlas), _cautions(atlas), settings=_settings(atlas.attrs),
+        "Map",
+        _headline(atlas),
+        _cautions(atlas),
+        settings=_settings(atlas.attrs),
         tables=[Table(title, ("measure", "least", "most", "points"), rows)],
-        draw=lambda: _plates(atlas, system), data=lambda: {**atlas.attrs, "variables": measures},
-    )  # fmt: skip
+        draw=lambda: _plates(atlas, system),
+        data=lambda: {**atlas.attrs, "variables": measures},
+    )
 
 
 def _measures(atlas: Any) -> dict[str, dict[str, Any]]:
@@ -204,7 +208,9 @@ def of_boundary(boundary: Boundary) -> Story:
 def of_dither(dither: Dither) -> Story:
     """What dither leaves of the sticks and of the friction."""
     return _story(
-        "What dither does", "dither", partial(plot_dither, dither),
+        "What dither does",
+        "dither",
+        partial(plot_dither, dither),
         "Top: the longest stick left; below the line none outlasts a period of the dither. Bottom: the friction "
         "left on average, and what the averaged law says; where they part, friction moves the mass in a period, "
         "or the contact gives way.",
@@ -212,13 +218,21 @@ def of_dither(dither: Dither) -> Story:
             f"Dither of {value_of(dither.amplitude)} at {dither.frequency:.5g} Hz on the {dither.on} removes "
             f"stick-slip: the longest stick falls from {dither.sticks[0]:.3g} s to {dither.sticks[1]:.3g} s."
         ],
-        lines=[Line.of(dither.amplitude)], notes=dither.checks,
-        data=lambda: plain({
-            "frequency": dither.frequency, "amplitude": dither.amplitude.to_dict(), "on": dither.on,
-            "speed": dither.speed, "sticks": dither.sticks, "tried": dither.tried, "scan": dither.scan,
-            "checks": dither.checks,
-        }),
-    )  # fmt: skip
+        lines=[Line.of(dither.amplitude)],
+        notes=dither.checks,
+        data=lambda: plain(
+            {
+                "frequency": dither.frequency,
+                "amplitude": dither.amplitude.to_dict(),
+                "on": dither.on,
+                "speed": dither.speed,
+                "sticks": dither.sticks,
+                "tried": dither.tried,
+                "scan": dither.scan,
+                "checks": dither.checks,
+            }
+        ),
+    )
 
 
 def _story(title: str, name: str, draw: Callable[[], Any], caption: str, **content: Any) -> Story:

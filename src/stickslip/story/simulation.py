@@ -151,10 +151,14 @@ def of_outcome(
             _write_sound(run, folder, fs or case.fs or HEARD, form)
 
     return Story(
-        f"{case.name}  {case.about}".rstrip(), result.sentences, tables=list(_tables(result)),
-        draw=draw, data=lambda: {**result.to_dict(), "fs": rate}, write=write,
+        f"{case.name}  {case.about}".rstrip(),
+        result.sentences,
+        tables=list(_tables(result)),
+        draw=draw,
+        data=lambda: {**result.to_dict(), "fs": rate},
+        write=write,
         look=lambda: _scope(run, rate, f"record.{form}"),
-    )  # fmt: skip
+    )
 
 
 def _scope(run: Trajectory, rate: float, file: str = "record.csv") -> Scope:

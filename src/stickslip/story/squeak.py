@@ -27,11 +27,15 @@ def of_findings(findings: Findings) -> Story:
     """One record."""
     low, high = findings.squeaks.band
     return Story(
-        findings.name, list(_headline(findings)), [*_cautions(findings), *cautions(findings)],
+        findings.name,
+        list(_headline(findings)),
+        [*_cautions(findings), *cautions(findings)],
         settings={"heard in": findings.squeaks.channel, "between": f"{low:g} and {high:g} Hz"},
-        tables=list(_tables(findings)), draw=lambda: plates_of(findings),
-        listen=lambda: burst_clips(findings.squeaks), data=lambda: _data(findings),
-    )  # fmt: skip
+        tables=list(_tables(findings)),
+        draw=lambda: plates_of(findings),
+        listen=lambda: burst_clips(findings.squeaks),
+        data=lambda: _data(findings),
+    )
 
 
 def of_comparison(comparison: Comparison) -> Story:
