@@ -65,8 +65,7 @@ UNUSED = 30 * 86400.0  # s after which what nothing has loaded is removed
 KEPT = 256  # generated modules on disk, the latest used: what a user comes back to, some 20 MB
 IN_USE = 60.0  # s: one that was used so lately may be about to be read by another process
 WAITS = "STICKSLIP_WAIT"  # environment variable: where it is set, who calls a kernel waits until it is compiled
-# s that a process runs kernels by Python, before it waits for who compiles: half of what that takes; of one processor
-# it would only take away from it
+# s that a process runs kernels by Python before it waits for who compiles; on one processor it takes that one's time
 PATIENCE = 5.0 if processors() > 1 else 1.0
 LONGEST = 10.0  # s of waiting for another process: on a busy machine it has less of a processor than who waits
 MOST = 30_000  # steps of a loop: Python takes some hundredths of a second

@@ -595,12 +595,3 @@ def _require_disc(friction: Expression, breakaway: float) -> None:
             "sliding in a plane begins and ends on a disc of some radius, along a smooth curve",
             "give a law with friction at rest, a Stribeck of exponent= 1 or more; without friction take Structure",
         ).of("law")
-
-
-def require_oscillator(system: object, question: str) -> Oscillator:
-    """The system, where it is one mass that moves along a line and rubs on one contact."""
-    if not isinstance(system, Oscillator):
-        raise ModelError(
-            f"a {type(system).__name__}", f"{question} of one mass on one contact, along a line", "give an Oscillator"
-        )
-    return system

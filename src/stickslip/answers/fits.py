@@ -20,10 +20,11 @@ from stickslip.law.start import CALIBRATION
 from stickslip.law.verdict import LawComparison
 from stickslip.law.which_law import compare_laws, fit_law, widened
 from stickslip.laws.coulomb import Coulomb
-from stickslip.oscillator import Oscillator, require_oscillator
+from stickslip.oscillator import Oscillator
 from stickslip.record.record import RIG_UNITS, Record
 from stickslip.rig.settings import RigSettings
 from stickslip.settings import read_toml
+from stickslip.solve.tables import require_oscillator
 from stickslip.statistics import follows
 from stickslip.systems.file import read_system
 from stickslip.units import dimensions

@@ -14,12 +14,13 @@ from numpy.typing import NDArray
 from stickslip.errors import UNNAMED, EstimateError, ModelError, RecordError
 from stickslip.law.search import ABOVE, OF_MOUNTS, OF_SENSORS, Knob, Point, Problem, Profile, descend
 from stickslip.law.stretch import DriveFrom, Sensor, Stretch, as_driven, driving, measured_drive
-from stickslip.oscillator import Oscillator, require_oscillator
+from stickslip.oscillator import Oscillator
 from stickslip.parameters import find
 from stickslip.record.record import Record
 from stickslip.settings import nearest
 from stickslip.signals.derivatives import LEAST, differentiate
 from stickslip.signals.noise import noise_level, quantisation_step
+from stickslip.solve.tables import require_oscillator
 
 Array = NDArray[np.float64]
 

@@ -15,10 +15,10 @@ from stickslip.drives.on_another import Dithered
 from stickslip.errors import ModelError, SolveError
 from stickslip.estimate import Doubt, Estimate, Result, Status
 from stickslip.maps.basins import Start
-from stickslip.oscillator import Oscillator, require_oscillator
+from stickslip.oscillator import Oscillator
 from stickslip.solve.poincare import tables
 from stickslip.solve.simulate import simulate
-from stickslip.solve.tables import Array
+from stickslip.solve.tables import Array, require_oscillator
 from stickslip.solve.trajectory import Trajectory
 
 FAST = 20.0  # dither periods in one of the slow motion, at least, where no frequency is given

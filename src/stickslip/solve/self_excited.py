@@ -18,12 +18,12 @@ from numpy.typing import NDArray
 from stickslip.drives.kinds import Belt
 from stickslip.errors import ModelError, SolveError
 from stickslip.laws.curved import CurvedLaw
-from stickslip.oscillator import Oscillator, require_oscillator
+from stickslip.oscillator import Oscillator
 from stickslip.solve.curved import CurvedTrajectory
 from stickslip.solve.march import Dense
 from stickslip.solve.poincare import SteadyState, Table, closes, derivative, stretch
 from stickslip.solve.simulate import opening
-from stickslip.solve.tables import Array, System
+from stickslip.solve.tables import Array, System, require_oscillator
 from stickslip.solve.tape import Tape
 from stickslip.solve.trajectory import Trajectory
 

@@ -318,6 +318,15 @@ def laws_of(system: System) -> list[Any]:
     return [contact.law for contact in system.contacts] if isinstance(system, Structure) else [system.law]
 
 
+def require_oscillator(system: object, question: str) -> Oscillator:
+    """The system, where it is one mass that moves along a line and rubs on one contact."""
+    if not isinstance(system, Oscillator):
+        raise ModelError(
+            f"a {type(system).__name__}", f"{question} of one mass on one contact, along a line", "give an Oscillator"
+        )
+    return system
+
+
 def by_value(system: Oscillator) -> bool:
     """Whether an equal system is the same one: law and drive are compared by their values."""
     return all(map(filippov.by_value, (system.law, system.drive)))
