@@ -321,9 +321,8 @@ def laws_of(system: System) -> list[Any]:
 def require_oscillator(system: object, question: str) -> Oscillator:
     """The system, where it is one mass that moves along a line and rubs on one contact."""
     if not isinstance(system, Oscillator):
-        raise ModelError(
-            f"a {type(system).__name__}", f"{question} of one mass on one contact, along a line", "give an Oscillator"
-        )
+        several = "a system of several masses" if isinstance(system, Structure) else f"a {type(system).__name__}"
+        raise ModelError(several, f"{question} of one mass on one contact, along a line", "give an Oscillator")
     return system
 
 
