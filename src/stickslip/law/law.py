@@ -380,7 +380,7 @@ def _sandwich(
 def _of_drives(problem: Problem, point: Point, influences: Sequence[Array]) -> Array:
     """The parameters' variance by the noise of a base's motion of any shape, which the mass follows.
 
-    It is slow, and too small to be seen in how the residuals are correlated: without it 69 of 127 intervals of kinetic
+    It is slow, and too small to be seen in how the residuals are correlated: without it 71 of 126 intervals of kinetic
     friction and damping held where x and z had 0.2 % of noise, on rigs of another integrator.
     """
     chance, totals = np.random.default_rng(0), []
