@@ -161,10 +161,32 @@ def test_stated_delays_are_taken_out_of_the_record_that_is_shown() -> None:
 )
 def test_a_normal_load_is_taken_by_its_magnitude_or_missed_aloud(reading: float, load: float, words: str) -> None:
     findings = analyze(sliding(normal=reading))
-    assert findings.normal == load
+    assert (findings.normal and findings.normal.value) == load
     assert any(words in note for note in findings.notes)
     stated = analyze(sliding(normal=reading), rig=RigSettings(normal=7.0))
-    assert stated.normal == (load or 7.0)
+    assert stated.normal.value == (load or 7.0)
+
+
+@pytest.mark.parametrize("stated", [True, False], ids=["stated", "measured"])
+def test_a_coefficient_is_no_surer_than_the_load(stated: bool) -> None:
+    """As the quotient of two numbers that are unsure: its relative sd is the root of the sum of both squared."""
+    rig = RigSettings(normal="4 ± 0.2 N") if stated else RigSettings(sensors={"normal": {"gain_sd": "5 %"}})
+    findings = analyze(sliding() if stated else sliding(normal=4.0), rig=rig)
+    level, coefficient = findings.level, findings.coefficient
+    assert coefficient.value == pytest.approx(level.value / 4.0)
+    half = np.diff(coefficient.interval)[0] / 2 / coefficient.value
+    alone = np.diff(level.interval)[0] / 2 / level.value
+    assert half == pytest.approx(np.hypot(alone, 1.96 * 0.05), rel=1e-3)
+
+
+def test_a_coefficient_over_records_is_no_surer_than_the_scale_that_weighed_them() -> None:
+    loads = (2.0, 4.0, 8.0)
+    exact, weighed = (
+        compare([analyze(sliding(0.3 * n), rig=RigSettings(normal=f"{n} ± {sure * n} N")) for n in loads]).coefficient
+        for sure in (0.0, 0.02)
+    )
+    assert weighed.value == exact.value
+    assert weighed.sd == pytest.approx(np.hypot(exact.sd, 0.02 * exact.value))
 
 
 def test_records_left_out_of_the_coefficient_are_named() -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+
 import numpy as np
 import pytest
 
@@ -132,6 +134,29 @@ def test_a_contact_that_gives_way_is_told_with_its_stiffness(stiffness: float) -
     assert presliding.stiffness.value == pytest.approx(stiffness, rel=0.15)  # low: smoothing blurs the friction alone
     assert presliding.backlash is not None
     assert abs(presliding.backlash.value) < 0.1 / stiffness * 2
+
+
+@pytest.mark.parametrize("dry", [0.1, 0.4, 0.7])
+def test_a_damper_beside_dry_friction_is_no_contact_that_gives_way(dry: float) -> None:
+    """On a rigid contact friction jumps as the motion turns round, and grows from there with the speed."""
+    t = np.arange(8000) / 1000
+    x, speed = 2e-3 * np.sin(2 * np.pi * t), np.cos(2 * np.pi * t)
+    for seed in range(4):
+        rng = np.random.default_rng(seed)
+        force = dry * np.sign(speed) + (1 - dry) * speed + rng.normal(0, 0.01, t.size)
+        verdict = ""
+        with contextlib.suppress(EstimateError):  # where the jump has no samples that a line goes through
+            verdict = ss.cycle.presliding(ss.Record.of({"x": x, "friction": force}, fs=1000)).verdict
+        assert verdict != "gives way"
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_noise_has_no_static_friction(seed: int) -> None:
+    t = np.arange(5000) / 500
+    noise = np.random.default_rng(seed).normal(0, 0.02, t.size)
+    record = ss.Record.of({"x": 5e-3 * np.sin(2 * np.pi * 1.3 * t), "friction": noise}, fs=500)
+    with pytest.raises(EstimateError, match="needs a sliding friction"):
+        ss.cycle.breakaway(record)
 
 
 def test_a_rigid_contact_is_called_rigid() -> None:

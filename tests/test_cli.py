@@ -133,6 +133,18 @@ def test_a_load_on_the_command_line_goes_before_those_of_the_file() -> None:
     assert [record["normal_load"] for record in json.loads(result.stdout)["records"]] == [1.0, 5.0, 9.0]
 
 
+def test_a_load_is_stated_with_its_uncertainty() -> None:
+    slide("run.csv")
+    widths = []
+    for load in ("10 N", "10 ± 0.5 N"):
+        result = run("analyze", "run.csv", *MAP, "--normal", load, "--json")
+        assert result.exit_code == 0, result.stderr
+        estimates = {estimate["name"]: estimate for estimate in json.loads(result.stdout)["estimates"]}
+        low, high = estimates["friction coefficient"]["interval"]
+        widths.append((high - low) / estimates["friction coefficient"]["value"])
+    assert widths[1] == pytest.approx(np.hypot(widths[0], 2 * 1.96 * 0.05), rel=1e-3)
+
+
 def test_a_file_that_can_not_answer_is_named_and_left_out() -> None:
     slide("run_1.csv")
     slide("run_2.csv")

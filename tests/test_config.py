@@ -41,8 +41,8 @@ def test_a_whole_file_is_read_into_si(tmp_path: Path) -> None:
     assert (rig.mass, rig.stiffness, rig.damping, rig.damper, rig.contact) == (3.0799, 1191.0, 0.669, "base", "ground")
     assert rig.channels == {"x": "x [mm]"}
     assert rig.row_range() == (15, None)
-    assert rig.normal_load("s_b_250g_x.mat") == pytest.approx(0.25 * 9.80665)
-    assert rig.normal_load("other.csv") == 5.0
+    assert rig.normal_load("s_b_250g_x.mat").value == pytest.approx(0.25 * 9.80665)
+    assert rig.normal_load("other.csv").value == 5.0
 
 
 @pytest.mark.parametrize(

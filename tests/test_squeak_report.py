@@ -146,8 +146,8 @@ def test_one_record_is_no_comparison() -> None:
 def test_the_load_is_read_where_it_is_measured() -> None:
     record = measured("wet", 1.23)
     with_load = record.with_channel("normal", np.full(len(record), -1.23), unit="N", source="cell")
-    assert ss.analyze_squeaks(with_load).normal == pytest.approx(1.23)
-    with pytest.raises(ss.errors.EstimateError, match="normal = -1"):
+    assert ss.analyze_squeaks(with_load).normal.value == pytest.approx(1.23)
+    with pytest.raises(ss.errors.ModelError, match="greater than 0"):
         ss.analyze_squeaks(record, normal=-1)
 
 

@@ -212,6 +212,20 @@ class Estimate(Plain):
         interval, sd = (ends[0], ends[1]), abs(factor) * self.sd
         return replace(self, name=name or self.name, value=factor * self.value, interval=interval, sd=sd, unit=unit)
 
+    def widened(self, share: float, times: float = 1.0) -> Estimate:
+        """The same estimate, unsure by a share of its value besides, and so many times as unsure.
+
+        Examples
+        --------
+        >>> Estimate.normal("friction coefficient", 0.3, sd=0.003, unit="1", method="").widened(0.02).sd
+        0.006708203932499369
+        """
+        more = share * abs(self.value)
+        below, above = (times * math.hypot(end - self.value, NORMAL_95 * more) for end in self.interval)
+        floor = 0.0 if self.interval[0] >= 0 else -math.inf  # what can not fall below zero does not by being less sure
+        interval = max(floor, self.value - below), self.value + above
+        return replace(self, interval=interval, sd=times * math.hypot(self.sd, more))
+
     @property
     def known(self) -> bool:
         """Whether it has a value; where it has none that is possible, the value is NaN and the status says why."""

@@ -111,7 +111,7 @@ class Findings(Answers):
         ``loops``, ``coupling``, ``spectra``, ``quality`` and ``impulses``.
     faults : tuple of Fault
         What the check-up found in the record as it was given.
-    normal : float or None
+    normal : Estimate or None
         Normal load [N] on the contact, where stated or measured.
     notes : tuple of str
         What could not be asked, and why; what was assumed.
@@ -129,7 +129,7 @@ class Findings(Answers):
     name: str
     record: Record
     faults: tuple[Fault, ...] = ()
-    normal: float | None = None
+    normal: Estimate | None = None
     notes: tuple[str, ...] = ()
     settings: Mapping[str, Any] = field(default_factory=dict)
 
@@ -154,7 +154,8 @@ class Findings(Answers):
     def _over_load(self, estimate: Estimate | None, unit: str, name: str) -> Estimate | None:
         if estimate is None or self.normal is None or self.level is None or self.level.unit != "N":
             return None
-        return estimate.scaled(1 / self.normal, unit, name)
+        load = self.normal
+        return estimate.scaled(1 / load.value, unit, name).widened(load.sd / load.value)
 
     @property
     def estimates(self) -> tuple[Estimate, ...]:

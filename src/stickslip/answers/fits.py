@@ -18,7 +18,7 @@ from stickslip.law.fit_curve import CurveFit, fit_curve
 from stickslip.law.law import LawFit
 from stickslip.law.start import CALIBRATION
 from stickslip.law.verdict import LawComparison
-from stickslip.law.which_law import compare_laws, fit_law, widened
+from stickslip.law.which_law import compare_laws, fit_law
 from stickslip.laws.coulomb import Coulomb
 from stickslip.oscillator import Oscillator
 from stickslip.record.record import RIG_UNITS, Record
@@ -106,7 +106,7 @@ def _weighed(comparison: LawComparison, rig: RigSettings) -> LawComparison:
     if not share:
         return comparison
     parameters = comparison.fit.parameters
-    weighed = {name: widened(one, share) if "mass" in dimensions(one.unit) else one for name, one in parameters.items()}
+    weighed = {name: one.widened(share) if "mass" in dimensions(one.unit) else one for name, one in parameters.items()}
     return replace(comparison, fit=replace(comparison.fit, parameters=weighed))
 
 
@@ -127,7 +127,8 @@ def _only_curve(record: Record, *, has_law: bool) -> str | None:
 def _load(record: Record, rig: RigSettings) -> float | None:
     """The normal load as measured, or as the settings state it for the record's files."""
     files = [file["name"] for step in record.history for file in step.arguments.get("files", ())]
-    return normal_load(record, rig, " + ".join(files), [])
+    load = normal_load(record, rig, " + ".join(files), [])
+    return None if load is None else load.value
 
 
 def _with_friction(record: Record, rig: RigSettings) -> Record:

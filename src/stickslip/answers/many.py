@@ -73,7 +73,7 @@ class Slid(Protocol):
     @property
     def level(self) -> Estimate | None: ...
     @property
-    def normal(self) -> float | None: ...
+    def normal(self) -> Estimate | None: ...
 
 
 def against_load(findings: Sequence[Slid]) -> tuple[dict[str, Estimate | None], tuple[str, ...]]:
@@ -90,7 +90,9 @@ def against_load(findings: Sequence[Slid]) -> tuple[dict[str, Estimate | None], 
     results: dict[str, Estimate | None] = dict.fromkeys(("coefficient", "slope", "offset"))
     if len(known) < 2:
         return results, tuple(notes)
-    loads = np.array([f.normal for f in known], dtype=float)
+    pressed = [f.normal for f in known if f.normal is not None]
+    loads = np.array([load.value for load in pressed])
+    unsure = max(load.sd / load.value for load in pressed)  # one gain, or one scale, may have measured all of them
     levels, sds = (np.array([getattr(f.level, key) for f in known]) for key in ("value", "sd"))
     over = f"over {len(known)} records"
     (slope,) = _line(loads[:, None], levels, sds)
@@ -101,11 +103,11 @@ def against_load(findings: Sequence[Slid]) -> tuple[dict[str, Estimate | None], 
         unit="1",
         method=f"slope through the origin {over}",
         checks=(f"scatter about the line {scatter:.3g} N",),
-    )
+    ).widened(unsure)
     if len(np.unique(loads)) >= 3:
         rise, rest = _line(np.column_stack([loads, np.ones_like(loads)]), levels, sds)
         way = f"straight line {over}"
-        tilt = Estimate.normal("slope of the line", **rise, unit="1", method=way)
+        tilt = Estimate.normal("slope of the line", **rise, unit="1", method=way).widened(unsure)
         offset = Estimate.normal("friction at no load", **rest, unit="N", method=way)
         if not offset.includes(0.0):
             coefficient = replace(coefficient, status="the line misses the origin: see friction at no load")
@@ -146,7 +148,7 @@ class Row:
         Its numbers.
     level : Estimate or None
         The sliding friction, where it is known.
-    normal : float or None
+    normal : Estimate or None
         Normal load [N], where it is known.
     refusal : str
         Why it answers nothing; else empty.
@@ -161,7 +163,7 @@ class Row:
     answer: str = ""
     estimates: tuple[Estimate, ...] = ()
     level: Estimate | None = None
-    normal: float | None = None
+    normal: Estimate | None = None
     refusal: str = ""
     same_as: str = ""
     picture: tuple[Sequence[float], Sequence[float]] = ((), ())
@@ -175,8 +177,9 @@ class Row:
     def of_dict(cls, data: Mapping[str, Any]) -> Row:
         """A row from plain data."""
         estimates = tuple(map(_estimate, data["estimates"]))
-        level = data["level"] and _estimate(data["level"])
-        return cls(**{**data, "estimates": estimates, "level": level, "picture": tuple(data["picture"])})
+        level, normal = (data[key] and _estimate(data[key]) for key in ("level", "normal"))
+        own = {"estimates": estimates, "level": level, "normal": normal, "picture": tuple(data["picture"])}
+        return cls(**{**data, **own})
 
 
 def _estimate(data: Mapping[str, Any]) -> Estimate:
@@ -347,7 +350,7 @@ def _cells(row: Row, names: Sequence[str]) -> Iterator[tuple[str, Any]]:
         ("same as", row.same_as),
         ("sha256", row.key),
     )
-    yield "normal load [N]", row.normal
+    yield "normal load [N]", row.normal and row.normal.value
     estimates = {estimate.name: estimate for estimate in row.estimates}
     for name in names:
         estimate = estimates.get(name)

@@ -15,14 +15,14 @@ from stickslip.balance.force import friction_force
 from stickslip.balance.lag import HIDDEN, REPEATS, SensorDelay, sensor_delay
 from stickslip.balance.mass import mass_and_stiffness
 from stickslip.balance.motion import is_measured
-from stickslip.estimate import UNSTATED, Doubt, kinds
+from stickslip.estimate import UNSTATED, Doubt, Estimate, kinds
 from stickslip.files.read import read_blocks, read_record
 from stickslip.files.select import file_entry
 from stickslip.printing import printable
 from stickslip.record.channels import Channel
 from stickslip.record.flaws import constant
 from stickslip.record.record import Record, Step
-from stickslip.rig.settings import RigSettings, rig_settings
+from stickslip.rig.settings import LOAD, RigSettings, rig_settings
 from stickslip.signals.interpolate import without_delays
 from stickslip.signals.repair import fill_gaps, fill_missing, remove_drift, remove_spikes, repair_clock, restore_clipped
 
@@ -513,17 +513,18 @@ def _by_cell(record: Record, inquiry: Inquiry) -> Record:
     return measured
 
 
-def normal_load(record: Record, rig: RigSettings, name: str, notes: list[str]) -> float | None:
-    """The normal load as measured, by its magnitude, or as stated for the file."""
+def normal_load(record: Record, rig: RigSettings, name: str, notes: list[str]) -> Estimate | None:
+    """The normal load as measured, by its magnitude and as sure as its sensor's gain, or as stated for the file."""
     if "normal" in record:
         finite = record["normal"][np.isfinite(record["normal"])]
         mean = float(finite.mean()) if len(finite) else 0.0
         if mean < 0:
             notes.append(f"The normal load reads {mean:.4g} N: its magnitude is taken.")
         if mean:
-            return abs(mean)
+            sd = record.channels["normal"].gain_sd * abs(mean)
+            return Estimate.normal(LOAD, abs(mean), sd=sd, unit="N", method="measured")
         notes.append("The channel normal holds no load but " + ("zeros." if len(finite) else "no numbers."))
     if record.log is not None and isinstance(record.log.normal, float):
-        return record.log.normal
+        return Estimate.stated(LOAD, record.log.normal, "N")
     loads = (rig.normal_load(part) for part in [*name.split(" + "), name])
     return next((load for load in loads if load is not None), None)

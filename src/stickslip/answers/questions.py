@@ -157,7 +157,7 @@ def _findings(record: Record, rig: RigSettings, method: str, questions: Sequence
     names = [question.key for question in QUESTIONS]
     results = {**dict.fromkeys(names), **answers, "delay": made.delay, "comparison": made.comparison, "trial": None}
     results |= {"slips": slips, "lacking": missing(whole, rig)}
-    normal = normal_load(record, rig, name, inquiry.notes)
+    normal = normal_load(whole, rig, name, inquiry.notes)
     settings = {**_stated(rig, all_of_it=bool(results["lacking"])), **_constants_of(whole), "contact": slid}
     return Findings(name, whole, faults, normal, tuple(inquiry.notes), settings, results=results)
 

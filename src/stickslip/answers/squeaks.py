@@ -10,16 +10,17 @@ from functools import partial
 import numpy as np
 
 from stickslip.answers.findings import Comparison, Findings, Inquiry, record_name, require_several
+from stickslip.answers.preparation import normal_load
 from stickslip.cycle.loops import NO_SLOPE, friction_loops
-from stickslip.errors import EstimateError
-from stickslip.estimate import Estimate, kinds
+from stickslip.estimate import Constant, Estimate, kinds
 from stickslip.record.record import Record, require_record
+from stickslip.rig.settings import RigSettings, rig_settings
 from stickslip.squeak.bursts import Squeaks, find_squeaks
 from stickslip.squeak.couplings import coupling
 from stickslip.squeak.hearing import HEARD
 from stickslip.squeak.quality import SoundQuality, impulsiveness, sound_quality
 from stickslip.squeak.spectra import burst_spectra
-from stickslip.units import parse_constant, parse_range, parse_value
+from stickslip.units import parse_constant, parse_range
 
 HEARD_AT_ONCE = 5.0  # s
 VIBRATING = (*HEARD, "torsion_velocity", "load")
@@ -32,7 +33,7 @@ def analyze_squeaks(
     channel: str | None = None,
     frequencies: tuple[float, float] | str | None = None,
     contact: str | None = None,
-    normal: float | str | None = None,
+    normal: Constant | None = None,
     lever: float | str | None = None,
 ) -> Findings:
     """Does it squeak, how does it sound, what moves together then, and how does friction change with speed?
@@ -53,8 +54,8 @@ def analyze_squeaks(
         Lowest and highest that are listened to [Hz], as in :func:`find_squeaks`; or in words, "500:8000".
     contact : {"ground", "base"}, optional
         What the mass slides on, as in :func:`friction_loops`.
-    normal : float or str, optional
-        Normal load [N]; the mean of the channel "normal" where there is one.
+    normal : float, str, tuple or Estimate, optional
+        Normal load [N], as "10 ± 0.2 N"; the mean of the channel "normal" where there is one.
     lever : float or str, optional
         Distance of the friction force from the axis of the torsion [m], as in :func:`coupling`.
 
@@ -114,8 +115,10 @@ def analyze_squeaks(
         "frequencies": list(squeaks.band),
         **({"contact": contact} if contact else {}),
     }
-    load = _normal(record, normal)
-    return Findings(name or record_name(record), record, faults, load, tuple(inquiry.notes), chosen, results=results)
+    name = name or record_name(record)
+    stated = None if normal is None else rig_settings({"normal": normal}, source="the call").normal_load(name)
+    load = stated or normal_load(record, RigSettings(), name, inquiry.notes)
+    return Findings(name, record, faults, load, tuple(inquiry.notes), chosen, results=results)
 
 
 def _quality(record: Record, squeaks: Squeaks, inquiry: Inquiry) -> SoundQuality | None:
@@ -139,19 +142,6 @@ def trend_of(slope: Estimate | None) -> str:
     return "falls" if slope.value < 0 else "rises"
 
 
-def _normal(record: Record, stated: float | str | None) -> float | None:
-    """The load stated, or the magnitude of the one measured."""
-    if stated is not None:
-        load = parse_value(stated, "N")
-        if not (math.isfinite(load) and load > 0):
-            raise EstimateError(f"normal = {stated}", "a normal load is positive", "give normal= in N")
-        return load
-    if "normal" not in record:
-        return None
-    measured = abs(float(np.nanmean(record["normal"]))) if np.isfinite(record["normal"]).any() else 0.0
-    return measured or None
-
-
 # ---- conditions side by side
 
 
@@ -163,7 +153,7 @@ class Condition:
     ----------
     name : str
         What it is called.
-    normal : float or None
+    normal : Estimate or None
         Normal load [N].
     forcing : float
         Frequency of the forced motion [Hz]; NaN where none is recorded.
@@ -195,7 +185,7 @@ class Condition:
     """
 
     name: str
-    normal: float | None
+    normal: Estimate | None
     forcing: float
     stroke: float
     level: Estimate | None

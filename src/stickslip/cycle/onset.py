@@ -92,13 +92,14 @@ def presliding(record: Record, *, contact: str | None = None) -> Presliding:
 
     In each stroke, from a reversal to the next slip, two lines :math:`x = x_0 + C f` are drawn by least squares: one
     while the friction of the stroke before falls, one while that of the new stroke builds up, each between 20 and 80 %
-    of the sliding friction. C of the second is the compliance (the displacement is regressed on the friction, which is
-    the surer of the two), :math:`1/C` the stiffness, and the distance of both lines at no friction the play. A contact
-    that gives way does so alike in both directions; where C is not told from zero, or is smaller than 0.05 % of the
-    stroke, it is rigid as far as the record can tell; where the mass moves against its load while it sticks, something
-    else moves (the frame, the sensor), and its compliance can not be told. Nor can it where friction would take more
-    than a third of a stroke to turn round, as one that follows the speed seems to, or builds up within the samples over
-    which a balance of forces blurs a jump.
+    of the sliding friction, or of what is left of it as the motion turns round: the rest follows the speed, as that of
+    a damper does. C of the second is the compliance (the displacement is regressed on the friction, which is the
+    surer), :math:`1/C` the stiffness, and the distance of both lines at no friction the play. A contact that gives way
+    does so alike in both directions; where C is not told from zero, or is smaller than 0.05 % of the stroke, it is
+    rigid as far as the record can tell; where the mass moves against its load while it sticks, something else moves
+    (the frame, the sensor), and its compliance can not be told. Nor can it where friction would take more than a third
+    of a stroke to turn round, as one that follows the speed seems to, or builds up within the samples over which a
+    balance of forces blurs a jump.
 
     Parameters
     ----------
@@ -134,11 +135,16 @@ def presliding(record: Record, *, contact: str | None = None) -> Presliding:
     noise = noise_level(strokes.motion.displacement, record.fs)
     span = float(np.median([np.ptp(stroke.displacement) for stroke in strokes.strokes]))
     length = strokes.motion.unit
+    turning = _at_reversal(strokes)
+    if turning > LOW:
+        strokes = replace(strokes, strokes=tuple(replace(s, level=turning * s.level) for s in strokes.strokes))
     slopes = [_compliance(strokes.to(way), f"compliance {side}", f"{length}/{strokes.unit}") for way, side in SIDES]
     level = float(np.median([stroke.level for stroke in strokes.strokes]))
     least = max(FELT * span, noise) / level  # compliance that would just be felt
     most = ELASTIC * span / 2 / level  # friction turns from one side to the other
     verdict, evidence = _verdict(slopes, level, (least, RIGID * span / level, most), length)
+    if verdict == "gives way" and turning <= LOW:
+        verdict, evidence = "can not be told", f"{evidence}, but where it turns round friction is gone with the speed"
     if verdict == "gives way" and not is_measured(record, "friction") and _blurred(strokes):
         verdict, evidence = "can not be told", f"{evidence}, as fast as the balance of forces lets a jump be seen"
     gives = verdict == "gives way"
@@ -152,6 +158,11 @@ def presliding(record: Record, *, contact: str | None = None) -> Presliding:
     stiffness = _inverse(_both(slopes), "presliding stiffness") if gives else None
     (forward, back), backlash = sides, _backlash(strokes) if gives else None
     return Presliding(stiffness, forward, back, backlash, slopes[0], slopes[1], verdict, evidence, status)
+
+
+def _at_reversal(strokes: Strokes) -> float:
+    """The friction as the motion turns round, over that while it slides: what follows the speed is not in it."""
+    return min(1.0, float(np.median([-stroke.friction[0] / stroke.level for stroke in strokes.strokes])))
 
 
 def _branch(stroke: Stroke, low: float, high: float) -> tuple[float, float] | None:

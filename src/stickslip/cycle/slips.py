@@ -50,6 +50,7 @@ EXPLAINED = 0.25  # of what the polynomial leaves: a mode that explains less is 
 ALIKE = 0.25  # of the strongest line's frequency: a mode that is farther off is another
 PADDED = 4  # times the samples of the spectrum
 
+RESOLVED = 3.0  # standard deviations: of 1000 records without friction one shows as much
 FAST = 0.5  # of a stroke's largest speed, above which it certainly slides
 NEAR = 0.9  # of the sliding friction: at this much the contact is about to slip
 FALL = 0.05  # of the sliding friction by which it falls after its first peak, at least
@@ -371,11 +372,14 @@ def find_strokes(record: Record, *, contact: str | None, question: str) -> Strok
     friction, velocity = record["friction"], motion.velocity
     ways = _ways(velocity, definite_speed(motion), slow)
     ways = ways[:: len(ways) // MANY // 2 * 2 + 1]  # an odd step: both directions in turn
-    offset = _middle(friction, velocity, ways)
+    forces = np.array([_level(friction[first:last], way * velocity[first:last]) for first, last, way in ways])
+    signs = np.array([way for _, _, way in ways])
+    offset = _middle(forces, signs)
+    levels = signs * (forces - offset)
+    _require_resolved(levels, record.channels["friction"].unit, question)
     strokes = []
-    for first, last, way in ways:
+    for (first, last, way), level in zip(ways, levels, strict=True):
         force, speed = way * (friction[first:last] - offset), way * velocity[first:last]
-        level = _level(force, speed)
         broke = _breakaway(force, speed, level, slow, max(FALL * level, AUDIBLE * noise))
         if broke is not None:
             strokes.append(Stroke(way, first, force, way * motion.displacement[first:last], level, *broke))
@@ -394,12 +398,23 @@ def _level(force: Array, speed: Array) -> float:
     return float(np.median(force[speed > FAST * speed.max()]))
 
 
-def _middle(friction: Array, velocity: Array, ways: list[tuple[int, int, int]]) -> float:
+def _middle(forces: Array, signs: Array) -> float:
     """Half-way between the sliding friction of both directions."""
-    levels: dict[int, list[float]] = {1: [], -1: []}
-    for first, last, way in ways:
-        levels[way].append(_level(friction[first:last], way * velocity[first:last]))
-    return sum(float(np.median(level)) for level in levels.values()) / 2 if all(levels.values()) else 0.0
+    ways = [forces[signs == way] for way in (1, -1)]
+    return sum(float(np.median(way)) for way in ways) / 2 if all(map(len, ways)) else 0.0
+
+
+def _require_resolved(levels: Array, unit: str, question: str) -> None:
+    """Refuse strokes whose sliding friction may as well be none: what comes before it would be a ratio to noise."""
+    if not len(levels):
+        return  # that there is no stroke says more
+    level, sd = float(np.mean(levels)), float(np.std(levels)) / math.sqrt(len(levels))
+    if level <= RESOLVED * sd:
+        raise EstimateError(
+            f"a sliding friction of {level:.2g} {unit}, unsure by {sd:.2g} {unit} over {len(levels)} strokes",
+            f"{question} needs a sliding friction {RESOLVED:g} times as large as it is unsure",
+            "give more cycles, a larger load, or a force channel with less noise",
+        )
 
 
 def _ways(velocity: Array, definite: float, slow: float) -> list[tuple[int, int, int]]:

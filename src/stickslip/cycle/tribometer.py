@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from stickslip.balance.motion import Cycles, Motion, contact_motion, find_cycles, motion_channels, require_fit
 from stickslip.cycle.loops import DRIVES, levels_of, sliding_parts
 from stickslip.errors import ModelError, RecordError
-from stickslip.estimate import NORMAL_95, Constant, Doubt, Estimate, Result, Status
+from stickslip.estimate import Constant, Doubt, Estimate, Result, Status
 from stickslip.record.record import Record, require_record
 from stickslip.signals.interpolate import without_delays
 from stickslip.statistics import FEW_CYCLES, correlation_time, mean_of_cycles, student
@@ -172,7 +172,7 @@ def friction_coefficients(
     status = Status(*_doubts(wear_in, steady, len(loads)), *([cycles.status] if cycles.status != "ok" else []))
     relative = math.hypot(record.channels["friction"].gain_sd, load.sd / load.value)
     if wear_in is not None:
-        wear_in = replace(wear_in, final=_widened(wear_in.final, relative), change=_widened(wear_in.change, relative))
+        wear_in = replace(wear_in, final=wear_in.final.widened(relative), change=wear_in.change.widened(relative))
     coefficients = {
         name: _beside(mean_of_cycles(_called(name), of_cycles[name][steady:], unit="1", method=how), relative, status)
         for name, how in DEFINITIONS.items()
@@ -245,16 +245,8 @@ def _forces(friction: Array, motion: Motion, cycles: Cycles, label: NDArray[np.i
 
 def _beside(coefficient: Estimate, relative: float, status: str) -> Estimate:
     """The coefficient with what load and gain are known to, and with what is to be said of all of them."""
-    widened = replace(_widened(coefficient, relative), status=Status(coefficient.status, status))
+    widened = replace(coefficient.widened(relative), status=Status(coefficient.status, status))
     return widened.within(0.0, otherwise=DRIVES)
-
-
-def _widened(coefficient: Estimate, relative: float) -> Estimate:
-    """With a `relative` deviation of load and gain in its interval."""
-    more = NORMAL_95 * relative * abs(coefficient.value)
-    below, above = (math.hypot(end - coefficient.value, more) for end in coefficient.interval)
-    interval = coefficient.value - below, coefficient.value + above
-    return replace(coefficient, interval=interval, sd=math.hypot(coefficient.sd, relative * coefficient.value))
 
 
 def fit_wear_in(values: Array) -> WearIn | None:

@@ -227,7 +227,7 @@ def plot_levels(comparison: Comparison, *, ax: Axes | None = None) -> Axes:
 def plot_load_dependence(comparison: Comparison, *, ax: Axes | None = None) -> Axes:
     """Friction against normal load, with the line through the origin and its 95 % band."""
     ax = axes_of(ax)
-    known = [(f.normal, f.level) for f in comparison.findings if f.normal is not None and f.level is not None]
+    known = [(f.normal.value, f.level) for f in comparison.findings if f.normal is not None and f.level is not None]
     loads = np.array([load for load, _ in known])
     values = np.array([level.value for _, level in known])
     ends = np.array([level.interval for _, level in known])

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stickslip.errors import EstimateError, ModelError
-from stickslip.estimate import NORMAL_95, Doubt, Estimate
+from stickslip.estimate import Doubt, Estimate
 from stickslip.law.law import LawFit, answered, explained, keyed, remainders, surety, teller, valued
 from stickslip.law.search import Knob, Point, Problem, Profile, descend, rows_of
 from stickslip.law.start import (
@@ -523,17 +523,8 @@ def _calibrated(fit: LawFit, records: Sequence[Record], calibration: float) -> L
         moved, weighed = (part in dimensions(one.unit) for part in ("length", "mass"))
         if moved or weighed:
             unsure = math.hypot(driven and moved, not felt and weighed)
-            parameters[key] = widened(one, unsure * calibration, with_force if felt else STRAYS.get(one.unit, STRAY))
+            parameters[key] = one.widened(unsure * calibration, with_force if felt else STRAYS.get(one.unit, STRAY))
     return replace(fit, parameters=parameters)
-
-
-def widened(estimate: Estimate, share: float, times: float = 1.0) -> Estimate:
-    """The estimate, unsure by a share of its value besides, and so many times as unsure."""
-    more, (low, high) = share * abs(estimate.value), estimate.interval
-    ends = (estimate.value - low, high - estimate.value)
-    below, above = (times * math.hypot(end, NORMAL_95 * more) for end in ends)
-    interval = (max(min(0.0, low), estimate.value - below), estimate.value + above)
-    return replace(estimate, interval=interval, sd=times * math.hypot(estimate.sd, more))
 
 
 def _kinds(laws: Sequence[Any] | None) -> list[tuple[Hypothesis, list[Any]]]:

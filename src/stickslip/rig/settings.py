@@ -39,6 +39,7 @@ BY_UNIT = {"m": ("x", "z"), "m/s": ("v",), "m/s^2": ("a",), "N": ("load",), "N m
 WIDE = {"m": 0.2, "rad": 6.3}  # spans above which an unstated unit is a smaller one
 SMALLER = {"m": "mm", "rad": "deg"}
 REPAIRS = ("clock", "gaps", "missing", "spikes", "clipping", "drift")
+LOAD = "normal load"
 READING = ("channels", "units", "fs", "time", "delimiter", "decimal")  # options that read_record has too
 
 
@@ -179,11 +180,13 @@ def _one_or_many(value: object) -> object:
 def _constant(name: str, *, positive: bool = False) -> PlainValidator:
     """A constant of the rig: a number where it is exact, an Estimate where its uncertainty is stated."""
 
+    unit = RIG_UNITS.get(name, "N")
+
     def read(value: Any) -> float | Estimate:
         if isinstance(value, bool):
-            raise ValueError(f"a number in {RIG_UNITS[name]}, or text like '2.5 {RIG_UNITS[name]}', is needed")
+            raise ValueError(f"a number in {unit}, or text like '2.5 {unit}', is needed")
         try:
-            constant = Estimate.stated(name, value, RIG_UNITS[name])
+            constant = Estimate.stated(name, value, unit)
         except ModelError as error:
             raise ValueError(printable(f"{error.value}; {error.rule}")) from error
         if constant.value < 0 or (positive and constant.value == 0):
@@ -317,8 +320,8 @@ class RigSettings(BaseModel):
         Unit of a column, where its header states none.
     sensors : dict of str to SensorSettings
         What is known of the sensor of a channel: its lag, its noise, the mount that it stands on.
-    normal : dict of str to float
-        Normal load [N] by file name or pattern ("*250g*"); a single number holds for every file.
+    normal : dict of str to float or Estimate
+        Normal load [N] by file name or pattern ("*250g*"); a single one holds for every file.
     repair : tuple of str
         Repairs made to every record after reading, in the order given: clock, gaps, missing, spikes, clipping,
         drift; see :func:`mend`.
@@ -341,7 +344,7 @@ class RigSettings(BaseModel):
     Examples
     --------
     >>> rig = RigSettings(mass="250 g", stiffness=1191, normal={"*250g*": "2.45 N"})
-    >>> rig.mass, rig.normal_load("s_b_250g_x.mat"), rig.normal_load("other.csv")
+    >>> rig.mass, rig.normal_load("s_b_250g_x.mat").value, rig.normal_load("other.csv")
     (0.25, 2.45, None)
     """
 
@@ -356,9 +359,10 @@ class RigSettings(BaseModel):
     fs: Annotated[float, quantity("Hz"), Field(gt=0)] | None = None
     units: dict[str, str] = Field(default_factory=dict)
     sensors: dict[str, SensorSettings] = Field(default_factory=dict)
-    normal: Annotated[dict[str, Annotated[float, quantity("N"), Field(gt=0)]], BeforeValidator(_one_or_many)] = Field(
-        default_factory=dict
-    )
+    normal: Annotated[
+        dict[str, Annotated[float | Estimate, _constant(LOAD, positive=True), AS_PAIR]],
+        BeforeValidator(_one_or_many),
+    ] = Field(default_factory=dict)
     repair: tuple[Annotated[str, BeforeValidator(_repair)], ...] = ()
     devices: dict[str, dict[str, Any]] = Field(default_factory=dict)
     time: Annotated[str, Field(min_length=1)] | None = None
@@ -376,14 +380,14 @@ class RigSettings(BaseModel):
         own = record.log.entries() if record.log is not None else {}
         return record.with_log({**self.log.entries(), **own})
 
-    def normal_load(self, name: str) -> float | None:
-        """The normal load [N] stated for a file of this name; the first pattern that fits decides.
+    def normal_load(self, name: str) -> Estimate | None:
+        """The normal load stated for a file of this name; the first pattern that fits decides.
 
         A name with folders before it fits by its last part too.
         """
         names = (name, name.rpartition("/")[2])
         fits = (load for pattern, load in self.normal.items() if any(fnmatch.fnmatch(name, pattern) for name in names))
-        return next(fits, None)
+        return next((Estimate.stated(LOAD, load, "N") for load in fits), None)
 
     def reading(self) -> dict[str, Any]:
         """What ``read_record`` is told of the files, None where nothing is."""

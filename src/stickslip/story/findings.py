@@ -26,7 +26,7 @@ from stickslip.files.write import require_form, write_record
 from stickslip.record.record import Record
 from stickslip.story.scope import of_findings as scope_of
 from stickslip.story.story import Line, Story, Table, logged
-from stickslip.story.words import Caution, interval_of, leading, number, value_of
+from stickslip.story.words import Caution, constant, interval_of, leading, value_of
 from stickslip.whole import whole_file
 
 # Which functions, of one record and of several, tell findings that hold a result of this name; others are friction's.
@@ -66,7 +66,8 @@ def of_findings(findings: Findings, *, form: str = "") -> Story:
         own = replace(
             own, look=lambda: scope_of(findings, file), write=lambda folder: write_record(record, folder / file)
         )
-    load = {} if findings.normal is None else {"normal load": number(findings.normal, 0.0, "N")}
+    pressed = findings.normal
+    load = {} if pressed is None else {"normal load": constant(pressed.value, pressed.sd, pressed.unit)}
     length = {"sampling rate": f"{record.fs:g} Hz", "length": f"{len(record)} samples, {record.duration:g} s"}
     return replace(
         own,
@@ -270,7 +271,7 @@ def _rows_of(batch: Batch) -> Mapping[str, Any]:
             "answer": row.answer,
             "refusal": row.refusal,
             "same_as": row.same_as,
-            "normal_load": row.normal,
+            "normal_load": row.normal and row.normal.value,
             "estimates": [estimate.to_dict() for estimate in row.estimates],
         }
         for row in batch.rows

@@ -22,7 +22,7 @@ from stickslip.figures.maps import plates_of_map
 from stickslip.record.record import RIG_UNITS
 from stickslip.story import scope
 from stickslip.story.story import Line, Story
-from stickslip.story.words import Caution, cautions, doubts, interval_of, leading, number, sentence, value_of
+from stickslip.story.words import Caution, cautions, constant, doubts, interval_of, leading, number, sentence, value_of
 
 MOSTLY = 0.5  # of the time: a bound above it tells nothing
 RARELY = 0.005  # of the time
@@ -67,7 +67,7 @@ def _settings(findings: Findings) -> dict[str, str]:
         settings[f"sensor {channel}"] = ", ".join(f"{key} {value}" for key, value in stated.items())
     sd = findings.settings.get("sd", {})
     for key in settings.keys() & RIG_UNITS.keys():
-        settings[key] = _constant(findings.settings[key], sd.get(key, 0.0), RIG_UNITS[key])
+        settings[key] = constant(findings.settings[key], sd.get(key, 0.0), RIG_UNITS[key])
     return settings
 
 
@@ -75,14 +75,10 @@ def _data(findings: Findings) -> dict[str, Any]:
     regression, trial = findings.regression, findings.trial
     return {
         "contradiction": findings.contradiction,
-        "normal_load": findings.normal,
+        "normal_load": findings.normal and findings.normal.value,
         "regression_residual": None if regression is None else regression.residual,
         **({} if trial is None else {"twins": trial.to_dict()}),
     }
-
-
-def _constant(value: float, sd: float, unit: str) -> str:
-    return number(value, sd, unit) + (f", standard uncertainty {number(sd, sd, unit)}" if sd else "")
 
 
 def _exact(findings: Findings) -> Iterator[str]:
@@ -209,7 +205,7 @@ def _of_loops(findings: Findings) -> Iterator[str]:
         return
     if findings.coefficient is not None and findings.normal is not None:
         yield (
-            f"Under a normal load of {number(findings.normal, 0.0, 'N')} that is a friction coefficient of "
+            f"Under a normal load of {value_of(findings.normal)} that is a friction coefficient of "
             f"{value_of(findings.coefficient)}."
         )
     yield from _of_directions(loops.forward, loops.back)
@@ -232,13 +228,12 @@ def _of_loops(findings: Findings) -> Iterator[str]:
 def _of_sticks(findings: Findings) -> str:
     sticks = findings.sticks
     assert sticks is not None
-    if findings.trial is not None and sticks.share.known and sticks.share.interval[0] == 0.0 < sticks.share.interval[1]:
-        most = sticks.share.interval[1]
-        return (
-            f"no stick is resolved: it sticks below {100 * most:.2g} % of the time (95 %)"
-            if most < MOSTLY
-            else "how long it sticks is not resolved"
-        )
+    low, high = sticks.share.interval
+    bound = findings.trial is not None and sticks.share.known and low == 0.0 < high
+    if high >= MOSTLY and (bound or sticks.share.value < RARELY):
+        return "how long it sticks is not resolved"
+    if bound:
+        return f"no stick is resolved: it sticks below {100 * high:.2g} % of the time (95 %)"
     if not any(event.kind == "stick" for event in sticks.events):
         brief = sticks.share.value >= RARELY
         share = value_of(sticks.share)
@@ -251,7 +246,6 @@ def _of_sticks(findings: Findings) -> str:
         if math.isfinite(often) and often > 0
         else ""
     )
-    low, high = sticks.share.interval
     share = interval_of(sticks.share) if high - low > 0.01 else value_of(sticks.share)
     return f"it {'sticks' if stands(sticks.share.status) else 'seems to stick'} {share} of the time{stops}"
 

@@ -306,8 +306,9 @@ def _again(
 
 def _loaded(findings: Findings) -> Iterator[str]:
     """The normal load, where it was stated."""
-    if findings.normal is not None and "normal" not in findings.record:
-        yield from ("--normal", f"{findings.normal:.12g}")
+    load = findings.normal
+    if load is not None and "normal" not in findings.record:
+        yield from ("--normal", f"{load.value:.12g}" + (f" ± {load.sd:.12g} N" if load.sd else ""))
 
 
 def _sources(record: Record) -> dict[str, str]:

@@ -10,7 +10,7 @@ import numpy as np
 
 from stickslip.answers.findings import Comparison, Findings
 from stickslip.answers.squeaks import Condition, trend_of
-from stickslip.estimate import Estimate, decimals, doubts_of
+from stickslip.estimate import Estimate, decimals, doubts_of, plain
 from stickslip.figures.squeak import plates_of, plates_together
 from stickslip.squeak.bursts import WORDS, Squeak, Squeaks
 from stickslip.squeak.couplings import Coupling, Pair
@@ -54,7 +54,7 @@ def _data(findings: Findings) -> dict[str, Any]:
     heard = findings.squeaks.to_dict()
     parts = {"coupling": findings.coupling, "sound_quality": findings.quality, "impulses": findings.impulses}
     return {
-        "normal_load": findings.normal,
+        "normal_load": findings.normal and findings.normal.value,
         "squeaks": {key: value for key, value in heard.items() if key not in ("notes", "history")},
         "beside": {
             squeaks.channel: {
@@ -71,7 +71,7 @@ def _data(findings: Findings) -> dict[str, Any]:
 def _together(comparison: Comparison) -> dict[str, Any]:
     """The conditions and what they say together, for JSON."""
     rows = [
-        {key: value.to_dict() if isinstance(value, Estimate) else value for key, value in vars(condition).items()}
+        {**plain(vars(condition)), "normal": condition.normal and condition.normal.value}
         for condition in comparison.conditions
     ]
     conditions = [{**row, "trend": condition.trend} for row, condition in zip(rows, comparison.conditions, strict=True)]
@@ -357,7 +357,7 @@ def _condition(condition: Condition) -> list[str]:
     stroke = "" if math.isnan(condition.stroke) else f"±{number(condition.stroke, condition.stroke / 100, 'm')}"
     slope = NONE if condition.slope is None else f"{value_of(condition.slope)} ({_ends(condition.slope)})"
     return [
-        condition.name, NONE if condition.normal is None else number(condition.normal, 0.0, "N"),
+        condition.name, NONE if condition.normal is None else number(condition.normal.value, 0.0, "N"),
         ", ".join(part for part in (forcing, stroke) if part) or NONE, _value(condition.level), slope,
         _heard(condition),
         NONE if condition.frequency is None else f"{condition.frequency.value:.1f}", _or_none(condition.sound, ".1f"),

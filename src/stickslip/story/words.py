@@ -35,6 +35,17 @@ def number(value: float, sd: float, unit: str) -> str:
     return f"{factor * value:.{digits}f}{'' if text == '1' else ' ' + text}"
 
 
+def constant(value: float, sd: float, unit: str) -> str:
+    """A constant as it was stated, with its standard uncertainty where it has one.
+
+    Examples
+    --------
+    >>> constant(2.42, 0.0, "kg"), constant(2.42, 0.02, "kg")
+    ('2.420 kg', '2.42 kg, standard uncertainty 0.02 kg')
+    """
+    return number(value, sd, unit) + (f", standard uncertainty {number(sd, sd, unit)}" if sd else "")
+
+
 def value_of(estimate: Estimate, value: float | None = None) -> str:
     """The estimate's value; or another one (the true one) with the same unit and digits."""
     value = estimate.value if value is None else value
