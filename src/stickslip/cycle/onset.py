@@ -41,6 +41,8 @@ BLUNT = {"load": 1, "a": 4, "x": 12}  # samples in which a corner of the frictio
 ROUNDED = {"load": 0.15, "a": 0.3, "x": 0.6}  # share of a sudden fall of the friction that smoothing takes off its peak
 PULLED = 0.025  # share by which smoothing and lags move the level that a pull is held against, on simulated rigs
 NOTHING = 0.9  # of its level, by which a friction that tells nothing of its peak strays after a slip
+ALIKE = 3.0  # times the other, within which the time of a peak's fall is that of the rise before it
+OVERSHOOT = 0.09  # of the level, by which a Butterworth filter of order two overshoots a jump from it to its opposite
 NEAR = 12  # samples before a slip in which the friction's rise is looked for
 CREEPS = 0.1  # of a stroke's largest speed, below which it does not slide for good
 RINGS = 1.5  # times what a mount's ring is after half a cycle it is at its start, at most
@@ -294,7 +296,10 @@ def breakaway(record: Record, *, contact: str | None = None) -> Breakaway:
     the instant and f; the pull can not be less than f then. Static friction is the pull at that instant, from a line
     through the stick's last fifth. Of a friction that was measured, or found by all sensors together, it is the largest
     value before the contact moves, which noise makes too large by two of its deviations at most: the interval's low end
-    goes as far down. Where the mass moves before friction is near its level it is the first peak thereafter.
+    goes as far down. It goes down to the level where the peak is as brief as the jump before it, for the sensor's own
+    filter overshoots so, and by 9 % of the level where a jump leads to it at all; its high end goes up by what the
+    friction falls in a sample, or by the whole of a brief peak, which a filter cuts. Where the mass moves before
+    friction is near its level it is the first peak thereafter.
 
     A mass that is not at rest while it sticks, ringing on a contact that gives way, bears its own inertia beside the
     pull: then it is the friction's peak, and the interval reaches from the pull on. The interval of a peak that was
@@ -447,7 +452,8 @@ def _by_peak(record: Record, strokes: Strokes) -> _Borne:
     friction = [float(stroke.friction[stroke.slip]) for stroke in chosen]
     noise = 2 * (record.channels["friction"].noise or noise_level(record["friction"], record.fs))
     if is_measured(record, "friction"):
-        return _Borne(chosen, friction, PEAK, noise)
+        below, above = _filtered(chosen)
+        return _Borne(chosen, friction, PEAK, max(noise, below), above)
     rows = float(np.median([stroke.slip for stroke in chosen]))
     if rows < FEW:
         raise EstimateError(
@@ -472,6 +478,30 @@ def _by_peak(record: Record, strokes: Strokes) -> _Borne:
     blurred = "told from the displacement alone, which blurs a peak" if best == "x" else "ok"
     status = Status(Doubt(unknown, UNSTATED) if unknown else blurred)
     return _Borne(chosen, friction, PEAK, max(noise, corner / 4) + stray, corner + stray, status)
+
+
+def _filtered(strokes: Sequence[Stroke]) -> tuple[float, float]:
+    """How much less and more than its measured peak a contact may have borne [N], by samples and sensor.
+
+    Between two samples it may have borne as much more as it then falls in one. A sensor's filter overshoots a jump,
+    with no static friction there, and cuts a peak that is as brief as the jump; a fall far quicker than the rise before
+    it shows that the sensor is not in the way.
+    """
+    rises, falls, excesses, steps = [], [], [], []
+    for stroke in strokes:
+        peak, then = stroke.friction[stroke.slip], stroke.friction[stroke.slip + 1 :]
+        rises.append(1 + np.count_nonzero(np.abs(stroke.friction[: stroke.slip]) < HIGH * stroke.level))
+        falls.append(1 + int(np.argmax(then < (peak + stroke.level) / 2)))
+        excesses.append(peak - stroke.level)
+        steps.append(peak - then[0])
+    rise, fall, excess, between = (float(np.median(values)) for values in (rises, falls, excesses, steps))
+    if excess < 0:  # still on its way to the level, or held back by what follows the speed
+        return 0.0, max(between, -excess)
+    if fall < rise / ALIKE:
+        return 0.0, max(between, 0.0)
+    if fall <= ALIKE * rise:
+        return excess, max(between, excess)
+    return OVERSHOOT * float(np.median([stroke.level for stroke in strokes])), max(between, 0.0)
 
 
 def _used(record: Record, method: str) -> list[str]:

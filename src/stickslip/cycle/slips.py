@@ -435,7 +435,8 @@ def _breakaway(force: Array, speed: Array, level: float, slow: float, fall: floa
     if level <= 0 or moved < 2:
         return None
     if force[moved] > HELD * level:
-        before = moved // 2
+        # a stick's first half holds what the stop leaves ringing; a face that is moved on passes rest without a stick
+        before = min(moved // 2, moved - int(np.argmax(speed[moved::-1] <= 0)))
         return before + int(np.argmax(force[before : moved + 1])), True
     near = np.flatnonzero(force >= NEAR * level)
     if not len(near):
