@@ -10,9 +10,9 @@ from scipy.signal import lfilter
 import stickslip as ss
 from stickslip.answers import analyze_tribometer, compare_tribometers
 from stickslip.cli.program import main
-from stickslip.cycle import friction_coefficients
+from stickslip.cycle import friction_coefficients, static_coefficient
 from stickslip.cycle.tribometer import fit_wear_in
-from stickslip.errors import ModelError, RecordError
+from stickslip.errors import EstimateError, ModelError, RecordError
 from stickslip.estimate import stands
 
 FS, HALF, STROKE, RISE = 1000.0, 500, 4e-3, 0.4e-3  # Hz, samples of a stroke, m, m over which friction turns round
@@ -146,6 +146,70 @@ def test_over_tests_the_scatter_between_them_counts() -> None:
     mean = compare_tribometers(tests).plateau
     assert mean.value == pytest.approx(0.3, rel=0.01)
     assert mean.interval[1] - mean.interval[0] > 5 * np.ptp(tests[0].tribometer.plateau.interval)
+
+
+def cell(fs=1000.0, static=0.25, kinetic=0.18, stiffness=2e4, period=0.5, frequency=400.0, seed=0, load=LOAD):
+    """A specimen on a load cell under a stage that moves evenly to and fro; what holds after a slip holds no longer."""
+    step, mass, rounds = 2e-5, stiffness / (2 * np.pi * frequency) ** 2, 6
+    damping, speed = 0.3 * np.sqrt(stiffness * mass), 2 * STROKE / period
+    every, count = round(1 / fs / step), round(rounds * period / step)
+    away, rate, holds, side, bears = 0.0, 0.0, True, 1.0, static
+    force = np.empty(count // every + 1)
+    for row in range(count):
+        stage = speed if (row * step / period) % 1 < 0.5 else -speed
+        if row % every == 0:
+            force[row // every] = stiffness * away
+        if holds:
+            rate = stage
+            borne = stiffness * away + damping * rate
+            bears = static if side * stage < 0 else bears
+            holds, side = abs(borne) < bears * load, np.sign(borne)
+        if not holds:
+            bears = kinetic
+            after = rate + step * (side * load * kinetic - damping * rate - stiffness * away) / mass
+            holds = side * (stage - after) <= 0
+            rate = stage if holds else after
+        away += step * rate
+    chance, time = np.random.default_rng(seed), np.arange(len(force)) / fs
+    x = STROKE * np.abs(2 * ((time / period) % 1) - 1) + chance.normal(0, 1e-6, time.size)
+    return ss.Record.of({"x": -x, "friction": force + chance.normal(0, 0.01, time.size)}, fs=fs)
+
+
+@pytest.mark.parametrize("fs", [1000.0, 5000.0])
+def test_the_static_coefficient_is_the_peak_at_each_reversal(fs) -> None:
+    findings = analyze_tribometer(cell(fs), normal=LOAD)
+    assert findings.static.includes(0.25), findings.static
+    assert findings.static.interval[0] > 0.19
+    assert np.ptp(findings.static.interval) < (0.07 if fs < 5000 else 0.02)
+    assert len(findings.peaks.of_strokes) >= 9
+    assert not findings.notes
+
+
+def test_the_static_coefficient_is_of_the_load_that_was_measured() -> None:
+    record = cell()
+    load = 10.0 + np.random.default_rng(1).normal(0, 0.1, len(record))
+    measured = ss.Record.of({"x": record["x"], "friction": record["friction"], "normal": load}, fs=record.fs)
+    assert analyze_tribometer(measured).static.includes(0.25)
+    unsure = analyze_tribometer(record, normal="10 ± 0.5 N").static
+    assert np.ptp(unsure.interval) > 1.96 * 2 * 0.05 * 0.23
+
+
+@pytest.mark.parametrize(
+    ("record", "why"),
+    [
+        (cell(static=0.18), "may swing"),
+        (cell(250.0), "Hz or more"),
+        (cell(5000.0, static=0.18, stiffness=1e4, frequency=4.0), "may swing"),
+        (strokes(), "without a peak"),
+    ],
+    ids=["none", "too slow", "a ring", "a slow turn"],
+)
+def test_where_no_static_coefficient_shows_the_reason_is_told(record, why) -> None:
+    findings = analyze_tribometer(record, normal=LOAD)
+    assert findings.static is None
+    assert why in findings.notes[0], findings.notes
+    with pytest.raises(EstimateError, match=why):
+        static_coefficient(record, coefficients=findings.tribometer)
 
 
 @pytest.mark.figures

@@ -15,11 +15,11 @@ from stickslip.answers.findings import Comparison, Findings, Inquiry, flagged, r
 from stickslip.answers.mistakes import called, require_angle
 from stickslip.cycle.joint import JointFriction, regress_joint, regress_joint_logs
 from stickslip.cycle.joint_onset import joint_backlash, joint_breakaway
-from stickslip.cycle.onset import Breakaway, breakaway
 from stickslip.cycle.sticks import find_sticks
-from stickslip.cycle.tribometer import DEFINITIONS, Coefficients, friction_coefficients
-from stickslip.errors import EstimateError, RecordError
-from stickslip.estimate import UNTRIED, Constant, Doubt, Estimate, stands
+from stickslip.cycle.tribometer import DEFINITIONS, friction_coefficients
+from stickslip.cycle.tribometer_static import static_coefficient
+from stickslip.errors import RecordError
+from stickslip.estimate import UNTRIED, Constant, Doubt, Estimate
 from stickslip.record.channels import VOCABULARY
 from stickslip.record.clock import fit_clock
 from stickslip.record.record import Record, Step, require_record
@@ -384,8 +384,8 @@ def analyze_tribometer(
     Returns
     -------
     Findings
-        Its results: ``tribometer``, ``wear_in`` where it is told, and ``static``, the coefficient at breakaway, or a
-        note of why it is not told.
+        Its results: ``tribometer``, ``wear_in`` where it is told, and ``static``, the coefficient at breakaway as
+        :func:`~stickslip.cycle.static_coefficient` tells it (that of every stroke: ``peaks``), or a note of why not.
 
     Raises
     ------
@@ -410,27 +410,14 @@ def analyze_tribometer(
     if normal is None and rig is not None and "normal" not in record:
         normal = rig.normal_load(record_name(record))
     coefficients = friction_coefficients(record, normal=normal, frequency=frequency)
-    away = inquiry.ask("Breakaway", partial(breakaway, record), aside=True)
-    static = inquiry.ask("The static coefficient", partial(_static, coefficients, away), aside=True) if away else None
-    results = {"tribometer": coefficients, "static": static, "wear_in": coefficients.wear_in}
+    ask = partial(static_coefficient, record, coefficients=coefficients)
+    peaks = inquiry.ask("The static coefficient", ask, aside=True)
+    static = None if peaks is None else peaks.static
+    results = {"tribometer": coefficients, "static": static, "wear_in": coefficients.wear_in, "peaks": peaks}
     load = "measured" if coefficients.measured else f"{coefficients.load.value:.4g} N, stated"
     return Findings(
         record_name(record), record, faults, notes=tuple(inquiry.notes), settings={"normal load": load}, results=results
     )
-
-
-def _static(coefficients: Coefficients, away: Breakaway) -> Estimate:
-    """The static coefficient, of what the contact bears either way before it slips."""
-    ways = [way for way in (away.forward, away.back) if way is not None and way.known]
-    if len(ways) < 2 or not all(stands(way.status) for way in ways):
-        raise EstimateError(
-            "breakaway is not told both ways", "the static coefficient is of both", "sample it more often at reversals"
-        )
-    ends = zip(*(way.interval for way in ways), strict=True)
-    low, high = (sum(end) / 2 / coefficients.load.value for end in ends)
-    value = sum(way.value for way in ways) / 2 / coefficients.load.value
-    sd = sum(way.sd for way in ways) / 2 / coefficients.load.value
-    return Estimate("coefficient of friction, static", value, (low, high), sd, "1", ways[0].method).within(0.0)
 
 
 def compare_tribometers(findings: Sequence[Findings]) -> Comparison:

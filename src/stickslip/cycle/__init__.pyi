@@ -23,5 +23,7 @@ from stickslip.cycle.sticks import Sticks as Sticks
 from stickslip.cycle.tribometer import Coefficients as Coefficients
 from stickslip.cycle.tribometer import WearIn as WearIn
 from stickslip.cycle.tribometer import friction_coefficients as friction_coefficients
+from stickslip.cycle.tribometer_static import StaticCoefficient as StaticCoefficient
+from stickslip.cycle.tribometer_static import static_coefficient as static_coefficient
 
 __all__: list[str]

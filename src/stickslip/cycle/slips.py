@@ -10,7 +10,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -361,14 +361,24 @@ class Strokes:
         return [stroke for stroke in self.strokes if stroke.way == way]
 
 
-def find_strokes(record: Record, *, contact: str | None, question: str) -> Strokes:
-    """Cut a record at the reversals of its motion; strokes that never reach their sliding friction are left out."""
+class Cut(NamedTuple):
+    """A motion cut at its reversals: of each stroke the rows from the first to before the last, the way, the level."""
+
+    motion: Motion
+    friction: Array
+    ways: list[tuple[int, int, int]]
+    levels: Array
+    offset: float
+    slow: float
+
+
+def cut_at_reversals(record: Record, *, contact: str | None, question: str) -> Cut:
+    """Where the strokes of a motion begin and end, and the middle of the friction both ways."""
     record.require_clean("friction", question=question)
     record = without_delays(record, *motion_channels(record, contact), "friction", question=question)
     motion = contact_motion(record, contact=contact, question=question)
     require_fit(record, "friction", length=motion.unit, question=question)
     slow = max(CREEP * find_cycles(record, motion).peak, AUDIBLE * motion.noise)
-    noise = record.channels["friction"].noise or 0.0
     friction, velocity = record["friction"], motion.velocity
     ways = _ways(velocity, definite_speed(motion), slow)
     ways = ways[:: len(ways) // MANY // 2 * 2 + 1]  # an odd step: both directions in turn
@@ -377,6 +387,13 @@ def find_strokes(record: Record, *, contact: str | None, question: str) -> Strok
     offset = _middle(forces, signs)
     levels = signs * (forces - offset)
     _require_resolved(levels, record.channels["friction"].unit, question)
+    return Cut(motion, friction, ways, levels, offset, slow)
+
+
+def find_strokes(record: Record, *, contact: str | None, question: str) -> Strokes:
+    """Cut a record at the reversals of its motion; strokes that never reach their sliding friction are left out."""
+    motion, friction, ways, levels, offset, slow = cut_at_reversals(record, contact=contact, question=question)
+    noise, velocity = record.channels["friction"].noise or 0.0, motion.velocity
     strokes = []
     for (first, last, way), level in zip(ways, levels, strict=True):
         force, speed = way * (friction[first:last] - offset), way * velocity[first:last]

@@ -83,6 +83,8 @@ class Coefficients(Result):
         Of the position.
     measured : bool
         Whether the load was measured, or stated.
+    steady : int
+        The first cycle of those that the means are of.
     status : str
         "ok", or in words what to beware of.
     """
@@ -101,6 +103,7 @@ class Coefficients(Result):
     back: Array
     unit: str
     measured: bool
+    steady: int
     status: str
 
 
@@ -190,6 +193,7 @@ def friction_coefficients(
         back=back,
         unit=motion.unit,
         measured=load.method != "stated",
+        steady=steady,
         status=status,
     )
 

@@ -86,8 +86,10 @@ def _definitions(findings: Findings) -> Table:
 
 
 def _test_data(findings: Findings) -> dict[str, Any]:
-    tribometer = findings.tribometer
+    tribometer, peaks = findings.tribometer, findings.peaks
+    static = {} if peaks is None else {"static_of_strokes": peaks.of_strokes, "stroke_time": peaks.time}
     return {
+        **static,
         "load_measured": tribometer.measured, "of_cycles": dict(tribometer.of_cycles), "cycle_time": tribometer.time,
         "map": {name: getattr(tribometer, name) for name in ("position", "cycle", "forward", "back")},
     }  # fmt: skip
