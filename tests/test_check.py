@@ -248,3 +248,16 @@ def test_few_stamps_are_checked_too(rows: int):
     stamps = np.cumsum(np.where(np.arange(rows) % 3 == 1, 0.0, 1.0 + np.arange(rows)))
     record = replace(Record.of({"x": np.arange(float(rows))}, fs=FS), stamps=stamps)
     assert record.check()[0].severity == "error"
+
+
+def test_a_measured_friction_at_the_end_of_its_range_is_clipped() -> None:
+    """A square wave with noise on its levels has none; a friction that was computed has no sensor that could."""
+    chance = np.random.default_rng(0)
+    v = 0.1 * np.cos(0.02 * np.pi * np.arange(2000))
+    friction = np.sign(v) * (2 + 0.8 * np.exp(-np.abs(v) / 0.02)) + chance.normal(0, 0.02, v.size)
+    record = Record.of({"v": v, "friction": friction}, fs=1000.0)
+    assert not [fault for fault in record.check() if fault.kind == "clipped"]
+    cut = record.with_channel("friction", np.clip(friction, -2.4, 2.4), unit="N", source="load cell")
+    assert [fault.channel for fault in cut.check() if fault.kind == "clipped"] == ["friction"]
+    computed = record.with_channel("friction", cut["friction"], unit="N", source="friction_force")
+    assert not [fault for fault in computed.check() if fault.kind == "clipped"]

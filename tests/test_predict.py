@@ -189,3 +189,20 @@ def test_a_structure_is_refused() -> None:
         ss.answers.predict(measured(STICKING), ss.squeak.squeak_rig())  # type: ignore[arg-type]
     with pytest.raises(ss.errors.EstimateError, match="no record"):
         ss.answers.predict([], STICKING)
+
+
+def test_a_channel_at_the_end_of_its_range_is_named_by_fit_and_prediction(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As analyze names it, by the check-up; of several records with the one that it is in."""
+    monkeypatch.setenv("COLUMNS", "400")
+    record = measured(STICKING)
+    cut = ss.Record.of({"x": np.clip(record["x"], -3e-4, 3e-4), "z": record["z"]}, fs=record.fs, start=record.start)
+    write("cut.csv", cut)
+    write("whole.csv", record)
+    Path("law.toml").write_text(SYSTEM, encoding="utf-8")
+    rig = ["--mass", "2.42", "--stiffness", "2310", "--laws", "Coulomb"]
+    fitted = CliRunner().invoke(main, ["fit", "cut.csv", "whole.csv", *rig])
+    assert "cut.csv: channel x has" in fitted.output, fitted.output
+    assert "whole.csv: channel" not in fitted.output
+    for output in (predict("law.toml", "cut.csv").output, CliRunner().invoke(main, ["fit", "cut.csv", *rig]).output):
+        assert "samples clipped near" in output, output
+    assert "clipped" not in predict("law.toml", "whole.csv").output

@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 SHORTEST = 32  # samples below which no question about friction can be answered
 NAMED = 8  # constant channels named in one sentence
 DRIFT = 0.3  # rise of the trend, in amplitudes of the oscillation, from which it is told
-COMPUTED = "friction"  # has no sensor that could clip or freeze
+COMPUTED = ("friction_force", "analyze_joint")  # sources of a friction that no sensor felt, which could clip
 SHARP_UNITS = ("m/s", "rad/s", "N", "N m")  # what may have plateaus with corners by nature: sticking, saturation
 
 
@@ -97,7 +97,9 @@ def find_faults(record: Record) -> list[Fault]:
         if record.stamps is not None and not is_uniform(record.stamps):
             faults += _clock_faults(record.stamps)
         for name in record:
-            faults += _channel_faults(name, record.channels[name].unit, record[name])
+            channel = record.channels[name]
+            felt = name != "friction" or channel.source not in COMPUTED
+            faults += _channel_faults(name, channel.unit, record[name], felt=felt)
     return sorted(_folded(record, faults), key=lambda fault: fault.severity != "error")
 
 
@@ -256,7 +258,7 @@ def _clock_unstated(record: Record) -> list[Fault]:
     return [Fault("unit", None, ((0, len(record) - 1),), message)]
 
 
-def _channel_faults(name: str, unit: str, values: Array) -> list[Fault]:
+def _channel_faults(name: str, unit: str, values: Array, *, felt: bool) -> list[Fault]:
     lost = ~np.isfinite(values)
     faults = []
     if lost.any():
@@ -273,7 +275,7 @@ def _channel_faults(name: str, unit: str, values: Array) -> list[Fault]:
             "look at its cable, range and column."
         )
         return [*faults, Fault("constant", name, ((0, len(values) - 1),), message)]
-    return faults + [fault for fault in _shape_faults(name, unit, values) if not _inside(fault.rows, lost)]
+    return faults + [fault for fault in _shape_faults(name, unit, values, felt=felt) if not _inside(fault.rows, lost)]
 
 
 def cure(values: Array) -> str:
@@ -309,7 +311,7 @@ def clock_cure(stamps: Array) -> str:
     return "mend the clock with repair_clock(record)"
 
 
-def _shape_faults(name: str, unit: str, values: Array) -> list[Fault]:
+def _shape_faults(name: str, unit: str, values: Array, *, felt: bool) -> list[Fault]:
     everywhere = ((0, len(values) - 1),)
     few = flaws.levels_used(values)
     if few is not None:
@@ -323,13 +325,12 @@ def _shape_faults(name: str, unit: str, values: Array) -> list[Fault]:
             _fault("spike", name, spikes, what, f'replace them with remove_spikes(record, "{name}")', "spikes")
         )
         values = flaws.held_over(values, flaws.rows_of(spikes, len(values)))
-    measured = name != COMPUTED
-    cut = _clipped(name, unit, values) if measured else None
+    cut = _clipped(name, unit, values) if felt else None
     if cut is not None:
         faults.append(cut)
     top = flaws.rows_of(cut.rows if cut is not None else (), len(values))
-    frozen = tuple(run for run in flaws.frozen(values) if not top[run[0] : run[1] + 1].any()) if measured else ()
-    if frozen:
+    frozen = tuple(run for run in flaws.frozen(values) if not top[run[0] : run[1] + 1].any())
+    if frozen and name != "friction":  # at rest it bears what pulls, which may stand still
         longest = max(last - first + 1 for first, last in frozen)
         what = f"samples frozen while the signal moved on, for up to {longest} rows"
         faults.append(_fault("frozen", name, frozen, what, f'make them NaN and use fill_missing(record, "{name}")'))
@@ -343,18 +344,9 @@ def _shape_faults(name: str, unit: str, values: Array) -> list[Fault]:
 
 
 def find_clipping(record: Record, name: str) -> Fault | None:
-    """Where a channel of numbers alone stands at the end of its sensor's range; the one fault, without the others.
-
-    Unlike the check-up, this also asks of a friction that was measured.
-    """
-    if name != COMPUTED:
-        clipped = (fault for fault in record.check() if fault.kind == "clipped" and fault.channel == name)
-        return next(clipped, None)
-    values = record[name]
-    spikes = flaws.spikes(values)
-    if spikes:
-        values = flaws.held_over(values, flaws.rows_of(spikes, len(values)))
-    return _clipped(name, record.channels[name].unit, values)
+    """Where a channel of numbers alone stands at the end of its sensor's range; the one fault, without the others."""
+    clipped = (fault for fault in record.check() if fault.kind == "clipped" and fault.channel == name)
+    return next(clipped, None)
 
 
 def _clipped(name: str, unit: str, values: Array) -> Fault | None:

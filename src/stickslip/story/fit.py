@@ -29,7 +29,7 @@ from stickslip.rig.settings import rig_toml
 from stickslip.settings import toml_lines
 from stickslip.story.scope import Scope, corrected, of_fit, reading_of
 from stickslip.story.story import Line, Story, Table
-from stickslip.story.words import Caution, doubts, interval_of, leading, number, value_of
+from stickslip.story.words import Caution, doubts, faulty, interval_of, leading, number, value_of
 
 Fit: TypeAlias = LawComparison | LawFit | CurveFit
 Records: TypeAlias = Record | Sequence[Record]  # what it was fitted to
@@ -96,10 +96,12 @@ def of_laws(
 def _story(fit: Fit, record: Records, headline: list[str], **content: Any) -> Story:
     """What all fits tell of their parameters and of the records that they were made to."""
     records = [record] if isinstance(record, Record) else list(record)
-    units = list(dict.fromkeys(caution for record in records for caution in leading(record.check())))
+    checked = [(f"{record_name(record)}: " if len(records) > 1 else "", record.check()) for record in records]
+    units = list(dict.fromkeys(caution for _, faults in checked for caution in leading(faults)))
     own = doubts(fit.estimates)
     said = {caution.reason for caution in own}
     cautions = [*(Caution(doubt.words) for doubt in doubts_of(fit.status) if doubt.words not in said), *own]
+    cautions += [caution for name, faults in checked for caution in faulty(faults, of=name)]
     if records:
         first = records[0]
         content = {"channels": list(first.channels.values()), "history": first.history, **content}
@@ -114,6 +116,7 @@ def _story(fit: Fit, record: Records, headline: list[str], **content: Any) -> St
         [*units, *headline],
         cautions,
         lines=list(map(Line.of, fit.estimates)),
+        faults=[f"{name}{fault}" for name, faults in checked for fault in faults] if records else None,
         draw=lambda: law_plates(fit),
         look=lambda: _scope(fit, records),
         write=partial(write_law, result=fit, records=records),
@@ -298,11 +301,13 @@ def _of_one(part: Prediction, law: str) -> Story:
             for pair in zip(*of, strict=True)
         ]
         tables.append(Table("Stops, by the speed", ("", "measured", "95 %", "predicted", "95 %"), stops))
+    faults = record.check()
     return Story.of_record(
         part.name,
         record,
-        headline=[*leading(record.check()), *_headline(part, law)],
-        cautions=[*_cautions(part), *doubts(part.estimates[:2])],
+        headline=[*leading(faults), *_headline(part, law)],
+        cautions=[*_cautions(part), *doubts(part.estimates[:2]), *faulty(faults)],
+        faults=[str(fault) for fault in faults],
         tables=tables,
         draw=lambda: law_plates(fit),
         look=lambda: _scope_of(part, law),

@@ -150,13 +150,15 @@ def _of_few(few: Mapping[Doubt, Sequence[str]]) -> Iterator[Caution]:
         yield Caution(reason, names, FEW)
 
 
-def faulty(faults: Sequence[Fault]) -> Iterator[Caution]:
-    """What the check-up found beside what leads: the first of it, and how many more."""
+def faulty(faults: Sequence[Fault], *, of: str = "") -> Iterator[Caution]:
+    """What the check-up found beside what leads: the first, and how many more; `of` which record of several."""
     others = [str(fault) for fault in faults if fault.kind != "unit"]
     if others:
         more = len(others) - 1
         those = f" ({more} more fault{'s' * (more > 1)} in the record)" if more else ""
-        yield Caution(f"The check-up found 1 fault in the record: {others[0]}" if not more else f"{others[0]}{those}")
+        yield Caution(
+            f"{of}{others[0]}{those}" if more or of else f"The check-up found 1 fault in the record: {others[0]}"
+        )
 
 
 def leading(faults: Iterable[Fault]) -> list[Caution]:
