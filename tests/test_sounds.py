@@ -138,3 +138,32 @@ def test_a_squeak_of_the_threshold_would_have_been_heard() -> None:
         bursts = heard(noise).of("tonal", "squeak", "squeal")
         found.append(any(abs(burst.frequency / pitch - 1) < 0.02 for burst in bursts))
     assert np.mean(found) >= 0.9  # 95 %, of twenty
+
+
+@pytest.mark.parametrize(("fs", "mains"), [(8000.0, 60.02), (44100.0, 50.0), (44100.0, 49.97), (48000.0, 50.03)])
+@pytest.mark.parametrize(
+    ("amplitudes", "order"), [((1.0,), 1), ((0.2, 1.0, 0.1), 2), ((0.3, 0.2, 1.0), 3)], ids=["first", "second", "third"]
+)
+def test_a_hum_of_the_mains_is_called_so_at_its_pitch(fs, mains, amplitudes, order) -> None:
+    """The bins of a window are 23 Hz wide at 48 kHz: the pitch was told 10 Hz off, by 34 to 47 Hz at 50."""
+    chance, time = np.random.default_rng(round(100 * mains)), np.arange(2 * round(fs)) / fs
+    tones = [
+        amplitude * np.sin(2 * np.pi * (number + 1) * mains * time + chance.uniform(0, 6))
+        for number, amplitude in enumerate(amplitudes)
+    ]
+    hum = 0.02 * (sum(tones) + 0.1 * chance.standard_normal(time.size))
+    squeaks = ss.find_squeaks(ss.Record.of({"sound": hum}, fs=fs, units={"sound": "Pa"}))
+    assert not squeaks.squeaking
+    loudest = squeaks.loudest
+    assert loudest.frequency == pytest.approx(order * mains, abs=0.1)
+    times = f"{order} times " if order > 1 else ""
+    assert f"{times}the {round(mains)} Hz of the mains" in loudest.evidence
+
+
+def test_a_low_tone_that_begins_and_ends_is_no_hum() -> None:
+    time = np.arange(88200) / 44100
+    tone = np.where(np.abs(time - 1) < 0.5, 0.02 * np.sin(2 * np.pi * 100 * time), 0)
+    noise = np.random.default_rng(0).normal(0, 2e-4, time.size)
+    loudest = ss.find_squeaks(ss.Record.of({"sound": tone + noise}, fs=44100.0, units={"sound": "Pa"})).loudest
+    assert loudest.frequency == pytest.approx(100, abs=0.5)
+    assert "mains" not in loudest.evidence

@@ -413,6 +413,8 @@ class _Listener:
                 f"the contact slides (faster than {1e3 * self.motion.slowest:.2g} mm/s) for {100 * sliding:.0f} % of it"
             )
             return "tonal", "no", f"{much}, less than a squeak needs" if sliding else "nothing slides meanwhile"
+        if self.motion.velocity is None and (hum := self.hearing.mains(part.line)):
+            return "tonal", "not told", f"of sound alone: {hum}"
         kind = "squeal" if duration * self.motion.frequency > THROUGH else "squeak"
         if self.motion.velocity is not None and "friction" in self.record:
             return self._swinging(part, kind)

@@ -42,6 +42,11 @@ WHOLE, COMMON = 0.03, 0.1  # how near a whole ratio is to it, and of the frames 
 DEEPER = -20.0  # dB below its line from which a deeper partial is a burst's own
 GLIDING = 32  # cycles over which a pitch is told: in fewer, noise moves it
 FLOOR = 4.0  # times the noise before it, from which on a tone is seen to grow
+COARSE = 10.0  # bins of a window, below which a line is sought in the whole stretch: they are 23 Hz wide
+NEARLY = 0.9  # of the lowest frequency heard, from which on a line may lie there
+# A hum of the mains, whose pitch wanders by 0.1 % where grids are tied together and by 0.4 % on islands:
+MAINS, HUMS, OF_MAINS = (50.0, 60.0), 8, 0.004  # Hz, orders, share of the pitch
+SHORTLY, STEADILY = 1.0, 8.0  # s in which a pitch is seen to be kept, and in which no grid's wanders
 LEAK, BETWEEN = 0.75, 1.38  # of Hann's window: sum over bins of a mean square, and what a line between two bins loses
 STILL = 0.4  # s: the window in which steady partials are told from each other
 FORCES = ("N", "N m")
@@ -158,11 +163,9 @@ class Hearing:
     def tones(self, part: Span) -> tuple[float, tuple[tuple[float, float], ...], float]:
         """Dominant frequency [Hz], the harmonics that stand out, and the share of the power in both."""
         values = self.values[part.first : part.last]
-        size = 4 * 2 ** math.ceil(math.log2(max(len(values), 16)))
-        power = np.abs(np.fft.rfft(values * np.hanning(len(values)), size)) ** 2
-        step = self.fs / size
+        power, step = _spectrum(values, self.fs)
         line = part.line if part.tonal else float(np.argmax(power)) * step
-        frequency = _centre(power, step, 0.9 * line, 1.1 * line)
+        frequency = line if line in self.hums else _centre(power, step, 0.9 * line, 1.1 * line)
         wide = max(4 * self.fs / len(values), 0.02 * frequency)
         lobe = power[_bins(step, frequency, wide, len(power))]
         strength, own, overtones, inside = lobe.max(), lobe.sum(), [], 0.0
@@ -268,9 +271,59 @@ class Hearing:
                 part = slice(first + begin, first + end)
                 sounding = tonal[part]
                 if sounding.any():
-                    middle = _fundamental(line[part][sounding], strength[part][sounding])
+                    middle = self._fine(part, _fundamental(line[part][sounding], strength[part][sounding]))
                     spans.append(self._tonal(part.start, part.stop, middle, swells=len(peaks) > 1))
         return [part for part in spans if (part.last - part.first) * part.line > SHORTEST * self.fs]
+
+    def _fine(self, frames: slice, line: float) -> float:
+        """A low line [Hz], which a window's bins tell too coarsely, by the whole stretch and the hum beside it."""
+        bin_ = float(self.frequencies[1])
+        if line < COARSE * bin_:
+            first, last = self._rows(frames.start, frames.stop)
+            power, step = _spectrum(self.values[first:last], self.fs)
+            low, high = max(line - bin_, NEARLY * self.band[0]), max(line, self.band[0]) + bin_
+            near = _bins(step, (low + high) / 2, (high - low) / 2, len(power))
+            line = float(near.start + np.argmax(power[near])) * step
+            own = max(OF_MAINS * line, self.fs / (last - first))
+            near_hums = [hum for hum in self.hums if abs(hum - line) < own]
+            line = min(near_hums, key=lambda hum: abs(hum - line), default=line)
+        return line
+
+    @cached_property
+    def hums(self) -> tuple[float, ...]:
+        """Lines [Hz] at multiples of 50 or 60 Hz that keep their pitch from end to end, as those of the mains do."""
+        from scipy.signal import stft
+
+        size = min(len(self.values), round(STEADILY * self.fs))
+        if size < SHORTLY * self.fs:
+            return ()
+        _, _, waves = stft(self.values, self.fs, nperseg=size, boundary=None, padded=False)
+        power, step, hums = np.min(np.abs(waves) ** 2, axis=1), self.fs / size, set()
+        for hum in (order * mains for mains in MAINS for order in range(1, HUMS + 1) if order * mains < 0.4 * self.fs):
+            reach = max(2 * OF_MAINS * hum, step)
+            near = _bins(step, hum, reach, len(power))
+            peak = near.start + int(np.argmax(power[near]))
+            beside = np.concatenate([power[max(0, peak - 9) : max(0, peak - 3)], power[peak + 4 : peak + 10]])
+            line = _centre(power, step, (peak - 2) * step, (peak + 2) * step)
+            alone = power[peak] > 10 ** (STANDS_OUT / 10) * beside.max(initial=0.0)
+            if alone and abs(line - hum) < reach / 2 and self._goes_on(line):
+                hums.add(line)
+        return tuple(sorted(hums))
+
+    def _goes_on(self, line: float) -> bool:
+        """Whether a line [Hz] is there from end to end, never less than half as strong as it is at most."""
+        time = np.arange(len(self.values)) / self.fs
+        parts = np.array_split(self.values * np.exp(-2j * np.pi * line * time), max(4, round(time[-1] / SHORTLY)))
+        sizes = np.array([abs(part.mean()) for part in parts])
+        return bool(sizes.min() > sizes.max() / 2)
+
+    def mains(self, line: float) -> str:
+        """Which multiple of the mains a line is that keeps its pitch from end to end, in words; empty where none."""
+        if line not in self.hums:
+            return ""
+        mains = min(MAINS, key=lambda mains: abs(line / mains - round(line / mains)) * mains)
+        times = f"{round(line / mains)} times " if round(line / mains) > 1 else ""
+        return f"it keeps {line:.1f} Hz from end to end, {times}the {mains:g} Hz of the mains, as their hum does"
 
     def _one_pitch(self, line: Array, tonal: Flags) -> list[tuple[int, int]]:
         """Runs of frames of one tone: it may glide, leap to a multiple, or be drowned for a moment."""
@@ -431,6 +484,12 @@ def _fundamental(lines: Array, levels: Array) -> float:
     base = float(np.quantile(lines, COMMON))
     orders = np.maximum(1, np.rint(lines / base))
     return _middle(lines / np.where(np.abs(lines / base / orders - 1) < JUMP, orders, 1.0), levels)
+
+
+def _spectrum(values: Array, fs: float) -> tuple[Array, float]:
+    """Power under Hann's window in fine bins, and their width [Hz]."""
+    size = 4 * 2 ** math.ceil(math.log2(max(len(values), 16)))
+    return np.abs(np.fft.rfft(values * np.hanning(len(values)), size)) ** 2, fs / size
 
 
 def _decibel(power: Array | float) -> Array:
