@@ -27,8 +27,9 @@ TOLD = ("level", "forward", "back", "load", "viscous", "inertia", "damping", "ba
 
 PLAYING = ("play", "play without gravity")
 ALONE = ("link alone", "motor alone")
+LATE = "late"  # by one of joints.LATE, and without the reference
 IDLE = "idle temperature"  # of joints whose friction does not follow it
-KINDS = ("torque", "controller", "torque alone", "warming", IDLE, *PLAYING, *ALONE)
+KINDS = ("torque", "controller", "torque alone", LATE, "warming", IDLE, *PLAYING, *ALONE)
 
 
 ALSO = {"backlash": "play", "warming": "warming", "thinning": "thinning"}
@@ -70,6 +71,8 @@ def asked(joint: joints.Joint, kind: str, seed: int) -> Found:
         del written[left_out]
         units = {name: record.channels[name].unit for name in written}
         record = ss.Record.of(written, fs=record.fs, units=units).with_details("force", gain_sd=joints.GAIN)
+    if kind == LATE:
+        record = joints.delayed(joint, float(np.random.default_rng([seed, 10]).choice(joints.LATE)))
     if kind == IDLE:
         record = record.with_channel("temperature", idle(record, seed), unit="K")
     regression = ss.cycle.regress_joint(record, **({"kp": joint.kp} if kind == "controller" else {}))

@@ -29,6 +29,9 @@ PLAY = np.radians([0.05, 1.5])  # of gears, from those of robots to those of toy
 COLD = np.zeros(1)  # a temperature that never changes
 WARMER = (3.0, 25.0)  # K, by which a joint warms up within its log
 PERIOD = 1e-3  # s, for which the controller holds its output
+LATE = (0.0, 3e-3, 8e-3, 15e-3, 30e-3)  # s, by which a torque comes late
+RISES = (0.15, 1.2)  # of the sliding friction, by which that at rest is above it
+FALLS = (0.03, 0.6)  # rad/s, within which it falls: harmonic drives' have 0.02 to 0.5
 
 
 @dataclass(frozen=True)
@@ -61,6 +64,12 @@ class Joint:
         level = (self.truth["forward"] + self.truth["back"]) / 2 + self.truth["load"] * float(load.mean())
         return level + self.truth.get("warming", 0.0) * self.warmer(time)
 
+    def static(self, time: np.ndarray) -> float:
+        """That at rest [N m], under the same load."""
+        rubs = (self.truth["forward"] + self.truth["back"]) / 2
+        falling = rubs + self.truth["of_load"] * (self.level(time) - rubs)
+        return self.level(time) + (self.truth["static"] - 1) * falling
+
     def warmer(self, time: np.ndarray) -> float:
         """By how much it was warmer at some times than in the mean of the log [K], of which the truth is told."""
         warm = self.record["temperature"] if "temperature" in self.record else np.zeros(len(self.record))
@@ -68,12 +77,14 @@ class Joint:
 
 
 @numba.njit
-def march(p, reference, slope, steps, count, control, warm=COLD, per_kelvin=(0.0, 0.0)):  # type: ignore[no-untyped-def]
+def march(p, reference, slope, steps, count, control, warm=COLD, per_kelvin=(0.0, 0.0), falls=(2.0, 1.0)):  # type: ignore[no-untyped-def]
     """Angle and motor torque at each sample of a reference that is known at `steps` instants a sample.
 
-    `warm` is a temperature at each sample, less its mean; `per_kelvin` what Coulomb and viscous friction grow by.
+    `warm` is a temperature at each sample, less its mean; `per_kelvin` what Coulomb and viscous friction grow by;
+    `falls` the exponent by which static friction falls with the speed, and what part of that of the load does.
     """
     inertia, forward, back, share, viscous, sine, cosine, kp, kd, static, excess_speed = p
+    exponent, of_load = falls
     samples = (reference.shape[0] - 1) // steps
     dt = 1.0 / (control * steps)
     angle, torque = np.zeros(samples), np.zeros(samples)
@@ -85,8 +96,9 @@ def march(p, reference, slope, steps, count, control, warm=COLD, per_kelvin=(0.0
             angle[i // steps], torque[i // steps] = q, motor
         load = sine * np.sin(q) + cosine * np.cos(q)
         hot = warm[i // steps] if len(warm) > 1 else 0.0
-        level = (forward if v > 0 or (v == 0 and motor > load) else back) + share * abs(load) + per_kelvin[0] * hot
-        level *= 1 + (static - 1) * np.exp(-((v / excess_speed) ** 2))
+        level, borne = forward if v > 0 or (v == 0 and motor > load) else back, share * abs(load)
+        excess = (static - 1) * (level + of_load * borne) * np.exp(-((abs(v) / excess_speed) ** exponent))
+        level += borne + per_kelvin[0] * hot + excess
         free = v + dt * (motor - load - (viscous + per_kelvin[1] * hot) * v) / inertia
         most = dt * level / inertia
         v = free - most if free > most else free + most if free < -most else 0.0
@@ -160,6 +172,23 @@ def _reference(kind: str, time: np.ndarray, chance: np.random.Generator) -> np.n
     return moved
 
 
+def _falling(truth: dict[str, float], chance: np.random.Generator, falls: bool) -> tuple[float, float]:
+    """Sets by how much and within which speed friction falls; its exponent, and whether that of the load does."""
+    truth["static"] = 1 + np.exp(chance.uniform(*np.log(RISES))) * falls
+    truth["fall"] = np.exp(chance.uniform(*np.log(FALLS)))
+    return float(chance.choice([1.0, 2.0])), float(chance.choice([0.0, 1.0]))
+
+
+def delayed(joint: Joint, late: float) -> ss.Record:
+    """The log of a joint whose torque comes late [s], its reference left out."""
+    time, fs = np.arange(len(joint.record)) / joint.record.fs, joint.record.fs
+    written = {
+        "theta": joint.record["theta"],
+        "force": np.interp(time - late, time, joint.record["force"]),
+    }
+    return ss.Record.of(written, fs=fs, units={"force": "N m"}).with_details("force", gain_sd=GAIN)
+
+
 def drawn(
     seed: int,
     *,
@@ -168,11 +197,14 @@ def drawn(
     loaded: bool = True,
     play: bool = False,
     warming: bool = False,
+    stribeck: bool | None = None,
 ) -> Joint:
     """A joint by chance, about one of the seven servos; with the motor's torque logged, or positions alone.
 
     With `warming` it warms up, as one does that is switched on: Coulomb friction falls by up to 1.5 % per kelvin,
     viscous friction by up to 3 %, of a third of them neither; logged in counts of 0.1 or 1 K.
+    With `stribeck` its friction falls with the speed by a part of its own, at a speed and with an exponent (1 or 2) of
+    its own, that of the load or not; without (False), it is the same at rest.
     With `play` its teeth have some (a third of them none), and both the motor and the link have an encoder.
     """
     chance = np.random.default_rng([seed, torque, loaded])
@@ -193,6 +225,7 @@ def drawn(
     fine = np.arange(int(seconds * fs) * steps + 1) / (fs * steps)
     reference = _reference(str(chance.choice(["sines", "stairs"])), fine, chance)
     count = max(1, round(fs * steps * PERIOD))
+    shape = (2.0, 1.0) if stribeck is None else _falling(truth, np.random.default_rng([seed, 8]), stribeck)
     p, way = np.array(list(truth.values())), np.gradient(reference, fine)
     written = {"reference": reference[count // 2 : -1 : steps]}
     if play:
@@ -211,7 +244,8 @@ def drawn(
         angle, motor = march(p, reference, way, steps, count, fs, hot - hot.mean(), (-falls[0], -falls[1]))
         written["temperature"] = 298.15 + np.round(hot / (step := heat.choice([0.1, 0.1, 1.0]))) * step
     else:
-        angle, motor = march(p, reference, way, steps, count, fs)
+        angle, motor = march(p, reference, way, steps, count, fs, falls=shape)
+    truth["exponent"], truth["of_load"] = shape
     size = 2 * np.pi / 2 ** int(chance.integers(8, 17))
     written["theta"] = np.round(angle / size) * size
     if torque:

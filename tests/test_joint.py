@@ -549,22 +549,11 @@ def test_the_figure_draws_either_direction_by_its_own_friction() -> None:
     assert forward.get_ydata()[0] == pytest.approx(joint.forward.value + share)
 
 
-def late_log(seed: int, late: float) -> tuple[joints.Joint, ss.Record]:
-    """A joint of the integrator of the tests, its torque logged `late` [s], its reference not."""
-    joint = joints.drawn(seed, torque=True)
-    time = np.arange(len(joint.record)) / joint.record.fs
-    written = {
-        "theta": joint.record["theta"],
-        "force": np.interp(time - late, time, joint.record["force"]),
-    }
-    record = ss.Record.of(written, fs=joint.record.fs, units={"force": "N m"})
-    return joint, record.with_details("force", gain_sd=joints.GAIN)
-
-
 @pytest.mark.parametrize("seed", [70100, 70109, 70119])
 def test_a_torque_that_comes_late_is_no_friction_of_the_load(seed: int) -> None:
     """Read as it was logged, its load part missed the truth by up to 9 deviations, and its viscous friction by 20."""
-    joint, record = late_log(seed, 0.015)
+    joint = joints.drawn(seed, torque=True)
+    record = joints.delayed(joint, 0.015)
     regression = regress_joint(record)
     assert is_late(regression.delay)
     assert regression.delay.value == pytest.approx(0.015, abs=1.5e-3)
@@ -578,7 +567,8 @@ def test_a_torque_that_comes_late_is_no_friction_of_the_load(seed: int) -> None:
 
 def test_a_torque_that_comes_in_time_is_not_told_to_be_late() -> None:
     for seed in (70100, 70109, 70119):
-        joint, record = late_log(seed, 0.0)
+        joint = joints.drawn(seed, torque=True)
+        record = joints.delayed(joint, 0.0)
         regression = regress_joint(record)
         assert not is_late(regression.delay)
         assert abs(regression.load.value - joint.truth["load"]) < 4 * regression.load.sd

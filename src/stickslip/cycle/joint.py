@@ -280,7 +280,7 @@ def _answer(
     left_out: tuple[str, ...],
 ) -> JointFriction:
     slides = data.logs[0].sliding
-    rows, window = slides.rows, slides.window
+    rows = slides.rows
     carried = _carried(data, pull)
     status = Status(*_worries(data, fit, terms, record))
     tell = Telling(data, fit, terms, turning(record), status)
@@ -293,9 +293,9 @@ def _answer(
     if "uneven" in terms:
         ways = [tell.sum({"viscous": 1, "uneven": by}, f"viscous friction {way}") for by, way in WAYS]
     inertia = replace(data.stated["inertia"], name="inertia") if "inertia" in data.stated else known["inertia"]
-    speed, acceleration = (window.apply(data.logs[0].turned, order)[rows] for order in (1, 2))
-    weight = pull[0] * window.apply(np.sin(data.logs[0].position))[rows]
-    weight += pull[1] * window.apply(np.cos(data.logs[0].position))[rows]
+    speed, acceleration = (slides.at(data.logs[0].turned, order) for order in (1, 2))
+    weight = pull[0] * slides.at(np.sin(data.logs[0].position))
+    weight += pull[1] * slides.at(np.cos(data.logs[0].position))
     damped = known["damping"].value * _error_rate(data) if "damping" in known else np.zeros(len(data.raw))
     return JointFriction(
         level=level.within(0.0),
@@ -364,9 +364,9 @@ def _worries(data: JointData, fit: LeastSquares, terms: tuple[str, ...], record:
     if fit.independent < FEW_INDEPENDENT * len(terms):
         worries.append(f"only {fit.independent:.0f} independent samples for {len(terms)} coefficients")
     if data.logs[0].reference is None and "inertia" in terms:
-        window, rows = data.logs[0].sliding.window, data.logs[0].sliding.rows
-        column = window.apply(data.logs[0].turned, 2)[rows]
-        noise = noise_level(data.logs[0].turned, record.fs) * window.noise_of_acceleration
+        slides = data.logs[0].sliding
+        column = slides.at(data.logs[0].turned, 2)
+        noise = noise_level(data.logs[0].turned, record.fs) * slides.window.noise_of_acceleration
         noisy = float(noise**2 / np.mean(column**2))
         if noisy > BIASED:
             doubt = f"noise in the acceleration lowers the inertia by about {100 * noisy:.2g} %: log the reference too"

@@ -132,6 +132,12 @@ class Sliding:
     rows: NDArray[np.intp]
     slowest: float
 
+    def at(self, values: Array, order: int = 0) -> Array:
+        """The derivative of that order at the rows, smoothed: no other row is computed."""
+        rough = five_point_difference(values, order) * self.window.fs**order
+        within = np.lib.stride_tricks.sliding_window_view(rough, 2 * self.window.half + 1)
+        return np.asarray(within[self.rows - self.window.half] @ self.window.weights)
+
 
 def sliding(position: Array, fs: float) -> Sliding:
     """When does a joint surely slide?
@@ -216,35 +222,35 @@ class Log:
         position, turned = self.position, self.turned
         if steered and self.reference is not None:
             position = turned = self.reference
-        side, window = self.sliding.side, self.sliding.window
+        side, at, fs = self.sliding.side, self.sliding.at, self.sliding.window.fs
         carried = pull[0] * np.sin(position) + pull[1] * np.cos(position)
         warmer = 0.0 if self.temperature is None else self.temperature - self.about
         stronger = 1 + load * side * np.sign(carried)
         made = {
-            "inertia": lambda: window.apply(turned, 2),
-            "viscous": lambda: window.apply(turned, 1),
-            "uneven": lambda: window.apply(side * five_point_difference(turned, 1) * window.fs),
-            "forward": lambda: window.apply(np.maximum(side, 0.0)),
-            "back": lambda: window.apply(np.minimum(side, 0.0)),
-            "coulomb": lambda: window.apply(side),
-            "sine": lambda: window.apply(np.sin(position) * stronger),
-            "cosine": lambda: window.apply(np.cos(position) * stronger),
-            "load": lambda: window.apply(side * np.abs(carried)),
+            "inertia": lambda: at(turned, 2),
+            "viscous": lambda: at(turned, 1),
+            "uneven": lambda: at(side * five_point_difference(turned, 1) * fs),
+            "forward": lambda: at(np.maximum(side, 0.0)),
+            "back": lambda: at(np.minimum(side, 0.0)),
+            "coulomb": lambda: at(side),
+            "sine": lambda: at(np.sin(position) * stronger),
+            "cosine": lambda: at(np.cos(position) * stronger),
+            "load": lambda: at(side * np.abs(carried)),
             "damping": lambda: self._error_rate(steered),
-            "warming": lambda: window.apply(side * warmer),
-            "thinning": lambda: window.apply(five_point_difference(turned, 1) * window.fs * warmer),
-            "late": lambda: -window.apply(np.zeros_like(position) if self.torque is None else self.torque, 1),
+            "warming": lambda: at(side * warmer),
+            "thinning": lambda: at(five_point_difference(turned, 1) * fs * warmer),
+            "late": lambda: -at(np.zeros_like(position) if self.torque is None else self.torque, 1),
         }
-        return np.column_stack([made[term]()[self.sliding.rows] for term in terms])
+        return np.column_stack([made[term]() for term in terms])
 
     def _error_rate(self, steered: bool) -> Array:
         """How the error of the position changes; its instrument is what inertia makes of the reference."""
-        window, fs = self.sliding.window, self.sliding.window.fs
+        slides = self.sliding
         if self.reference is None:
             raise EstimateError("no channel reference", "a controller follows one", "name the column of the reference")
         if steered:
-            return window.apply(five_point_difference(self.reference, 1) * fs, 2)
-        return window.apply(self.position - self.reference, 1)
+            return slides.at(five_point_difference(self.reference, 1) * slides.window.fs, 2)
+        return slides.at(self.position - self.reference, 1)
 
     def quiet(self) -> Log:
         """With the motion freed of its noise, beyond a stroke: that would bend a fit, but less than noise a prediction.
@@ -259,7 +265,7 @@ class Log:
     def unshared(self, inertia: float, viscous: float) -> tuple[Array, Array]:
         """Standard deviations of the torque at the rows, as nobody knows what of these is the motor's, none to all."""
         apart = self.lead / math.sqrt(12)  # of half of it, an evenly spread share leaves that
-        accelerated, moved = (self.sliding.window.apply(apart, order)[self.sliding.rows] for order in (2, 1))
+        accelerated, moved = (self.sliding.at(apart, order) for order in (2, 1))
         return inertia * accelerated, viscous * moved
 
 
@@ -311,8 +317,11 @@ class JointData:
         for log in self.logs:
             assert log.torque is not None
             rows = np.arange(len(log.torque)) + late * log.sliding.window.fs
-            logs.append(replace(log, torque=band_limited(log.torque, np.clip(rows, 0, len(rows) - 1))))
-        smoothed = [log.sliding.window.apply(np.asarray(log.torque))[log.sliding.rows] for log in logs]
+            inside = (rows >= 0) & (rows <= len(rows) - 1)
+            torque = np.where(rows < 0, log.torque[0], log.torque[-1])
+            torque[inside] = band_limited(log.torque, rows[inside])
+            logs.append(replace(log, torque=torque))
+        smoothed = [log.sliding.at(np.asarray(log.torque)) for log in logs]
         raw = np.concatenate([np.asarray(log.torque) for log in logs])
         return replace(self, logs=tuple(logs), torque=np.concatenate(smoothed), raw=raw)
 
@@ -420,20 +429,19 @@ def _data_of(record: Record, constants: dict[str, Estimate], gravity: bool) -> J
     slides = sliding(position, record.fs)
     _refuse_still(slides, record)
     lead = motor_lead(position, record["motor"]) if "motor" in record else None
-    window, rows = slides.window, slides.rows
     logged = "temperature" in record and bool(np.all(np.isfinite(record["temperature"])))
     warm = record["temperature"] if logged else None
     log = Log(position, reference, slides, np.zeros(len(position)) if lead is None else lead, warm)
     terms = ["viscous", "forward", "back", *(("sine", "cosine", "load") if gravity else ())]
-    known, unsure = np.zeros(len(rows)), []
+    known, unsure = np.zeros(len(slides.rows)), []
     if "inertia" in constants:
-        column = window.apply(log.turned, 2)[rows]
+        column = slides.at(log.turned, 2)
         known, unsure = known + constants["inertia"].value * column, [constants["inertia"].sd * column]
     else:
         terms.insert(0, "inertia")
     if "force" in record:
         raw = record["force"]
-        torque = window.apply(raw)[rows]
+        torque = slides.at(raw)
         log = replace(log, torque=raw)
         scale = constants.get("torque_constant") if record.channels["force"].source == "current" else None
         source = "current" if scale else "force"
@@ -441,10 +449,10 @@ def _data_of(record: Record, constants: dict[str, Estimate], gravity: bool) -> J
         assert reference is not None
         scale, source = constants["kp"], "reference"
         raw = scale.value * (reference - position)
-        torque = window.apply(raw)[rows]
+        torque = slides.at(raw)
         if "kd" in constants:
-            rate = window.apply(reference - position, 1)[rows]
-            raw = raw + constants["kd"].value * window.apply(reference - position, 1)
+            rate = slides.at(reference - position, 1)
+            raw = raw + constants["kd"].value * slides.window.apply(reference - position, 1)
             torque, unsure = torque + constants["kd"].value * rate, [*unsure, constants["kd"].sd * rate]
         else:
             terms.append("damping")
