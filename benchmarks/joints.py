@@ -2,7 +2,8 @@
 
 Seven servos' published parameters as centres, encoders of 8 to 16 bit, 50 Hz to 1 kHz, gravity, currents with noise;
 with the torque measured to 1 %, or by the controller's kp alone, known to 1 %, its kd unknown; with play between motor
-and link, which both have an encoder, or ("link alone", "motor alone": of joints that have play) one of them. Counted
+and link, which both have an encoder, or ("link alone", "motor alone": of joints that have play) one of them; with a
+torque that comes late; with friction that falls with the speed ("stribeck": counted where a fall is told). Counted
 are the numbers that stand without a grave doubt.
 
     python benchmarks/joints.py --draws 100 --first 1000
@@ -23,13 +24,17 @@ import joints
 import stickslip as ss
 from stickslip.cycle.joint_fit import SURELY
 
-TOLD = ("level", "forward", "back", "load", "viscous", "inertia", "damping", "backlash", "warming", "thinning")
+TOLD = (
+    "level", "static", "stribeck_speed", "forward", "back", "load", "viscous", "inertia", "damping", "backlash",
+    "warming", "thinning",
+)  # fmt: skip
 
 PLAYING = ("play", "play without gravity")
 ALONE = ("link alone", "motor alone")
 LATE = "late"  # by one of joints.LATE, and without the reference
+FALLS = {"stribeck": True, "stribeck without": False}  # friction that falls with the speed, or none that does
 IDLE = "idle temperature"  # of joints whose friction does not follow it
-KINDS = ("torque", "controller", "torque alone", LATE, "warming", IDLE, *PLAYING, *ALONE)
+KINDS = ("torque", "controller", "torque alone", LATE, *FALLS, "warming", IDLE, *PLAYING, *ALONE)
 
 
 ALSO = {"backlash": "play", "warming": "warming", "thinning": "thinning"}
@@ -54,6 +59,8 @@ def truths(joint: joints.Joint, time: np.ndarray) -> dict[str, float]:
         **{name: true[name] for name in ("forward", "back", "load", "viscous", "inertia")},
         "damping": true["kd"] - true["kp"] * joints.PERIOD / 2,
         "level": joint.level(time),
+        "static": joint.static(time),
+        "stribeck_speed": true["fall"],
         **{name: true.get(of, 0.0) for name, of in ALSO.items()},
     }  # fmt: skip
 
@@ -93,7 +100,7 @@ def main() -> None:
         held: dict[str, list[float]] = {name: [] for name in TOLD}
         wide: dict[str, list[float]] = {name: [] for name in TOLD}
         changes: dict[str, list[tuple[bool, bool]]] = {"warming": [], "thinning": []}
-        refused, spent, claims = 0, list[float](), list[tuple[bool, bool]]()
+        refused, spent, claims, lines = 0, list[float](), list[tuple[bool, bool]](), list[bool]()
         for seed in range(options.first, options.first + options.draws):
             joint = joints.drawn(
                 seed,
@@ -101,6 +108,7 @@ def main() -> None:
                 play=kind in PLAYING + ALONE,
                 loaded=kind != "play without gravity",
                 warming=kind == "warming",
+                stribeck=FALLS.get(kind),
             )
             if kind in ALONE and not joint.truth["play"]:
                 continue
@@ -116,6 +124,9 @@ def main() -> None:
             true = truths(joint, found.time)
             if teeth is not None:
                 claims.append((true["backlash"] > 0, teeth.claimed))
+            if kind in FALLS and found.static is None:
+                lines.append(found.level.includes(true["level"]))
+                continue
             for name in TOLD:
                 estimate = getattr(teeth if name == "backlash" else found, name, None)
                 if estimate is None or not estimate.known or not ss.estimate.stands(estimate.status):
@@ -132,6 +143,11 @@ def main() -> None:
             if held[name]:
                 half = f", half width {np.median(wide[name]):.1%}" if wide[name] else ""
                 print(f"  {name:9} held {np.mean(held[name]):6.1%} of {len(held[name])}{half}")
+        if kind in FALLS:
+            print(
+                f"  a fall is told of {len(spent) - len(lines)} of {len(spent)}; "
+                f"of the others the level held {np.mean(lines):.1%}"
+            )
         for name in ("warming", "thinning"):
             if changes[name]:
                 claimed = (

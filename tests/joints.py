@@ -77,14 +77,15 @@ class Joint:
 
 
 @numba.njit
-def march(p, reference, slope, steps, count, control, warm=COLD, per_kelvin=(0.0, 0.0), falls=(2.0, 1.0)):  # type: ignore[no-untyped-def]
+def march(p, reference, slope, steps, count, control, heat=(COLD, 0.0, 0.0), falls=(2.0, 1.0)):  # type: ignore[no-untyped-def]
     """Angle and motor torque at each sample of a reference that is known at `steps` instants a sample.
 
-    `warm` is a temperature at each sample, less its mean; `per_kelvin` what Coulomb and viscous friction grow by;
+    `heat` is a temperature at each sample, less its mean, and what Coulomb and viscous friction grow by per kelvin;
     `falls` the exponent by which static friction falls with the speed, and what part of that of the load does.
     """
     inertia, forward, back, share, viscous, sine, cosine, kp, kd, static, excess_speed = p
     exponent, of_load = falls
+    warm, stronger, thicker = heat
     samples = (reference.shape[0] - 1) // steps
     dt = 1.0 / (control * steps)
     angle, torque = np.zeros(samples), np.zeros(samples)
@@ -98,8 +99,8 @@ def march(p, reference, slope, steps, count, control, warm=COLD, per_kelvin=(0.0
         hot = warm[i // steps] if len(warm) > 1 else 0.0
         level, borne = forward if v > 0 or (v == 0 and motor > load) else back, share * abs(load)
         excess = (static - 1) * (level + of_load * borne) * np.exp(-((abs(v) / excess_speed) ** exponent))
-        level += borne + per_kelvin[0] * hot + excess
-        free = v + dt * (motor - load - (viscous + per_kelvin[1] * hot) * v) / inertia
+        level += borne + stronger * hot + excess
+        free = v + dt * (motor - load - (viscous + thicker * hot) * v) / inertia
         most = dt * level / inertia
         v = free - most if free > most else free + most if free < -most else 0.0
         q += dt * v
@@ -241,7 +242,7 @@ def drawn(
         hot = heat.uniform(*WARMER) * -np.expm1(-at / (seconds * heat.uniform(0.2, 2.0)))
         falls = heat.uniform(0, 1, 2) * (0.015 * coulomb, 0.03 * viscous) * heat.choice([0.0, 1.0, 1.0])
         truth["warming"], truth["thinning"] = -falls
-        angle, motor = march(p, reference, way, steps, count, fs, hot - hot.mean(), (-falls[0], -falls[1]))
+        angle, motor = march(p, reference, way, steps, count, fs, (hot - hot.mean(), -falls[0], -falls[1]))
         written["temperature"] = 298.15 + np.round(hot / (step := heat.choice([0.1, 0.1, 1.0]))) * step
     else:
         angle, motor = march(p, reference, way, steps, count, fs, falls=shape)

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -32,10 +33,8 @@ class LeastSquares:
 
     Attributes
     ----------
-    coefficients, sd : ndarray, shape (p,)
-        Estimates and their standard deviations.
-    freedom : ndarray, shape (p,)
-        Degrees of freedom of each standard deviation, for Student's quantile.
+    coefficients : ndarray, shape (p,)
+        Estimates.
     residual : ndarray, shape (n,)
         Data minus model.
     condition : float
@@ -49,13 +48,27 @@ class LeastSquares:
     """
 
     coefficients: Array
-    sd: Array
-    freedom: Array
     residual: Array
     condition: float
     independent: float
     projection: Array
     leverage: Array
+
+    @cached_property
+    def _sure(self) -> tuple[Array, Array]:
+        terms = len(self.coefficients)
+        pairs = [_influenced(form, self.residual, self.independent, terms) for form in self.projection]
+        return np.array([sd for sd, _ in pairs]), np.array([freedom for _, freedom in pairs])
+
+    @property
+    def sd(self) -> Array:
+        """Standard deviations of the coefficients, shape (p,)."""
+        return self._sure[0]
+
+    @property
+    def freedom(self) -> Array:
+        """Degrees of freedom of each standard deviation, for Student's quantile."""
+        return self._sure[1]
 
     def estimate(self, index: int, name: str, unit: str, method: str, **more: Any) -> Estimate:
         """Coefficient number `index` as an Estimate."""
@@ -273,6 +286,29 @@ def weighted_mean(estimates: Sequence[Estimate], *, of: str, status: str = "ok")
     )
 
 
+def mixture(estimates: Sequence[Estimate], weights: Array) -> Estimate:
+    """One answer of several that exclude each other, each as likely as its weight: the interval is that of them all.
+
+    Examples
+    --------
+    >>> two = [Estimate.normal("friction", value, sd=0.01, unit="N", method="") for value in (1.0, 2.0)]
+    >>> print(mixture(two, np.array([0.5, 0.5])))
+    friction 1.5 N (95 %: 1.0 to 2.0)
+    """
+    from scipy.special import ndtr
+
+    centres, sds = _values(estimates)
+    value = float(weights @ centres)
+    sd = math.sqrt(float(weights @ (sds**2 + (centres - value) ** 2)))
+    spreads = np.array([(one.interval[1] - one.interval[0]) / (2 * NORMAL_95) for one in estimates])  # by Student's t
+    spreads = np.maximum(spreads, sds)
+    reach = np.linspace(min(centres - 5 * spreads), max(centres + 5 * spreads), 2000)
+    low, high = np.interp((0.025, 0.975), ndtr((reach[:, None] - centres) / spreads) @ weights, reach)
+    ends = (min(float(low), value), max(float(high), value))
+    first = estimates[int(np.argmax(weights))]
+    return replace(first, value=value, interval=ends, sd=sd)
+
+
 def _values(estimates: Sequence[Estimate]) -> tuple[Array, Array]:
     values, sds = (np.array([getattr(estimate, key) for estimate in estimates]) for key in ("value", "sd"))
     return values, np.maximum(sds, 1e-12 * max(1e-300, float(np.abs(values).max())))
@@ -339,12 +375,9 @@ def least_squares(design: ArrayLike, data: ArrayLike, *, instruments: ArrayLike 
     residual = values - unit @ scaled
     independent = count / correlation_time(residual)
     leverage = np.einsum("ij,ji->i", unit, projection)
-    sure = [_influenced(form, residual, independent, terms) for form in projection]
-    sd = np.array([value for value, _ in sure]) / lengths
-    freedoms = np.array([freedom for _, freedom in sure])
     leverage = np.clip(leverage * count / independent, 0.0, MOST_LEVERAGE)
     influence = projection / lengths[:, None]
-    return LeastSquares(scaled / lengths, sd, freedoms, residual, condition, independent, influence, leverage)
+    return LeastSquares(scaled / lengths, residual, condition, independent, influence, leverage)
 
 
 def follows(measured: Array, model: Array) -> float:

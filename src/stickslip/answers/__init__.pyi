@@ -17,6 +17,7 @@ from stickslip.answers.machines import axis_record as axis_record
 from stickslip.answers.machines import compare_joints as compare_joints
 from stickslip.answers.machines import compare_tribometers as compare_tribometers
 from stickslip.answers.machines import episodes as episodes
+from stickslip.answers.machines import joint_law as joint_law
 from stickslip.answers.many import Batch as Batch
 from stickslip.answers.many import Kept as Kept
 from stickslip.answers.many import Row as Row

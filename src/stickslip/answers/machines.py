@@ -13,13 +13,16 @@ import numpy as np
 
 from stickslip.answers.findings import Comparison, Findings, Inquiry, flagged, record_name, require_several, with_doubt
 from stickslip.answers.mistakes import called, require_angle
-from stickslip.cycle.joint import JointFriction, regress_joint, regress_joint_logs
+from stickslip.cycle.joint import JointFriction, regress_joint
+from stickslip.cycle.joint_logs import regress_joint_logs
 from stickslip.cycle.joint_onset import joint_backlash, joint_breakaway
 from stickslip.cycle.sticks import find_sticks
 from stickslip.cycle.tribometer import DEFINITIONS, friction_coefficients
 from stickslip.cycle.tribometer_static import static_coefficient
 from stickslip.errors import RecordError
 from stickslip.estimate import UNTRIED, Constant, Doubt, Estimate
+from stickslip.laws.coulomb import LinearSlope
+from stickslip.laws.stribeck import Stribeck
 from stickslip.record.channels import VOCABULARY
 from stickslip.record.clock import fit_clock
 from stickslip.record.record import Record, Step, require_record
@@ -136,6 +139,38 @@ def analyze_joint(
         doubt = f"nobody stated a unit: {' and '.join(unstated)}"
         results = {key: flagged(result, doubt) for key, result in results.items()}
     return Findings(name, whole, faults, notes=tuple(inquiry.notes), settings=_settings(joint, given), results=results)
+
+
+def joint_law(joint: JointFriction) -> LinearSlope | Stribeck:
+    """The law of a joint under the mean load of its log, alike both ways: what simulators take.
+
+    Parameters
+    ----------
+    joint : JointFriction
+        Of :func:`~stickslip.cycle.regress_joint`.
+
+    Returns
+    -------
+    LinearSlope or Stribeck
+        Stribeck's curve where friction falls with the speed; numbers in N m and rad/s of a joint that turns.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> t = np.arange(6000) / 200
+    >>> q = 1.2 * np.sin(2 * np.pi * 0.2 * t) + 0.4 * np.sin(2 * np.pi * 0.7 * t)
+    >>> v, a = np.gradient(q, 1 / 200), np.gradient(np.gradient(q, 1 / 200), 1 / 200)
+    >>> friction = (0.06 + 0.04 * np.exp(-((v / 0.5) ** 2))) * np.sign(v) + 0.03 * v
+    >>> torque = 0.02 * a + friction + np.random.default_rng(0).normal(0, 0.01, t.size)
+    >>> log = Record.of({"theta": q, "force": torque}, fs=200, units={"force": "N m"})
+    >>> joint_law(regress_joint(log, gravity=False)).exponent
+    2.0
+    """
+    slope = max(joint.viscous.value, 0.0)
+    if joint.static is None or joint.stribeck_speed is None or joint.exponent is None:
+        return LinearSlope(joint.level.value, slope=slope)
+    static, speed = max(joint.static.value, joint.level.value), joint.stribeck_speed.value
+    return Stribeck(joint.level.value, static, speed=speed, exponent=joint.exponent, viscous=slope)
 
 
 def compare_joints(

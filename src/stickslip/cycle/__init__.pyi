@@ -1,8 +1,8 @@
 from stickslip.cycle.joint import JointFriction as JointFriction
-from stickslip.cycle.joint import JointLogs as JointLogs
-from stickslip.cycle.joint import JointPrediction as JointPrediction
 from stickslip.cycle.joint import regress_joint as regress_joint
-from stickslip.cycle.joint import regress_joint_logs as regress_joint_logs
+from stickslip.cycle.joint_logs import JointLogs as JointLogs
+from stickslip.cycle.joint_logs import JointPrediction as JointPrediction
+from stickslip.cycle.joint_logs import regress_joint_logs as regress_joint_logs
 from stickslip.cycle.joint_onset import JointBacklash as JointBacklash
 from stickslip.cycle.joint_onset import JointBreakaway as JointBreakaway
 from stickslip.cycle.joint_onset import joint_backlash as joint_backlash

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from stickslip.cycle.joint_fall import FALL, Fall, falling
 from stickslip.cycle.joint_fit import (
     ADVICE,
     SURELY,
@@ -20,16 +21,15 @@ from stickslip.cycle.joint_fit import (
     coefficient,
     fitted,
     joint_data,
-    pooled,
     turning,
     warmed,
 )
 from stickslip.cycle.regression import TURNING, UNITS
-from stickslip.errors import EstimateError, RecordError
+from stickslip.errors import EstimateError
 from stickslip.estimate import NORMAL_95, Constant, Doubt, Estimate, Result, Status
 from stickslip.record.record import Record
 from stickslip.signals.noise import noise_level
-from stickslip.statistics import FEW_INDEPENDENT, LeastSquares
+from stickslip.statistics import FEW_INDEPENDENT, LeastSquares, mixture
 
 Array = NDArray[np.float64]
 
@@ -51,7 +51,8 @@ class JointFriction(Result):
     Attributes
     ----------
     level : Estimate
-        Sliding friction [N m] at vanishing speed under the mean load of the log, the mean of both directions.
+        Sliding friction [N m] at vanishing speed under the mean load of the log, the mean of both directions; of
+        friction that falls with the speed the kinetic part of it.
     forward, back : Estimate
         Coulomb friction either way [N m], without load.
     viscous : Estimate
@@ -93,6 +94,11 @@ class JointFriction(Result):
         "force", "current", or "reference" where the torque is that of the stated controller.
     status : str
         "ok", or in words what to beware of.
+    static, stribeck_speed : Estimate or None
+        Of friction that falls with the speed: the mean of both directions at rest under the mean load [N m], and the
+        speed within which it falls to `level` [rad/s]; None where no fall is surely there.
+    exponent : float or None
+        Of that Stribeck curve, the likeliest; the intervals count 1, 1.5 and 2.
     delay : Estimate or None
         By how much the measured torque comes later [s] than the position; taken out where it is surely there. None of
         a controller's torque, and where the motion does not tell it.
@@ -125,6 +131,9 @@ class JointFriction(Result):
     left_out: tuple[str, ...]
     source: str
     status: str
+    static: Estimate | None = None
+    stribeck_speed: Estimate | None = None
+    exponent: float | None = None
     delay: Estimate | None = None
 
     def weight(self, position: Array) -> Array:
@@ -168,6 +177,10 @@ def regress_joint(
     temperature T of the joint was logged, Coulomb and viscous friction are straight lines over it,
     :math:`F_c + b (T - \bar T)` and :math:`F_v + b_v (T - \bar T)`.
 
+    Where friction surely falls with the speed, :math:`(F_s - F_c)\,e^{-(|\dot q|/v_s)^\delta}\,\mathrm{sgn}\,\dot q`
+    stands beside (Stribeck's curve; Armstrong-Helouvry, Dupont and Canudas de Wit 1994), and every number is the mean
+    over all curves that the log allows, each by its likelihood.
+
     Parameters
     ----------
     record : Record
@@ -207,17 +220,22 @@ def regress_joint(
     >>> regression.forward.includes(0.06), regression.load.includes(0.1), round(regression.inertia.value, 3)
     (True, True, 0.02)
     """
-    record, data = joint_data(record, gravity, inertia=inertia, kp=kp, kd=kd, torque_constant=torque_constant)
+    given = {"inertia": inertia, "kp": kp, "kd": kd, "torque_constant": torque_constant}
+    record, data = joint_data(record, gravity, **given)
     (data,) = warmed([data])
-    delay = _delay_of(data)
-    data = _punctual(data, delay)
+    delay = delay_of(data)
+    data = punctual(data, delay)
     fit, terms, pull, left_out = fitted(data)
+    (slow,) = warmed([joint_data(record, gravity, True, **given)[1]])
+    slow = punctual(slow, delay)
+    fall = falling(slow, fit, terms, pull)
+    data = slow if fall else data
     if delay is None and data.source != "reference":
         left_out = (*left_out, f"{WORDS['late']}: {ADVICE['late']}")
-    return replace(_answer(record, data, fit, terms, pull, left_out), delay=delay)
+    return replace(_answer(record, data, fit, terms, pull, left_out, fall), delay=delay)
 
 
-def _delay_of(data: JointData) -> Estimate | None:
+def delay_of(data: JointData) -> Estimate | None:
     """By how much a measured torque comes late; None of a controller's, and where the motion can not tell.
 
     A torque that was filtered, or logged after the position, passes for friction that grows with the load. Its delay is
@@ -248,7 +266,7 @@ def _delay_of(data: JointData) -> Estimate | None:
     return Estimate.normal(WORDS["late"], late, sd=sd, unit="s", method="the balance of torque, read later")
 
 
-def _punctual(data: JointData, delay: Estimate | None) -> JointData:
+def punctual(data: JointData, delay: Estimate | None) -> JointData:
     """The data with a torque read as much later as it surely is late, and unsure by how unsure that is."""
     if delay is None:
         return data
@@ -266,6 +284,11 @@ def _unseen(delay: Estimate) -> float:
     return math.sqrt(odds / (1 + odds)) * size
 
 
+def is_wide(estimate: Estimate) -> bool:
+    """Whether its interval hardly tells it."""
+    return NORMAL_95 * estimate.sd > BARELY * abs(estimate.value)
+
+
 def is_late(delay: Estimate) -> bool:
     """Whether a delay is surely there."""
     return abs(delay.value) > SURELY * delay.sd
@@ -278,13 +301,18 @@ def _answer(
     terms: tuple[str, ...],
     pull: tuple[float, float],
     left_out: tuple[str, ...],
+    fall: Fall | None,
 ) -> JointFriction:
+    if fall is not None:
+        fit, terms, pull = fall.fits[fall.best], fall.terms, fall.pull
     slides = data.logs[0].sliding
     rows = slides.rows
     carried = _carried(data, pull)
     status = Status(*_worries(data, fit, terms, record))
     tell = Telling(data, fit, terms, turning(record), status)
-    known = {term: tell.one(term) for term in terms if term != "uneven"}
+    if fall is not None:
+        tell = Averaged(data, fit, terms, turning(record), status, fall)
+    known = {term: tell.one(term) for term in terms if term not in ("uneven", *FALL)}
     if "load" in known:
         known["load"] = known["load"].within(0.0)
     forward, back = known["forward"].within(0.0), known["back"].within(0.0)
@@ -318,14 +346,28 @@ def _answer(
         residual=float(np.linalg.norm(fit.residual) / np.linalg.norm(data.torque)),
         condition=fit.condition,
         time=record.start + rows / record.fs,
-        speed=speed,
-        measured=data.torque,
-        explained=data.torque - fit.residual,
-        friction=data.torque + damped[rows] - inertia.value * acceleration - weight,
+        speed=speed / slides.weights,
+        measured=data.torque / slides.weights,
+        explained=(data.torque - fit.residual) / slides.weights,
+        friction=(data.torque - inertia.value * acceleration - weight) / slides.weights + damped[rows],
         left_out=left_out,
         source=data.source,
         status=status,
+        **_stribeck(tell, fall, pull, known.get("load")),
     )
+
+
+def _stribeck(tell: Telling, fall: Fall | None, pull: tuple[float, float], load: Estimate | None) -> dict[str, Any]:
+    """What is told of friction that falls: at rest, and within which speed."""
+    if fall is None:
+        return {}
+    unit = "rad/s" if tell.turning else "m/s"
+    speed = fall.speed("Stribeck speed", unit)
+    static = _level(tell, pull, load, rest=True).within(0.0)
+    if is_wide(static):
+        unseen = Doubt(f"the log slides too fast to tell it: {ADVICE[FALL[0]]}", CONFOUNDED, lesser=True)
+        static = replace(static, status=Status(static.status, unseen))
+    return {"static": static, "stribeck_speed": speed, "exponent": fall.exponent}
 
 
 def _carried(data: JointData, pull: tuple[float, float]) -> float:
@@ -334,16 +376,18 @@ def _carried(data: JointData, pull: tuple[float, float]) -> float:
     return float(np.mean(np.abs(pull[0] * np.sin(place) + pull[1] * np.cos(place))))
 
 
-def _level(tell: Telling, pull: tuple[float, float], load: Estimate | None) -> Estimate:
+def _level(tell: Telling, pull: tuple[float, float], load: Estimate | None, *, rest: bool = False) -> Estimate:
     """Sliding friction under the mean load, which gravity's torque is part of, so that it is as unsure as that too."""
-    weights = {"forward": 0.5, "back": 0.5}
+    name, weights = "friction at rest" if rest else "sliding friction", {"forward": 0.5, "back": 0.5}
+    if rest:
+        weights[FALL[0]] = 1.0
     if load is None or not load.known:
-        return tell.sum(weights, "sliding friction")
+        return tell.sum(weights, name)
     place = tell.data.logs[0].position[tell.data.logs[0].sliding.rows]
     side = np.sign(pull[0] * np.sin(place) + pull[1] * np.cos(place))
     carried, share = _carried(tell.data, pull), load.value
     weights |= {"load": carried, "sine": share * float(np.mean(side * np.sin(place)))}
-    level = tell.sum(weights | {"cosine": share * float(np.mean(side * np.cos(place)))}, "sliding friction")
+    level = tell.sum(weights | {"cosine": share * float(np.mean(side * np.cos(place)))}, name)
     more = share * carried  # its product counts twice in a sum of both factors
     low, high = level.interval
     return replace(level, value=level.value - more, interval=(low - more, high - more))
@@ -394,8 +438,7 @@ class Telling:
     def one(self, term: str) -> Estimate:
         """A coefficient, with a doubt where its interval hardly tells it."""
         estimate = self.sum({term: 1.0}, WORDS[term])
-        wide = NORMAL_95 * estimate.sd > BARELY * abs(estimate.value)
-        if not wide:
+        if not is_wide(estimate):
             return estimate
         partner = self._partner(self.terms.index(term))
         doubt = Doubt(f"hardly told from the {WORDS[partner]}: {ADVICE[term]}", CONFOUNDED, lesser=True)
@@ -430,160 +473,17 @@ class Telling:
         return self.terms[int(np.argmax(alike))]
 
 
-# ---- several logs of one joint
+@dataclass(frozen=True)
+class Averaged(Telling):
+    """The same over all Stribeck curves that a log allows."""
 
+    fall: Fall
 
-@dataclass(frozen=True, eq=False)
-class JointPrediction:
-    """How far the torque of a log is predicted by what the other logs tell.
+    @cached_property
+    def parts(self) -> list[Telling]:
+        """What each of them tells."""
+        return [Telling(self.data, fit, self.terms, self.turning, self.status) for fit in self.fall.fits]
 
-    Attributes
-    ----------
-    error, plain : float
-        Norm of what the prediction misses over that of the torque about its mean, by all that the other logs tell; and
-        by Coulomb and viscous friction alone, fitted to the same logs with inertia and gravity.
-    time : ndarray, shape (m,)
-        Times [s] at which the joint slides.
-    measured, predicted : ndarray, shape (m,)
-        As it was, smoothed by windows within strokes, and as it is predicted [N m].
-    """
-
-    error: float
-    plain: float
-    time: Array
-    measured: Array
-    predicted: Array
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class JointLogs(Result):
-    """What several logs of one joint tell together.
-
-    Attributes
-    ----------
-    forward, back, viscous, load, inertia, sine, cosine, damping, warming, thinning : Estimate or None
-        As of :class:`JointFriction`, of all logs at once; None where they do not tell it, or where it was stated.
-    predictions : tuple of JointPrediction
-        Of each log by the others.
-    left_out : tuple of str
-        What all logs together can not tell, and which motion would.
-    status : str
-        "ok", or in words what to beware of.
-    delay : Estimate or None
-        As of :class:`JointFriction`, of all logs at once.
-    """
-
-    forward: Estimate
-    back: Estimate
-    viscous: Estimate
-    load: Estimate | None
-    inertia: Estimate | None
-    sine: Estimate | None
-    cosine: Estimate | None
-    damping: Estimate | None
-    warming: Estimate | None
-    thinning: Estimate | None
-    predictions: tuple[JointPrediction, ...]
-    left_out: tuple[str, ...]
-    status: str = "ok"
-    delay: Estimate | None = None
-
-
-def regress_joint_logs(
-    records: Sequence[Record], *, gravity: bool | None = None, **constants: Constant | None
-) -> JointLogs:
-    r"""What do several logs of one joint tell together, and does what some tell hold in the others?
-
-    The balance of :func:`regress_joint` is solved for all logs at once, so that one may tell gravity and another
-    viscous friction. Each log is then left out in turn: the others' solution predicts its torque :math:`\tau` from its
-    motion, and told is
-
-    .. math:: \frac{|\tau - \hat\tau|}{|\tau - \bar\tau|},
-
-    the normalised root of the mean square (Ljung, System Identification, 1999, section 16.4), while the joint slides;
-    beside it stands that of Coulomb and viscous friction, fitted to the same logs.
-
-    Parameters
-    ----------
-    records : sequence of Record
-        Two or more, each as :func:`regress_joint` takes it, all with a torque of the same source.
-    gravity : bool, optional
-        As of :func:`regress_joint`.
-    **constants : float, str, tuple or Estimate
-        `inertia`, `kp`, `kd` and `torque_constant`, as of :func:`regress_joint`.
-
-    Returns
-    -------
-    JointLogs
-
-    Raises
-    ------
-    RecordError
-        Fewer than two logs, or logs whose torques have different sources.
-    ModelError
-        A constant without meaning.
-    EstimateError
-        What a log, or all but one, can not tell: the sentence says which motion would.
-
-    Examples
-    --------
-    >>> def moved(seed, speed):
-    ...     t = np.arange(4000) / 200
-    ...     q = np.sin(2 * np.pi * speed * t) + 0.4 * np.sin(2 * np.pi * 3.1 * speed * t)
-    ...     v, a = np.gradient(q, 1 / 200), np.gradient(np.gradient(q, 1 / 200), 1 / 200)
-    ...     torque = 0.02 * a + 0.03 * v + (0.06 + 0.1 * abs(0.5 * np.sin(q))) * np.sign(v) + 0.5 * np.sin(q)
-    ...     torque += np.random.default_rng(seed).normal(0, 0.01, t.size)
-    ...     return Record.of({"theta": q, "force": torque}, fs=200, units={"force": "N m"})
-    >>> together = regress_joint_logs([moved(0, 0.2), moved(1, 0.3), moved(2, 0.5)])
-    >>> together.load.includes(0.1)
-    True
-    >>> [bool(one.error < one.plain) for one in together.predictions]
-    [True, True, True]
-    """
-    data = warmed([joint_data(record, gravity, **constants)[1] for record in records])
-    if len(data) < 2 or len({(one.source, one.terms) for one in data}) > 1:
-        raise RecordError(
-            f"{len(data)} log{'s' * (len(data) != 1)}, with torque by {', '.join(one.source for one in data)}",
-            "several logs are told together by torques of one source",
-            "give two logs or more, of one robot and one kind",
-        )
-    delay = _delay_of(pooled(data))
-    data = [_punctual(one, delay) for one in data]
-    fit, terms, _, left_out = fitted(pooled(data))
-    tell = Telling(pooled(data), fit, terms, turning(records[0]), "ok")
-    known = {term: tell.one(term) for term in terms if term != "uneven"}
-    predictions = [
-        _predicted(log, pooled(data[:place] + data[place + 1 :]), record)
-        for place, (log, record) in enumerate(zip(data, records, strict=True))
-    ]
-    return JointLogs(
-        known["forward"].within(0.0),
-        known["back"].within(0.0),
-        known["viscous"],
-        load=known.get("load"),
-        inertia=known.get("inertia"),
-        sine=known.get("sine"),
-        cosine=known.get("cosine"),
-        damping=known.get("damping"),
-        warming=known.get("warming"),
-        thinning=known.get("thinning"),
-        predictions=tuple(predictions),
-        left_out=left_out,
-        delay=delay,
-    )
-
-
-def _predicted(log: JointData, others: JointData, record: Record) -> JointPrediction:
-    """A log's torque by the regression of the others, and by a plain one."""
-    fit, terms, pull, _ = fitted(others)
-    predicted = log.model(fit, terms, pull)
-    plain = tuple("coulomb" if term == "forward" else term for term in terms if term not in {*RICHER, "back"})
-    fit, pull = about_load(replace(others, terms=plain), plain)
-    spread = float(np.linalg.norm(log.torque - log.torque.mean()))
-    if spread == 0:
-        raise EstimateError("the torque of a log never changes", "a prediction is of a torque", "check its column")
-    error, simple = (
-        float(np.linalg.norm(log.torque - torque)) / spread for torque in (predicted, log.model(fit, plain, pull))
-    )
-    time = record.start + log.logs[0].sliding.rows / record.fs
-    return JointPrediction(error, simple, time, log.torque, predicted)
+    def sum(self, weights: dict[str, float], name: str) -> Estimate:
+        """A sum of coefficients: that of every curve by its weight."""
+        return mixture([part.sum(weights, name) for part in self.parts], self.fall.weights)

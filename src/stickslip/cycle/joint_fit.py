@@ -7,29 +7,22 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from stickslip.balance.motion import away_from, require_fit, stretches
+from stickslip.balance.motion import require_fit
+from stickslip.cycle.joint_slides import Sliding, sliding
 from stickslip.errors import EstimateError, ModelError, RecordError
 from stickslip.estimate import Constant, Estimate
 from stickslip.record.record import Record, Step, require_record
-from stickslip.signals.derivatives import differentiate, five_point_difference, smooth
+from stickslip.signals.derivatives import five_point_difference, smooth
 from stickslip.signals.interpolate import band_limited, without_delays
-from stickslip.signals.noise import noise_level, quantisation_step
+from stickslip.signals.noise import noise_level
 from stickslip.statistics import LeastSquares, least_squares
 
 Array = NDArray[np.float64]
 
-# of a stroke's length, that the window has on either side: with 0.15 the accelerations of an axis fall out
-SHARE = 0.08
-SHORTEST = 4  # samples of the window on either side
-REACH = 2  # samples that a difference adds to it
-NOISY = 4.0  # deviations of the velocity's noise, below which it may be at rest
-SLOW = 0.05  # of its fast speed (90 %): slower, static friction that falls with the speed would be taken for Coulomb's
-APART = 4  # rows in the window's half: nearer ones tell the same
 QUESTION = "the friction of a joint"
 LEAST = 200  # samples
 ROWS = 20  # instants at which it slides
@@ -44,7 +37,7 @@ WORDS = {
     "coulomb": "Coulomb friction", "load": "friction per load",
     "warming": "friction per kelvin", "thinning": "viscous friction per kelvin",
     "sine": "gravity, sine part", "cosine": "gravity, cosine part", "damping": "damping of the control loop",
-    "late": "delay of the torque",
+    "late": "delay of the torque", "fall": "friction that falls with the speed", "fall of load": "its part of the load",
 }  # fmt: skip
 ADVICE = {
     "inertia": "accelerate harder, by steps or faster swings",
@@ -59,6 +52,8 @@ ADVICE = {
     "cosine": "turn farther, a quarter turn at least",
     "damping": "log the torque or the motor's current, or state kd",
     "late": "swing at several frequencies, or state it",
+    "fall": "slide slower too",
+    "fall of load": "slide slowly under several loads",
 }
 WARM = ("warming", "thinning")
 # Of the variance of a temperature, its counts' and its noise's: a regression on it is low by as much.
@@ -71,96 +66,6 @@ OPTIONAL: tuple[tuple[str, ...], ...] = (
 
 
 Fitted = tuple[LeastSquares, tuple[str, ...], tuple[float, float]]  # with its terms and gravity's sine and cosine part
-
-
-@dataclass(frozen=True)
-class Window:
-    """A smoothing window of compact support, so that nothing beyond a stroke enters what is told within it.
-
-    The kernel is ``(1 - (t/T)^2)^4``: the balance is weighed by functions that vanish with three derivatives at their
-    ends (the modulating functions of Shinbrot, 1957), so that derivatives fall on the window and not on the noise.
-
-    Attributes
-    ----------
-    half : int
-        Samples on either side.
-    fs : float
-        Sampling rate [Hz].
-    """
-
-    half: int
-    fs: float
-
-    @cached_property
-    def weights(self) -> Array:
-        """The kernel, of sum one."""
-        shape = (1 - (np.arange(-self.half, self.half + 1) / (self.half + 1)) ** 2) ** 4
-        return np.asarray(shape / shape.sum())
-
-    def apply(self, values: Array, order: int = 0) -> Array:
-        """The derivative of that order, smoothed."""
-        from scipy.signal import fftconvolve
-
-        return np.asarray(fftconvolve(five_point_difference(values, order) * self.fs**order, self.weights, mode="same"))
-
-    @cached_property
-    def noise_of_acceleration(self) -> float:
-        """Standard deviation of a second derivative for white noise of unit standard deviation."""
-        impulse = np.zeros(len(self.weights) + 8)
-        impulse[len(impulse) // 2] = 1.0
-        return float(np.linalg.norm(self.apply(impulse, 2)))
-
-
-@dataclass(frozen=True)
-class Sliding:
-    """When a joint slides, and which way.
-
-    Attributes
-    ----------
-    side : ndarray, shape (n,)
-        1 forward, -1 back, 0 at rest or too slow to be told from it.
-    window : Window
-        As wide as its strokes allow.
-    rows : ndarray of int
-        Instants whose window lies within one stroke.
-    slowest : float
-        Speed below which it may be at rest.
-    """
-
-    side: Array
-    window: Window
-    rows: NDArray[np.intp]
-    slowest: float
-
-    def at(self, values: Array, order: int = 0) -> Array:
-        """The derivative of that order at the rows, smoothed: no other row is computed."""
-        rough = five_point_difference(values, order) * self.window.fs**order
-        within = np.lib.stride_tricks.sliding_window_view(rough, 2 * self.window.half + 1)
-        return np.asarray(within[self.rows - self.window.half] @ self.window.weights)
-
-
-def sliding(position: Array, fs: float) -> Sliding:
-    """When does a joint surely slide?
-
-    Where its speed is above four deviations of its noise, a twentieth of its fast speed, and one encoder count in half
-    a window: slower, the error of the counts is a slope and no noise.
-    """
-    velocity = differentiate(position, fs)
-    speed = np.abs(velocity.values)
-    slowest = max(NOISY * float(np.median(velocity.sd)), SLOW * float(np.quantile(speed, 0.9)))
-    begins, ends = stretches(speed > slowest)
-    lengths = ends - begins
-    if not len(lengths):
-        raise EstimateError(
-            "the joint never moves faster than its encoder's noise", "friction is told from sliding", "move it farther"
-        )
-    half = max(SHORTEST, int(SHARE * float(lengths @ lengths) / float(lengths.sum())))
-    slowest = max(slowest, quantisation_step(position) * fs / half)
-    side = np.where(speed > slowest, np.sign(velocity.values), 0.0)
-    broken = (side == 0) | np.append(False, np.diff(side) != 0)
-    within = away_from(broken, half + REACH)
-    within[: half + REACH] = within[len(side) - half - REACH :] = False
-    return Sliding(side, Window(half, fs), np.flatnonzero(within)[:: max(1, half // APART)], slowest)
 
 
 @dataclass(frozen=True)
@@ -316,9 +221,10 @@ class JointData:
         logs = []
         for log in self.logs:
             assert log.torque is not None
-            rows = np.arange(len(log.torque)) + late * log.sliding.window.fs
+            rows = np.arange(len(log.torque), dtype=float) + late * log.sliding.window.fs
             inside = (rows >= 0) & (rows <= len(rows) - 1)
-            torque = np.where(rows < 0, log.torque[0], log.torque[-1])
+            torque = np.full(len(rows), log.torque[-1])
+            torque[rows < 0] = log.torque[0]
             torque[inside] = band_limited(log.torque, rows[inside])
             logs.append(replace(log, torque=torque))
         smoothed = [log.sliding.at(np.asarray(log.torque)) for log in logs]
@@ -368,12 +274,14 @@ def pooled(data: Sequence[JointData]) -> JointData:
     return JointData(logs, terms=first.terms, source=first.source, unsure=unsure, stated=first.stated, **joined)
 
 
-def joint_data(record: Record, gravity: bool | None, **given: Constant | None) -> tuple[Record, JointData]:
-    """The record with its torque, and what is asked of it under what is stated."""
+def joint_data(
+    record: Record, gravity: bool | None, slowly: bool = False, /, **given: Constant | None
+) -> tuple[Record, JointData]:
+    """The record with its torque, and what is asked of it under what is stated; of slow sliding too, where asked."""
     require_record(record)
     constants = _constants(record, **given)
     record = _torqued(record, constants)
-    return record, _data_of(record, constants, turning(record) if gravity is None else gravity)
+    return record, _data_of(record, constants, turning(record) if gravity is None else gravity, slowly)
 
 
 def turning(record: Record) -> bool:
@@ -420,13 +328,13 @@ def _torqued(record: Record, constants: dict[str, Estimate]) -> Record:
     return record
 
 
-def _data_of(record: Record, constants: dict[str, Estimate], gravity: bool) -> JointData:
+def _data_of(record: Record, constants: dict[str, Estimate], gravity: bool, slowly: bool) -> JointData:
     position = record["theta" if turning(record) else "x"]
     followed = "reference" in record
     reference = record["reference"] if followed else None
     if np.ptp(position) == 0:
         raise EstimateError("the position never changes", f"{QUESTION} needs motion", "check the column")
-    slides = sliding(position, record.fs)
+    slides = sliding(position, record.fs, slowly=slowly)
     _refuse_still(slides, record)
     lead = motor_lead(position, record["motor"]) if "motor" in record else None
     logged = "temperature" in record and bool(np.all(np.isfinite(record["temperature"])))

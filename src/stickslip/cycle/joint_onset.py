@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 
 from stickslip.balance.motion import away_from, stretches
 from stickslip.cycle.joint import JointFriction
-from stickslip.cycle.joint_fit import motor_lead, sliding, turning
+from stickslip.cycle.joint_fit import motor_lead, turning
+from stickslip.cycle.joint_slides import sliding
 from stickslip.errors import EstimateError
 from stickslip.estimate import NORMAL_95, Estimate, Result
 from stickslip.parameters import finite

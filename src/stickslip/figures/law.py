@@ -37,7 +37,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from stickslip.answers.findings import Findings
-    from stickslip.cycle.joint import JointFriction, JointPrediction
+    from stickslip.cycle.joint import JointFriction
+    from stickslip.cycle.joint_logs import JointPrediction
 
 Array = NDArray[np.float64]
 WORDS = {
@@ -46,6 +47,7 @@ WORDS = {
 }  # fmt: skip
 ALONG = {"v": ("velocity", "m/s"), "x": ("displacement", "m"), "t": ("time", "s")}
 COLOURS = (BLUE, GREEN, PURPLE, SKY, ORANGE)
+CURVE = 200  # points of a line over the speed
 SHOWN = 0.4  # s of a record that are drawn: more can not be told apart on a page
 
 
@@ -77,8 +79,11 @@ def plot_joint(joint: JointFriction, *, ax: Axes | None = None) -> Axes:
     under_load = joint.load.value * joint.carried if joint.load is not None and joint.load.known else 0.0
     ways = ((-1, joint.back, joint.viscous_back), (1, joint.forward, joint.viscous_forward))
     for side, coulomb, viscous in ways:
-        speed = np.linspace(0, side * np.abs(joint.speed).max(), 50)
+        speed = np.linspace(0, side * np.abs(joint.speed).max(), CURVE)
         friction = side * (coulomb.value + under_load) + (viscous or joint.viscous).value * speed
+        if joint.static is not None and joint.stribeck_speed is not None and joint.exponent is not None:
+            near = np.exp(-((np.abs(speed) / joint.stribeck_speed.value) ** joint.exponent))
+            friction = friction + side * (joint.static.value - joint.level.value) * near
         ax.plot(speed, friction, color=ORANGE, linewidth=1.6, label="under the mean load" if side > 0 else None)
     ax.axhline(0.0, color=INK, linewidth=0.6)
     ax.set(xlabel=f"speed [{'rad/s' if unit == 'N m' else 'm/s'}]", ylabel=f"friction [{unit}]")

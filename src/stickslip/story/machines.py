@@ -10,8 +10,10 @@ from typing import Any
 import numpy as np
 
 from stickslip.answers.findings import Comparison, Findings
-from stickslip.cycle.joint import JointFriction, JointLogs, is_late
+from stickslip.answers.machines import joint_law
+from stickslip.cycle.joint import JointFriction, is_late
 from stickslip.cycle.joint_fit import SURELY
+from stickslip.cycle.joint_logs import JointLogs
 from stickslip.cycle.tribometer import DEFINITIONS
 from stickslip.errors import ModelError
 from stickslip.estimate import Estimate, stands
@@ -163,6 +165,7 @@ def _of_one_joint(findings: Findings) -> Iterator[str]:
     if level.interval[0] > 0:
         yield f"The joint slides against {value_of(level)} of friction{under} (95 %: {interval_of(level)}){doubt}."
         yield from _directions(joint)
+        yield from _fall(joint)
     else:
         yield f"No dry friction{under} is felt{doubt}; more than {value_of(level, level.interval[1])} would be (95 %)."
     parts = [f"{value_of(joint.viscous)} of viscous friction"]
@@ -227,6 +230,20 @@ def _directions(joint: JointFriction) -> Iterator[str]:
         )
 
 
+def _fall(joint: JointFriction) -> Iterator[str]:
+    """How its friction falls with the speed, or from which speed on none does."""
+    if joint.static is not None and joint.stribeck_speed is not None:
+        static, speed = joint.static, joint.stribeck_speed
+        yield (
+            f"Its friction falls with the speed: at rest it is {value_of(static)} (95 %: {interval_of(static)}), and "
+            f"falls within {value_of(speed)} (95 %: {interval_of(speed)}), the Stribeck speed."
+        )
+        return
+    slowest = float(np.abs(joint.speed).min())
+    unit = "rad/s" if joint.level.unit == "N m" else "m/s"
+    yield f"No fall of it with the speed is felt from {number(slowest, slowest / 10, unit)} on, where the log slides."
+
+
 def _untold(joint: JointFriction | JointLogs, who: str = "This log does") -> Iterator[str]:
     for words in joint.left_out:
         yield f"{who} not tell {words}."
@@ -248,11 +265,19 @@ def write_joint(folder: Path, *, joint: JointFriction) -> None:
         return
     (folder / "joint").mkdir()
     turning = joint.level.unit == "N m"
-    law = LinearSlope(joint.level.value, slope=max(joint.viscous.value, 0.0))
-    (folder / "joint" / "dynamics.urdf").write_text(urdf_dynamics(law) + "\n", encoding="utf-8")
+    law, line = joint_law(joint), LinearSlope(joint.level.value, slope=max(joint.viscous.value, 0.0))
+    lost = (
+        ""
+        if law == line
+        else f"<!-- its friction rises to {law.breakaway:.4g} {joint.level.unit} at rest, not here -->\n"
+    )
+    (folder / "joint" / "dynamics.urdf").write_text(f"{lost}{urdf_dynamics(line)}\n", encoding="utf-8")
     for form, file in FILES.items():
         try:
-            text = export_law(law, format=form, turning=turning)
+            if form == "mujoco":  # whose joints take a line alone, as URDF's
+                text = lost + export_law(line, format=form, turning=turning)
+            else:
+                text = export_law(law, format=form, turning=turning)
         except ModelError:  # it has no such form
             continue
         text = f"{ALONE}\n{text}" if form == "toml" else text

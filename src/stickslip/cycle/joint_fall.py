@@ -1,0 +1,276 @@
+"""Friction of a joint that falls with the speed: which Stribeck curves its log allows, and whether it surely does."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stickslip.cycle.joint_fit import JointData, Log, coefficient
+from stickslip.cycle.joint_slides import Sliding
+from stickslip.errors import EstimateError
+from stickslip.estimate import Estimate
+from stickslip.signals.derivatives import differentiate
+from stickslip.statistics import LeastSquares, correlation_time, least_squares
+
+Array = NDArray[np.float64]
+
+EXPONENTS = (1.0, 1.5, 2.0)  # Tustin's, Gauss's and one between: a log hardly tells them apart, so all are counted
+SPEEDS = 12  # of each exponent
+BENT = 0.5  # of the fastest sliding: a likeliest curve that falls slower is a bend of the line, as rising friction has
+LEAST = 2.0  # deviations of the speed's noise
+ROUNDS = 2  # about the load part and gravity's torque that the likeliest curve leaves
+LIKELY = 8.0  # halves of chi squared above the least, within which curves are told apart finer
+NEGLIGIBLE = 1e-3  # of the likeliest curve's weight
+SAME = 1e-3  # of the largest: a singular value below it is one instrument counted twice
+SURELY = 3.5  # deviations of the excess at rest: of 95 joints without one, seeds 6000 to 8042, none came to 3
+METHOD = "likelihood over Stribeck curves"
+FINER = 3  # rounds of likely curves closer together: three make 12 speeds of one step of the first
+FALL = ("fall", "fall of load")  # the excess at rest under the mean load, and what each N m of load adds to it
+
+
+@dataclass(frozen=True)
+class Fall:
+    """The Stribeck curves that a log allows.
+
+    Attributes
+    ----------
+    terms : tuple of str
+        Of the regressions, of `FALL` last.
+    fits : tuple of LeastSquares
+        One for each curve that is likely enough.
+    curves : ndarray, shape (m, 2)
+        Stribeck speed and exponent of each.
+    weights : ndarray, shape (m,)
+        How likely each is, of sum one.
+    spans : ndarray, shape (m,)
+        Of the logarithm of the speed, what each stands for.
+    pull : (float, float)
+        Gravity's sine and cosine part.
+    """
+
+    terms: tuple[str, ...]
+    fits: tuple[LeastSquares, ...]
+    curves: Array
+    weights: Array
+    spans: Array
+    pull: tuple[float, float]
+
+    @property
+    def best(self) -> int:
+        """The likeliest curve."""
+        return int(np.argmax(self.weights))
+
+    @property
+    def exponent(self) -> float:
+        """The likeliest exponent."""
+        exponents = self.curves[:, 1]
+        return float(max(EXPONENTS, key=lambda one: float(self.weights[exponents == one].sum())))
+
+    def speed(self, name: str, unit: str) -> Estimate:
+        """The Stribeck speed: the quantiles of what all curves make likely, each evenly over its span."""
+        logs = np.log(self.curves[:, 0])
+        reach = np.linspace(np.min(logs - self.spans), np.max(logs + self.spans), 2000)
+        below = np.clip((reach[:, None] - logs) / self.spans + 0.5, 0.0, 1.0) @ self.weights
+        low, middle, high = np.exp(np.interp((0.025, 0.5, 0.975), below, reach))
+        spread = (logs - self.weights @ logs) ** 2 + self.spans**2 / 12
+        sd = float(middle) * math.sqrt(float(self.weights @ spread))
+        return Estimate(name, float(middle), (float(low), float(high)), sd, unit, METHOD)
+
+
+@dataclass(frozen=True)
+class _Balance:
+    """The balance about a load part and gravity's torque, to be solved with any curve beside its terms.
+
+    Its instruments are those of all curves that may be seen: of a few alike they would tell nothing apart.
+    """
+
+    data: JointData
+    terms: tuple[str, ...]
+    share: float
+    pull: tuple[float, float]
+    speeds: tuple[tuple[Array, Array], ...]
+    seen: Array
+
+    def about(self, solution: Array) -> _Balance:
+        """The same about what was found."""
+        share, *pull = (
+            float(solution[self.terms.index(term)]) if term in self.terms else 0.0
+            for term in ("load", "sine", "cosine")
+        )
+        return replace(self, share=share, pull=(pull[0], pull[1]))
+
+    @property
+    def richer(self) -> tuple[str, ...]:
+        return (*self.terms, *FALL[: 1 + ("load" in self.terms)])
+
+    def columns(self, curves: Array, *, steered: bool = False) -> tuple[Array, list[Array]]:
+        """Those of the terms, and those of each curve."""
+        steered = steered and self.data.followed
+        base = self.data.columns(self.terms, self.share, self.pull, steered=steered)
+        speeds = (pair[steered] for pair in self.speeds)
+        parts = [self._falls(*log, curves, steered) for log in zip(self.data.logs, speeds, strict=True)]
+        return base, list(np.concatenate(parts, axis=1))
+
+    def _falls(self, log: Log, speed: Array, curves: Array, steered: bool) -> Array:
+        """Columns of a log for each curve: of the excess, and of what of it goes with the load."""
+        slides = log.sliding
+        place = log.reference if steered and log.reference is not None else log.position
+        carried = np.abs(self.pull[0] * np.sin(place) + self.pull[1] * np.cos(place))
+        excess = [slides.side * np.exp(-((speed / fall) ** exponent)) for fall, exponent in curves]
+        columns = [[slides.at(one)] for one in excess]
+        if "load" in self.terms:
+            carried = carried - carried[slides.rows].mean()
+            columns = [[column, slides.at(one * carried)] for one, (column,) in zip(excess, columns, strict=True)]
+        return np.stack([np.column_stack(pair) for pair in columns])
+
+    def solved(self, curves: Array) -> _Solved:
+        """The balance solved with each curve, and without any."""
+        base, falls = self.columns(curves)
+        torque = self.data.torque - self.data.known
+        if "load" in self.terms:  # linear about `share`: its column stands in gravity's already
+            torque = torque + self.share * base[:, self.terms.index("load")]
+        known, shapes = self.columns(self.seen, steered=True) if self.data.followed else (base, falls)
+        basis = _basis(known, np.hstack(shapes), SAME if self.data.followed else 0.0)
+        return _Solved([np.column_stack([base, one]) for one in falls], torque, basis)
+
+
+@dataclass(frozen=True)
+class _Solved:
+    """Designs, the torque that they explain, and an orthonormal basis of all that the instruments tell."""
+
+    designs: list[Array]
+    torque: Array
+    basis: Array
+
+    def left(self, design: Array) -> tuple[Array, float]:
+        """The coefficients, and the square of what they leave of that of the torque which the instruments tell."""
+        sizes = np.linalg.norm(design, axis=0)
+        told = self.basis.T @ self.torque
+        columns = self.basis.T @ (design / sizes)
+        solution, *_ = np.linalg.lstsq(columns, told, rcond=None)
+        return solution / sizes, float(np.sum((told - columns @ solution) ** 2))
+
+    def likeliest(self, terms: tuple[str, ...]) -> tuple[int, Array]:
+        """The one that leaves least, and what all leave: infinitely much where it does not fall, or to below none."""
+        solutions, left = zip(*(self.left(design) for design in self.designs), strict=True)
+        rubs = [terms.index("forward"), terms.index("back")]
+        falls = [one[len(terms)] > 0 and one[rubs].sum() > 0 for one in solutions]
+        if not any(falls):
+            raise EstimateError("no curve falls", "friction falls with the speed, to a positive level", "slide slower")
+        squares = np.where(falls, left, np.inf)
+        return int(np.argmin(squares)), squares
+
+    def fit(self, number: int) -> LeastSquares:
+        """One of them, with all that makes its intervals (two-stage least squares)."""
+        design = self.designs[number]
+        return least_squares(design, self.torque, instruments=self.basis @ (self.basis.T @ design))
+
+
+def speed_of(log: Log, *, steered: bool = False) -> tuple[Array, float]:
+    """Speed of a log, or of its reference, and the deviation of its noise."""
+    position = log.reference if steered and log.reference is not None else log.turned
+    velocity = differentiate(position, log.sliding.window.fs)
+    return np.abs(velocity.values), float(np.median(velocity.sd))
+
+
+def _basis(base: Array, shapes: Array, same: float) -> Array:
+    """An orthonormal basis of columns, and of what others have beside them."""
+    first, _ = np.linalg.qr(base / np.linalg.norm(base, axis=0))
+    others = shapes / np.maximum(np.linalg.norm(shapes, axis=0), 1e-300)
+    beside, sizes, _ = np.linalg.svd(others - first @ (first.T @ others), full_matrices=False)
+    return np.column_stack([first, beside[:, sizes > same * sizes[0]]])
+
+
+def falling(data: JointData, fit: LeastSquares, terms: tuple[str, ...], pull: tuple[float, float]) -> Fall | None:
+    r"""Whether the friction falls with the speed, surely, and along which curves it may.
+
+    Beside the terms of the regression stands the excess of Stribeck's curve,
+    :math:`e\,\mathrm{sgn}(\dot q)\,\exp(-(|\dot q|/v_s)^\delta)`, linear for a given speed and exponent (the variable
+    projection of Golub and Pereyra 1973, over a grid); where friction grows with the load the excess may too. What a
+    curve leaves of the torque, as far as the instruments tell it, makes its weight: a log that hardly tells speed and
+    exponent is answered by all curves that it allows.
+    """
+    moved = [speed_of(log) for log in data.logs]
+    steered = [
+        speed_of(log, steered=True)[0] if data.followed else speed
+        for log, (speed, _) in zip(data.logs, moved, strict=True)
+    ]
+    speeds = tuple((speed, along) for (speed, _), along in zip(moved, steered, strict=True))
+    curves = _visible([(*one, log.sliding) for one, log in zip(moved, data.logs, strict=True)])
+    try:
+        return _allowed(_Balance(data, terms, coefficient(fit, terms, "load"), pull, speeds, curves), curves)
+    except EstimateError:  # the motion tells no curve from the other terms
+        return None
+
+
+def _allowed(balance: _Balance, curves: Array) -> Fall | None:
+    """The curves that the log allows, where one surely falls and is no bend."""
+    place, fastest = len(balance.terms), curves.max(axis=0)[0]
+    for finer in (False,) * ROUNDS + (True,) * FINER:
+        solved = balance.solved(curves)
+        best, left = solved.likeliest(balance.terms)
+        sure, variance = _sureness(solved.fit(best), place)
+        if sure < SURELY or curves[best, 0] > BENT * fastest:
+            return None
+        balance = balance.about(solved.left(solved.designs[best])[0])
+        curves = _finer(curves, left / variance) if finer else curves
+    solved = balance.solved(curves)
+    _, left = solved.likeliest(balance.terms)
+    return _weighed(balance, solved, curves, left / variance)
+
+
+def _visible(moved: list[tuple[Array, float, Sliding]]) -> Array:
+    """Curves that fall within the speeds at which it slides, evenly in their logarithms."""
+    slowest = min(max(slides.slowest / 2, LEAST * noise) for _, noise, slides in moved)
+    fastest = max(float(speed[slides.rows].max()) for speed, _, slides in moved)
+    speeds = np.geomspace(min(slowest, fastest / 2), fastest, SPEEDS)
+    return np.array([(speed, exponent) for exponent in EXPONENTS for speed in speeds])
+
+
+def _sureness(fit: LeastSquares, place: int) -> tuple[float, float]:
+    """By how many deviations the excess is above none, and the variance that a residual counts for.
+
+    Few cosines may give too small a variance by chance; it is at least that of residuals that are correlated as these.
+    """
+    excess, form = fit.coefficients[place], float(np.linalg.norm(fit.projection[place]))
+    sd = fit.combined(np.eye(len(fit.coefficients))[place], "", "", "").sd
+    noise = float(fit.residual @ fit.residual) / (len(fit.residual) - len(fit.coefficients))
+    variance = max((sd / form) ** 2, noise * correlation_time(fit.residual))
+    return float(excess) / (form * math.sqrt(variance)), variance
+
+
+def _finer(curves: Array, halves: Array) -> Array:
+    """Of each exponent those speeds that are likely, closer together."""
+    finer = []
+    for exponent in EXPONENTS:
+        speeds, left = curves[curves[:, 1] == exponent, 0], halves[curves[:, 1] == exponent]
+        if np.isfinite(left.min()):  # its own least: that of a coarse grid may seem unlikely beside another exponent's
+            likely = np.flatnonzero(left < left.min() + 2 * LIKELY)
+            low, high = speeds[max(likely[0] - 1, 0)], speeds[min(likely[-1] + 1, len(speeds) - 1)]
+            finer += [(speed, exponent) for speed in np.geomspace(low, high, SPEEDS)]
+    return np.array(finer)
+
+
+def _weighed(balance: _Balance, solved: _Solved, curves: Array, halves: Array) -> Fall:
+    """The likely curves, each by its weight: how well it explains the torque, times how much of the range it is."""
+    spans = _spans(curves)
+    weights = np.exp((halves.min() - halves) / 2) * spans
+    fits = {}
+    for number in np.flatnonzero(weights > NEGLIGIBLE * weights.max()):
+        try:
+            fits[int(number)] = solved.fit(int(number))
+        except EstimateError:  # a curve that the motion does not tell from the other terms is none that it tells
+            continue
+    rows = list(fits)
+    shares = weights[rows] / weights[rows].sum()
+    return Fall(balance.richer, tuple(fits.values()), curves[rows], shares, spans[rows], balance.pull)
+
+
+def _spans(curves: Array) -> Array:
+    """How much of the logarithm of the speed each curve stands for."""
+    return np.concatenate(
+        [np.gradient(np.log(curves[curves[:, 1] == exponent, 0])) for exponent in dict.fromkeys(curves[:, 1])]
+    )

@@ -1,0 +1,157 @@
+"""When a joint surely slides, and the windows within its strokes by which its torque is weighed."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stickslip.balance.motion import away_from, stretches
+from stickslip.errors import EstimateError
+from stickslip.signals.derivatives import differentiate, five_point_difference
+from stickslip.signals.noise import quantisation_step
+
+Array = NDArray[np.float64]
+
+# of a stroke's length, that the window has on either side: with 0.15 the accelerations of an axis fall out
+SHARE = 0.08
+SHORTEST = 4  # samples of the window on either side
+REACH = 2  # samples that a difference adds to it
+NOISY = 4.0  # deviations of the velocity's noise, below which it may be at rest
+SLOW = 0.05  # of its fast speed (90 %): slower, static friction that falls with the speed would be taken for Coulomb's
+SLOWER = 0.02  # where that fall is asked for
+NARROW = 0.3  # of the window, near the ends of strokes
+APART = 4  # rows in the window's half: nearer ones tell the same
+
+
+@dataclass(frozen=True)
+class Window:
+    """A smoothing window of compact support, so that nothing beyond a stroke enters what is told within it.
+
+    The kernel is ``(1 - (t/T)^2)^4``: the balance is weighed by functions that vanish with three derivatives at their
+    ends (the modulating functions of Shinbrot, 1957), so that derivatives fall on the window and not on the noise.
+
+    Attributes
+    ----------
+    half : int
+        Samples on either side.
+    fs : float
+        Sampling rate [Hz].
+    """
+
+    half: int
+    fs: float
+
+    @cached_property
+    def weights(self) -> Array:
+        """The kernel, of sum one."""
+        shape = (1 - (np.arange(-self.half, self.half + 1) / (self.half + 1)) ** 2) ** 4
+        return np.asarray(shape / shape.sum())
+
+    def apply(self, values: Array, order: int = 0) -> Array:
+        """The derivative of that order, smoothed."""
+        from scipy.signal import fftconvolve
+
+        return np.asarray(fftconvolve(five_point_difference(values, order) * self.fs**order, self.weights, mode="same"))
+
+    def at(self, values: Array, rows: NDArray[np.intp], order: int = 0) -> Array:
+        """The same at some rows: no other is computed."""
+        rough = five_point_difference(values, order) * self.fs**order
+        return np.asarray(
+            np.lib.stride_tricks.sliding_window_view(rough, 2 * self.half + 1)[rows - self.half] @ self.weights
+        )
+
+    def within(self, side: Array) -> NDArray[np.bool_]:
+        """Where it lies within one stroke."""
+        broken = (side == 0) | np.append(False, np.diff(side) != 0)
+        within = away_from(broken, self.half + REACH)
+        within[: self.half + REACH] = within[len(side) - self.half - REACH :] = False
+        return within
+
+    @cached_property
+    def noise_of_acceleration(self) -> float:
+        """Standard deviation of a second derivative for white noise of unit standard deviation."""
+        impulse = np.zeros(len(self.weights) + 8)
+        impulse[len(impulse) // 2] = 1.0
+        return float(np.linalg.norm(self.apply(impulse, 2)))
+
+
+@dataclass(frozen=True)
+class Sliding:
+    """When a joint slides, and which way.
+
+    Attributes
+    ----------
+    side : ndarray, shape (n,)
+        1 forward, -1 back, 0 at rest or too slow to be told from it.
+    window : Window
+        As wide as its strokes allow.
+    rows : ndarray of int
+        Instants whose window lies within one stroke.
+    slowest : float
+        Speed below which it may be at rest.
+    near : ndarray of bool or None
+        Rows near the ends of strokes, of a narrower window: there it slides slowly.
+    narrow : Window or None
+        Theirs.
+    """
+
+    side: Array
+    window: Window
+    rows: NDArray[np.intp]
+    slowest: float
+    near: NDArray[np.bool_] | None = None
+    narrow: Window | None = None
+
+    @cached_property
+    def weights(self) -> Array:
+        """By which each row counts: a narrower window leaves more of the noise."""
+        if self.near is None or self.narrow is None:
+            return np.ones(len(self.rows))
+        return np.where(self.near, math.sqrt(self.narrow.half / self.window.half), 1.0)
+
+    def at(self, values: Array, order: int = 0) -> Array:
+        """The derivative of that order at the rows, smoothed and weighed: no other row is computed."""
+        if self.near is None or self.narrow is None:
+            return self.window.at(values, self.rows, order)
+        smoothed = np.empty(len(self.rows))
+        smoothed[~self.near] = self.window.at(values, self.rows[~self.near], order)
+        smoothed[self.near] = self.narrow.at(values, self.rows[self.near], order)
+        return smoothed * self.weights
+
+
+def sliding(position: Array, fs: float, *, slowly: bool = False) -> Sliding:
+    """When does a joint surely slide?
+
+    Where its speed is above four deviations of its noise, a twentieth of its fast speed, and one encoder count in half
+    a window: slower, the error of the counts is a slope and no noise. With `slowly` the ends of strokes are seen too,
+    by narrower windows.
+    """
+    velocity = differentiate(position, fs)
+    speed, fast = np.abs(velocity.values), SLOWER if slowly else SLOW
+    slowest = max(NOISY * float(np.median(velocity.sd)), fast * float(np.quantile(speed, 0.9)))
+    begins, ends = stretches(speed > slowest)
+    lengths = ends - begins
+    if not len(lengths):
+        raise EstimateError(
+            "the joint never moves faster than its encoder's noise", "friction is told from sliding", "move it farther"
+        )
+    window = Window(max(SHORTEST, int(SHARE * float(lengths @ lengths) / float(lengths.sum()))), fs)
+    count = quantisation_step(position) * fs
+    side = np.where(speed > max(slowest, count / window.half), np.sign(velocity.values), 0.0)
+    slides = Sliding(side, window, _apart(window.within(side), window), max(slowest, count / window.half))
+    if not slowly:
+        return slides
+    narrow = Window(max(SHORTEST, round(NARROW * window.half)), fs)
+    slow = narrow.within(np.where(speed > max(slowest, count / narrow.half), side, 0.0)) & ~window.within(side)
+    rows = np.concatenate([slides.rows, _apart(slow, narrow)])
+    order, near = np.argsort(rows, kind="stable"), np.arange(len(rows)) >= len(slides.rows)
+    return replace(slides, rows=rows[order], near=near[order], narrow=narrow)
+
+
+def _apart(within: NDArray[np.bool_], window: Window) -> NDArray[np.intp]:
+    """Rows that tell something of their own."""
+    return np.flatnonzero(within)[:: max(1, window.half // APART)]

@@ -1,0 +1,139 @@
+"""Friction of a joint that falls with the speed: told where the log shows it, by all curves that it allows."""
+
+import json
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+import joints
+import stickslip as ss
+from stickslip.answers import analyze_joint, joint_law
+from stickslip.cli.program import main
+from stickslip.cycle import regress_joint
+from stickslip.errors import EstimateError
+from stickslip.estimate import stands
+from stickslip.figures.law import plot_joint
+from stickslip.laws import LinearSlope, Stribeck
+from stickslip.statistics import mixture
+
+
+def log(
+    static: float = 0.12, exponent: float = 2.0, speed: float = 0.4, seed: int = 0, noise: float = 0.01
+) -> ss.Record:
+    """A joint that slides against 0.06 N m when fast and `static` when slow, under a load that rubs too."""
+    t = np.arange(6000) / 200
+    q = 0.3 + 1.2 * np.sin(2 * np.pi * 0.2 * t) + 0.4 * np.sin(2 * np.pi * 0.7 * t)
+    v, a = np.gradient(q, t), np.gradient(np.gradient(q, t), t)
+    weight = 0.5 * np.sin(q) - 0.2 * np.cos(q)
+    level = 0.06 + (static - 0.06) * np.exp(-((abs(v) / speed) ** exponent)) + 0.1 * abs(weight)
+    torque = 0.02 * a + 0.03 * v + weight + np.sign(v) * level
+    torque += noise * np.random.default_rng(seed).standard_normal(t.size)
+    return ss.Record.of({"theta": q, "force": torque}, fs=200, units={"force": "N m"})
+
+
+@pytest.mark.parametrize(("exponent", "speed"), [(2.0, 0.4), (1.0, 0.4), (2.0, 0.2)])
+def test_a_fall_is_told_with_its_level_at_rest_and_its_speed(exponent: float, speed: float) -> None:
+    """By a straight line it was 0.08 N m at vanishing speed, of 0.12 that there are."""
+    joint = regress_joint(log(exponent=exponent, speed=speed))
+    assert joint.static is not None
+    assert joint.stribeck_speed is not None
+    load = 0.1 * joint.carried
+    truth = {"static": 0.12 + load, "level": 0.06 + load, "stribeck_speed": speed, "viscous": 0.03, "load": 0.1}
+    for name, value in (truth | {"inertia": 0.02, "forward": 0.06, "back": 0.06}).items():
+        told = getattr(joint, name)
+        assert abs(told.value - value) < 3 * told.sd, name  # of 24 numbers one is beyond two deviations
+    assert joint.static.value - joint.level.value > 4 * joint.static.sd or speed < 0.4
+    assert (joint.static.unit, joint.stribeck_speed.unit) == ("N m", "rad/s")
+
+
+def test_without_noise_the_curve_is_found() -> None:
+    joint = regress_joint(log(noise=0.0))
+    assert joint.static.value == pytest.approx(0.12 + 0.1 * joint.carried, rel=0.01)
+    assert joint.stribeck_speed.value == pytest.approx(0.4, rel=0.02)
+    assert joint.exponent == 2.0
+
+
+def test_friction_that_rises_or_stays_falls_nowhere() -> None:
+    for static in (0.03, 0.06):
+        for seed in range(4):
+            joint = regress_joint(log(static=static, seed=seed))
+            assert joint.static is None
+            assert isinstance(joint_law(joint), LinearSlope)
+
+
+@pytest.mark.parametrize(
+    ("draws", "most"), [(8, 0), pytest.param(200, 2, marks=pytest.mark.soak)], ids=["short", "long"]
+)
+def test_no_fall_is_claimed_of_joints_without(draws: int, most: int) -> None:
+    claimed = 0
+    for seed in range(draws):
+        try:
+            claimed += regress_joint(joints.drawn(seed, torque=True, stribeck=False).record).static is not None
+        except EstimateError:
+            continue
+    assert claimed <= most
+
+
+@pytest.mark.parametrize(
+    ("draws", "least"), [(10, 0.75), pytest.param(150, 0.91, marks=pytest.mark.soak)], ids=["short", "long"]
+)
+def test_intervals_hold_on_joints_of_another_integrator(draws: int, least: float) -> None:
+    """Of those that are told to fall; `least` is three binomial deviations below 95 %, for their number."""
+    held = []
+    for seed in range(100, 100 + draws):
+        joint = joints.drawn(seed, torque=True, stribeck=True)
+        try:
+            told = regress_joint(joint.record)
+        except EstimateError:
+            continue
+        if told.static is None:
+            continue
+        truth = {
+            "level": joint.level(told.time),
+            "static": joint.static(told.time),
+            "stribeck_speed": joint.truth["fall"],
+        }
+        estimates = {name: getattr(told, name) for name in truth}
+        held += [one.includes(truth[name]) for name, one in estimates.items() if stands(one.status)]
+    assert len(held) > draws / 2
+    assert np.mean(held) >= least
+
+
+def test_page_terminal_and_exports_have_the_curve(tmp_path, monkeypatch) -> None:
+    ss.write_record(log(), tmp_path / "log.csv")
+    monkeypatch.chdir(tmp_path)
+    outcome = CliRunner().invoke(main, ["joint", "log.csv", "--output", "out", "--all"])
+    assert outcome.exit_code == 0, outcome.output
+    words = " ".join(outcome.output.split())
+    assert "falls with the speed" in words
+    assert "Stribeck speed" in words
+    results = json.loads((tmp_path / "out" / "results.json").read_text())
+    assert "friction at rest" in json.dumps(results)
+    assert "falls with the speed" in (tmp_path / "out" / "report.html").read_text()
+    folder = tmp_path / "out" / "joint"
+    assert 'name = "Stribeck"' in (folder / "law.toml").read_text()
+    for file in ("friction.c", "friction.py", "friction.mo", "friction.m"):
+        assert "static - kinetic" in (folder / file).read_text(), file
+    for file in ("mujoco.xml", "dynamics.urdf"):
+        assert "at rest" in (folder / file).read_text(), file
+    assert (folder / "joint.fmu").exists()
+
+
+def test_the_law_and_the_figure_are_those_of_the_answer() -> None:
+    joint = analyze_joint(log()).joint
+    law = joint_law(joint)
+    assert isinstance(law, Stribeck)
+    assert law.friction(0.0) == pytest.approx(joint.static.value)
+    assert law.speed == joint.stribeck_speed.value
+    _, back, forward, _ = plot_joint(joint).lines
+    excess = joint.static.value - joint.level.value
+    assert forward.get_ydata()[0] == pytest.approx(joint.forward.value + joint.load.value * joint.carried + excess)
+    assert back.get_ydata()[0] == pytest.approx(-joint.back.value - joint.load.value * joint.carried - excess)
+
+
+def test_a_mixture_of_one_is_itself() -> None:
+    one = ss.Estimate.normal("friction", 1.0, sd=0.1, unit="N", method="")
+    both = mixture([one, one], np.array([0.3, 0.7]))
+    assert both.interval == pytest.approx(one.interval, abs=1e-3)
+    assert both.sd == pytest.approx(0.1)
