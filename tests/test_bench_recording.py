@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import random
+import shutil
 import signal
 import subprocess
 import sys
@@ -83,6 +84,23 @@ def test_what_is_lost_or_clipped_is_named(tmp_path: Path) -> None:
     clipped = np.sum(np.abs(record["load"]) >= sim.inputs[3].limit * (1 - 1e-9))
     assert clipped > 300
     assert f"load clipped in {clipped} samples, first at 0.5" in done.outcomes["sim"]
+
+
+def test_samples_that_are_lost_at_the_end_are_named_too(tmp_path: Path) -> None:
+    done = acquire(Counter(lost=((15_000, 40_000),)), output=tmp_path / "a.h5", wanted=Wanted(seconds=0.4))
+    assert "5000 samples lost (5000 at 0.300 s)" in done.outcomes["counter"]
+    assert len(ss.read_record(tmp_path / "a.h5")) == 15_000
+
+
+def test_a_disk_without_room_for_the_record_leaves_the_journal(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    output, rich = tmp_path / "a.h5", shutil.disk_usage(tmp_path)
+    monkeypatch.setattr(shutil, "disk_usage", lambda path: rich._replace(free=200_000))
+    with pytest.raises(ss.errors.FormatError, match=r"a\.h5.* MB are free.*a\.h5\.journal holds all of it") as refused:
+        acquire(Counter(), output=output, wanted=Wanted(seconds=0.4))
+    assert "make room" in refused.value.next_step
+    monkeypatch.undo()
+    assert not output.exists()
+    assert len(ss.read_record(tmp_path / "a.h5.journal")) == 20_000
 
 
 def test_a_trigger_begins_it_and_what_was_before_is_kept(tmp_path: Path) -> None:

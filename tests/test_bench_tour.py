@@ -86,6 +86,23 @@ def test_a_run_list_is_read_back_and_acquired(tmp_path: Path) -> None:
         bench.read_runs(path)
 
 
+def test_a_run_list_is_refused_whole_before_its_first_run(tmp_path: Path) -> None:
+    path, config, records = tmp_path / "runs.toml", tmp_path / "rig.toml", tmp_path / "records"
+    config.write_text('[shaker]\nstroke = "1 mm"\n[devices.desk]\nkind = "sim"\nfast = true\nfs = 1000\n', "utf-8")
+    asked = ["acquire", "--device", "desk", "--config", str(config), "--output", str(records)]
+    run = '[[run]]\nname = "{}"\nfrequency = 2.5\namplitude = {}\nseconds = 0.1\n'
+    path.write_text(run.format("small", 5e-4) + run.format("large", 2e-3), "utf-8")
+    for more in (["--runs", str(path)], ["--drive", "base=2e-3@2.5", "--seconds", "0.1"]):
+        result = CliRunner().invoke(main, [*asked, *more])
+        assert result.exit_code == 1
+        assert "stroke allows 1 mm" in result.output
+        assert not records.exists()
+    assert CliRunner().invoke(main, [*asked, "--runs", str(path), "--seconds", "3"]).exit_code == 2
+    path.write_text(2 * run.format("small", 5e-4), "utf-8")
+    with pytest.raises(ss.errors.ModelError, match="two runs are called small"):
+        bench.read_runs(path)
+
+
 def test_a_plan_refuses_what_the_shaker_can_not_move() -> None:
     run = ss.simulate(replace(SLIDER, drive=ss.drives.HarmonicBase(9e-3, frequency=2.5)), cycles=2)
     with pytest.raises(ss.errors.ModelError, match="stroke allows 8 mm"):

@@ -96,6 +96,8 @@ def test_the_command_writes_goes_on_and_answers_single_files(tmp_path: Path) -> 
     record = next(path for path in kept if path.stem == "weigh")
     alone = json.loads(run("commission", f"weigh={record}", "--json"))
     assert alone["steps"]["weigh"][0]["name"] == "gain of load"
+    run("commission", "--step", "rest", "--output", folder)  # one step more leaves the others' answers in rig.toml
+    assert "±" in ss.rig.read_rig(folder / "rig.toml").channels["load"]
 
 
 def test_steps_are_listed_and_unknown_ones_refused() -> None:

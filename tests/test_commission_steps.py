@@ -37,6 +37,20 @@ def test_the_noise_before_rounding_is_found_behind_counts(noise: float) -> None:
     assert found.zero.value == pytest.approx(0.7e-6, abs=5 * noise / 200 + 1e-8)
 
 
+@pytest.mark.parametrize("smallest", [0.03, 0.15, 0.3, 1.0])
+def test_zero_and_noise_hold_however_coarse_a_count_is(smallest: float) -> None:
+    """Noise from a thirtieth of a count on, and levels anywhere between two: one count, two, or many."""
+    held = []
+    for seed in range(100):
+        rng = np.random.default_rng([seed, 5])
+        noise, level = smallest * rng.uniform(1, 2), rng.uniform(-3, 3)
+        values = np.round(level + noise * rng.standard_normal(4000))
+        if np.ptp(values):  # of what reads one number throughout is said so
+            sensor = bench.at_rest(of("x", values)).sensors["x"]
+            held += [(sensor.zero.includes(level), sensor.noise.includes(noise))]
+    assert np.mean(held, axis=0).min() >= 0.9
+
+
 def test_a_drift_and_a_dead_sensor_are_told() -> None:
     time = np.arange(20_000) / 1000
     moving = bench.at_rest(of("load", 0.01 * time + 0.002 * NOISE.standard_normal(time.size))).sensors["load"]

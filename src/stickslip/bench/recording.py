@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stickslip.bench.device import Block, Device, Input, Signal, Stream
-from stickslip.errors import EstimateError, ModelError, RecordError, StickslipError
+from stickslip.errors import EstimateError, FormatError, ModelError, RecordError, StickslipError
 from stickslip.files import journal
 from stickslip.files.read import read_record
 from stickslip.files.table import Options
@@ -91,16 +91,7 @@ class Seen:
         RecordError
             The counter runs back.
         """
-        if self.after is not None and block.first != self.after:
-            missing = block.first - self.after
-            if missing < 0:
-                raise RecordError(
-                    f"sample {block.first} came after sample {self.after - 1}",
-                    "a device counts its samples upwards",
-                    "check its driver",
-                )
-            self.lost += missing
-            self.gaps += [(self.after, missing)] if len(self.gaps) < 1000 else []
+        self.skip(block.first)
         self.after = block.after
         self.samples += block.samples.shape[1]
         high, low = np.fmax.reduce(block.samples, axis=1), np.fmin.reduce(block.samples, axis=1)
@@ -108,6 +99,26 @@ class Seen:
             at = np.flatnonzero(np.abs(block.samples[row].astype(np.float64)) >= self.edges[row, 0])
             count, first = self.clipped.get(self.inputs[row].name, (0, block.first + int(at[0]) if len(at) else 0))
             self.clipped[self.inputs[row].name] = (count + len(at), first)
+
+    def skip(self, first: int) -> None:
+        """Count as lost what did not come before this sample.
+
+        Raises
+        ------
+        RecordError
+            The counter runs back.
+        """
+        missing = 0 if self.after is None else first - self.after
+        if missing < 0:
+            raise RecordError(
+                f"sample {first} came after sample {first - missing - 1}",
+                "a device counts its samples upwards",
+                "check its driver",
+            )
+        self.lost += missing
+        if missing:
+            self.gaps += [(first - missing, missing)] if len(self.gaps) < 1000 else []
+            self.after = first
 
     def outcome(self, fs: float, begin: int) -> str:
         """In words."""
@@ -208,10 +219,14 @@ class Tape:
 
     def finish(self) -> Path:
         """The journal, closed, as the record that was asked for; the journal goes when the record stands."""
-        if self.output.suffix in (".h5", ".hdf5"):
-            write_table(journal.read(self.path, Options()), self.output)
-        else:
-            write_record(read_record(self.path), self.output)
+        try:
+            if self.output.suffix in (".h5", ".hdf5"):
+                write_table(journal.read(self.path, Options()), self.output)
+            else:
+                write_record(read_record(self.path), self.output)
+        except FormatError as error:
+            step = f"{error.next_step}; {self.path.name} holds all of it: stickslip convert makes a record of that"
+            raise FormatError(error.value, error.rule, step) from error
         self.path.unlink()
         return self.output
 
@@ -358,7 +373,7 @@ def acquire(
     """
     wanted, output = wanted or Wanted(), Path(output)
     every = list(device) if isinstance(device, Sequence) else [device]
-    _require(every, wanted)
+    require_possible(every, wanted)
     outputs = [output] if len(every) == 1 else [_beside(output, one.name) for one in every]
     for path in {output, *outputs}:
         require_writable(path)
@@ -378,8 +393,14 @@ def _beside(output: Path, name: str) -> Path:
     return output.with_name(f"{output.stem}-{name}{output.suffix}")
 
 
-def _require(devices: Sequence[Device], wanted: Wanted) -> None:
-    """Refuse what can not be, before anything is measured."""
+def require_possible(devices: Sequence[Device], wanted: Wanted) -> None:
+    """Refuse what can not be, before anything is measured.
+
+    Raises
+    ------
+    ModelError
+        Devices of one name, no time, a trigger or a drive of what no device has, or one beyond an output's limits.
+    """
     if not devices or len({one.name for one in devices}) < len(devices):
         raise ModelError(f"{len(devices)} devices", "each has a name of its own", "name them in [devices.NAME]")
     if wanted.seconds is not None and not 0 < wanted.seconds < math.inf:
@@ -543,6 +564,7 @@ class _Head:
         if block.after > self.end:
             block = block._replace(samples=block.samples[:, : max(0, int(self.end) - block.first)])
             self.tape.write(block)
+            self.tape.seen.skip(int(self.end))  # the last samples may be those that were lost
             self.end = min(self.end, self.tape.seen.after or 0)
             return
         self.tape.write(block)

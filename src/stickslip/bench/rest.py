@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -25,6 +25,7 @@ MOVES = 6.0  # deviations from chance of a slow swing, from which the rig was no
 TONE, FEWEST = 0.5, 4  # of what is left, that one tone carries; and cycles of it: less may be a slow walk
 HUM = 45.0  # Hz: a tone from here on is the mains' as likely as the rig's
 WIDE = 1e-2  # of the logarithm: wide enough for rounding, narrow against what 500 samples tell
+UNSEEN = 3.0  # samples: so few or fewer stand on a count on which none was seen (95 %)
 HELD = 0.02  # of the samples off the one count, below which the noise is only bounded
 
 
@@ -124,46 +125,69 @@ def at_rest(record: Record) -> AtRest:
 
 def _sensor(name: str, record: Record) -> SensorAtRest:
     values, unit = record[name], record.channels[name].unit
-    count = quantisation_step(values)
     time = (np.arange(len(values)) - (len(values) - 1) / 2) / record.fs
     slope = float(time @ values / (time @ time))
     residual = values - values.mean() - slope * time
     worth = len(values) / max(1.0, correlation_time(residual))
     of = f"{len(values)} samples at rest"
-    zero_sd, freedom = mean_uncertainty(residual)
-    level, noise = _noise(values - slope * time, residual, count, worth)
-    zero = Estimate.normal(
-        f"zero of {name}", level, sd=zero_sd, unit=unit, method=f"mean of {of}", quantile=student(freedom)
-    )
-    sd, slope_freedom = mean_uncertainty(time * residual / float(np.mean(time**2)))
+    sd, freedom = mean_uncertainty(time * residual / float(np.mean(time**2)))
     drift = Estimate.normal(
-        f"drift of {name}", slope, sd=sd, unit=f"{unit}/s", method=f"slope of {of}", quantile=student(slope_freedom)
+        f"drift of {name}", slope, sd=sd, unit=f"{unit}/s", method=f"slope of {of}", quantile=student(freedom)
     )
-    spread = noise[1] if math.isfinite(noise[1]) else 0.0
-    rounded = Estimate.normal(
-        f"noise of {name}", noise[0], sd=spread, unit=unit, method=f"likelihood of the counts of {of}" if count else of
-    ).within(0.0)
-    if not noise[0] or not math.isfinite(noise[1]):
-        rounded = Estimate(rounded.name, 0.0, (0.0, count / 2 or 0.0), count / 4, unit, f"{of} stand on one count")
+    levels = np.unique(values)
+    count = float(np.ptp(levels)) if len(levels) == 2 else quantisation_step(values)
+    zero, noise = (
+        replace(estimate, name=f"{what} of {name}", unit=unit, method=f"{estimate.method} of {of}")
+        for what, estimate in zip(("zero", "noise"), _read(values - slope * time, residual, count, worth), strict=True)
+    )
     status = _status(name, values, residual, worth, drift, _tone(residual, record.fs))
-    return SensorAtRest(name, zero, drift, rounded, count, status)
+    return SensorAtRest(name, zero, drift, noise, count, status)
 
 
-def _noise(values: Array, residual: Array, count: float, worth: float) -> tuple[float, tuple[float, float]]:
-    """Level, and deviation of the noise with its own; the second is infinite where only a bound is known."""
-    level, sd = float(values.mean()), float(residual.std())
+def _read(values: Array, residual: Array, count: float, worth: float) -> tuple[Estimate, Estimate]:
+    """The level, and the noise before it was rounded to counts."""
+    sd, (zero_sd, freedom) = float(residual.std()), mean_uncertainty(residual)
+    zero = Estimate.normal("", values.mean(), sd=zero_sd, unit="", method="mean", quantile=student(freedom))
     if not count or sd > COARSE * count:
-        return level, (sd, sd / math.sqrt(2 * max(1.0, worth - 2)))
+        own = math.sqrt(sd**2 - count**2 / 12)  # without what rounding adds
+        noise = Estimate.normal("", own, sd=own / math.sqrt(2 * max(1.0, worth - 2)), unit="", method="deviation")
+        return zero, noise.within(0.0)
     counts, times = np.unique(np.round(values / count), return_counts=True)
-    if times.max() > (1 - HELD) * len(values):
-        return level, (sd, math.inf)
-    return _rounded(counts * count, times * worth / len(values), count, level, sd)
+    weights = times * worth / len(values)
+    if len(counts) < 3 or times.max() > (1 - HELD) * len(values):
+        return _bounded(counts * count, weights, count)
+    return _rounded(counts * count, weights, count, zero.value, sd)
 
 
-def _rounded(
-    levels: Array, times: NDArray[np.float64], count: float, level: float, sd: float
-) -> tuple[float, tuple[float, float]]:
-    """Mean and deviation before rounding, by the likelihood of the counts; deviation of the latter by its curvature."""
+def _bounded(levels: Array, weights: Array, count: float) -> tuple[Estimate, Estimate]:
+    """Level and noise by what stands on one count, or two: bounds, for a share of the two tells one number alone.
+
+    With a share p on the upper count, the level is Phi^-1(p) deviations above the edge between both; and the deviation
+    is so small that nothing stands on the next count.
+    """
+    from scipy.special import ndtri
+
+    often = levels[np.argmax(weights)]
+    if len(levels) != 2:
+        low, high, wide, middle = often - count / 2, often + count / 2, count / 2, often
+    else:
+        edge, size = levels.mean(), weights.sum()
+        share, least = weights[1] / size, 1 / (size + 2)
+        unsure = NORMAL_95 * math.sqrt(max(share * (1 - share), least) / size)
+        ends = ndtri(np.clip([share - unsure, share, share + unsure], least, 1 - least))
+        wide = count / (abs(ends[1]) - ndtri(max(least, UNSEEN / size)))
+        low, high, middle = (
+            min(edge, edge + wide * ends[0]),
+            max(edge, edge + wide * ends[2]),
+            edge + wide / 2 * ends[1],
+        )
+    method = "share of two counts" if len(levels) == 2 else "the one count"
+    zero = Estimate("", float(middle), (float(low), float(high)), float(high - low) / (2 * NORMAL_95), "", method)
+    return zero, Estimate("", 0.0, (0.0, float(wide)), float(wide) / 2, "", method)
+
+
+def _rounded(levels: Array, weights: Array, count: float, level: float, sd: float) -> tuple[Estimate, Estimate]:
+    """Level and deviation before rounding, by the likelihood of the counts; as sure as it bends, in both together."""
     from scipy.optimize import minimize
     from scipy.special import ndtr
 
@@ -173,14 +197,20 @@ def _rounded(
             (levels + count / 2 - level - count * at[0]) / spread,
             (levels - count / 2 - level - count * at[0]) / spread,
         )
-        return -float(times @ np.log(np.maximum(ndtr(ends[0]) - ndtr(ends[1]), 1e-300)))
+        return -float(weights @ np.log(np.maximum(ndtr(ends[0]) - ndtr(ends[1]), 1e-300)))
 
     start = np.array([0.0, math.log(max(0.2, math.sqrt(max(0.0, (sd / count) ** 2 - 1 / 12))))])
     best = minimize(cost, start, method="Nelder-Mead", options={"xatol": 1e-5, "fatol": 1e-6}).x
-    step = np.array([0.0, WIDE])
-    bend = (cost(best + step) - 2 * cost(best) + cost(best - step)) / WIDE**2
+    steps = WIDE * np.eye(2)
+    bend = [
+        [cost(best + a + b) - cost(best + a - b) - cost(best - a + b) + cost(best - a - b) for b in steps]
+        for a in steps
+    ]
+    sds = np.sqrt(np.maximum(0.0, np.diag(np.linalg.pinv(np.array(bend) / (4 * WIDE**2)))))
+    method = "likelihood of the counts"
+    zero = Estimate.normal("", level + count * best[0], sd=count * sds[0], unit="", method=method)
     noise = count * math.exp(best[1])
-    return level + count * float(best[0]), (noise, noise / math.sqrt(bend) if bend > 0 else math.inf)
+    return zero, Estimate.normal("", noise, sd=noise * sds[1], unit="", method=method).within(0.0)
 
 
 def _tone(residual: Array, fs: float) -> float | None:

@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, Field
+from pydantic import AfterValidator, BaseModel, Field
 
 from stickslip.drives.kinds import HarmonicBase
 from stickslip.errors import EstimateError, ModelError, StickslipError
@@ -57,6 +57,13 @@ class Run(BaseModel):
     why: str = ""
 
 
+def _of_names(runs: tuple[Run, ...]) -> tuple[Run, ...]:
+    names = [run.name for run in runs]
+    if twice := next((name for name in names if names.count(name) > 1), ""):
+        raise ValueError(f"two runs are called {twice}, and each is recorded into a file of its name")
+    return runs
+
+
 class RunList(BaseModel):
     """Runs to record, one after another.
 
@@ -68,7 +75,7 @@ class RunList(BaseModel):
 
     model_config = STRICT
 
-    run: tuple[Run, ...]
+    run: Annotated[tuple[Run, ...], AfterValidator(_of_names)]
 
     def toml(self) -> str:
         """As the text of a file that ``stickslip acquire --runs`` reads."""

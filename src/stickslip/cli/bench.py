@@ -14,9 +14,11 @@ import click
 
 import stickslip as ss
 import stickslip.bench as bench
+from stickslip.bench.recording import require_possible
 from stickslip.cli.records import all_option, groups_of, pair, usable
 from stickslip.cli.terminal import aligned, deliver, print_json, progress, redrawn, say, say_json, wrapped
 from stickslip.errors import INTERRUPTED
+from stickslip.whole import whole_file
 
 if TYPE_CHECKING:
     from stickslip import Record
@@ -35,7 +37,7 @@ Source = Callable[["BenchStep"], "Record | None"]
     help="What measures: a table [devices.NAME] of the configuration, or a kind of device. sim needs no hardware.",
 )
 @click.option("--config", type=click.Path(path_type=Path), metavar="RIG.TOML", help="What is known of the rig already.")
-@click.option("--step", "steps", multiple=True, metavar="NAME", help="Only this step. Repeatable.")
+@click.option("--step", "steps", multiple=True, metavar="NAME", help="Record only this step. Repeatable.")
 @click.option("--again", multiple=True, metavar="NAME", help="Record this step anew. Repeatable.")
 @click.option("--seed", type=click.IntRange(min=0), default=1, show_default=True, help="Of a simulated rig's noise.")
 @click.option(
@@ -75,6 +77,8 @@ def commission(
         chosen = [step for step in bench.STEPS if step.name in given]
     folder = output or (None if given or as_json else Path("commission"))
     device = _device(options["name"], rig, config) if options["name"] else None
+    if folder:  # what was recorded before stays part of the rig
+        chosen = [step for step in bench.STEPS if step in chosen or _kept(folder, step.name).exists()]
     if device is None and not given and not (folder and (folder / "records").is_dir()):
         raise click.UsageError("nothing measures; name a --device (sim needs no hardware), or STEP=FILE")
     source, truth = _source(given, device, rig, folder, seed=options["seed"], anew=anew)
@@ -85,7 +89,8 @@ def commission(
             done = bench.commission(source, rig=rig, steps=chosen, truth=truth, progress=tell)
     if folder:
         folder.mkdir(parents=True, exist_ok=True)
-        (folder / "rig.toml").write_text(done.known.toml(), encoding="utf-8")
+        with whole_file(folder / "rig.toml") as draft:
+            draft.write_text(done.known.toml(), encoding="utf-8")
     deliver(done, folder and folder / "report", as_json=as_json, everything=everything)
     if folder and not as_json:
         say(f"Settings: {folder / 'rig.toml'}")
@@ -241,11 +246,17 @@ def acquire(names: tuple[str, ...], config: Path | None, output: Path, as_json: 
     tables, folder = (settings.devices if settings else {}), config.parent if config else None
     chosen = [bench.find_device(name, tables, folder=folder) for name in names]
     log = settings.log if settings else None
+    shaker = ss.rig.Shaker.of(settings.shaker) if settings and settings.shaker else None
     if options["runs"]:
-        _run_all(chosen, bench.read_runs(options["runs"]), output, log, as_json=as_json)
+        if options["seconds"] or options["trigger"] or options["drives"]:
+            raise click.UsageError(
+                "--runs says seconds and drive of each run; leave out --seconds, --drive and --trigger"
+            )
+        _run_all(chosen, bench.read_runs(options["runs"]), output, log, shaker, as_json=as_json)
         return
     drive = dict(_driven(text) for text in options["drives"])
     wanted = bench.Wanted(options["seconds"], _trigger(options["trigger"], options["before"]), drive, log)
+    _require_moved(chosen, wanted, shaker)
     with progress(100) as tell:
         done = bench.acquire(chosen, output=output, wanted=wanted, watch=_watch(tell, options["seconds"]))
     _recorded(done, as_json=as_json)
@@ -253,18 +264,31 @@ def acquire(names: tuple[str, ...], config: Path | None, output: Path, as_json: 
         raise SystemExit(INTERRUPTED)
 
 
-def _run_all(devices: Any, runs: bench.RunList, folder: Path, log: Any, *, as_json: bool) -> None:
+def _require_moved(devices: Any, wanted: bench.Wanted, shaker: Any) -> None:
+    """Refuse a recording that can not be, also by what the rig's shaker can."""
+    require_possible(devices, wanted)
+    tone = wanted.drive.get("base")
+    if shaker is not None and isinstance(tone, bench.Tone):
+        shaker.require(tone.frequency, tone.amplitude)
+
+
+def _run_all(devices: Any, runs: bench.RunList, folder: Path, log: Any, shaker: Any, *, as_json: bool) -> None:
     """Every run of a list, each into a file of its name; one that is there already is left out."""
+    every = {
+        folder / f"{run.name}.h5": bench.Wanted(
+            run.seconds, None, {run.on: bench.Tone(run.amplitude, run.frequency)}, log
+        )
+        for run in runs.run
+    }
+    for wanted in every.values():
+        _require_moved(devices, wanted, shaker)
     folder.mkdir(parents=True, exist_ok=True)
-    for run in runs.run:
-        path = folder / f"{run.name}.h5"
+    for path, wanted in every.items():
         if path.exists():
             say(f"{path} is there already: left out", err=True)
             continue
-        moved: dict[str, bench.Signal] = {run.on: bench.Tone(run.amplitude, run.frequency)}
-        wanted = bench.Wanted(run.seconds, None, moved, log)
         with progress(100) as tell:
-            done = bench.acquire(devices, output=path, wanted=wanted, watch=_watch(tell, run.seconds))
+            done = bench.acquire(devices, output=path, wanted=wanted, watch=_watch(tell, wanted.seconds))
         _recorded(done, as_json=as_json)
         if done.ended == "interrupted":
             raise SystemExit(INTERRUPTED)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -32,6 +33,7 @@ from stickslip.whole import whole_file
 Array = NDArray[np.float64]
 
 ROWS_AT_ONCE = 200_000
+SLACK = 1 << 17  # bytes that HDF5 takes beside the samples and their description
 Columns = dict[str, tuple[str, Array]]
 
 
@@ -159,10 +161,22 @@ def _write_csv(path: Path, columns: Columns, _: str) -> None:
 
 def _write_hdf5(path: Path, columns: Columns, metadata: str) -> None:
     h5py = optional("h5py")
+    _require_room(path, sum(values.nbytes for _, values in columns.values()) + len(metadata))
     with h5py.File(path, "w", libver="latest") as file:  # only this layout lets an attribute pass 64 KiB
         file.attrs[KEY] = metadata
         for name, (unit, values) in columns.items():
             file.create_dataset(name, data=values).attrs["unit"] = unit
+
+
+def _require_room(path: Path, size: int) -> None:
+    """Refuse a file that the disk has no room for: HDF5 may not tell of it, and break down as the program ends."""
+    free = shutil.disk_usage(path.parent).free
+    if free < size + SLACK:
+        raise FormatError(
+            f"'{path.name}' takes {size / 1e6:.3g} MB, and {free / 1e6:.3g} MB are free",
+            "a record is written whole or not at all",
+            "make room, or choose another disk",
+        )
 
 
 def write_table(table: Table, path: Path) -> Path:
@@ -188,6 +202,7 @@ def write_table(table: Table, path: Path) -> Path:
     require_free(path)
     units, digests = units_of(table.record), Digests()
     rows = int(table.record["rows"])
+    _require_room(path, 8 * rows * len(units) + len(json.dumps(table.record)))
     with whole(path, replace=False) as part, h5py.File(part, "w", libver="latest") as file:
         for name, unit in units.items():
             file.create_dataset(name, shape=(rows,), dtype="<f8").attrs["unit"] = unit
