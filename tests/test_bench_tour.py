@@ -94,7 +94,7 @@ def test_a_run_list_is_refused_whole_before_its_first_run(tmp_path: Path) -> Non
     path.write_text(run.format("small", 5e-4) + run.format("large", 2e-3), "utf-8")
     for more in (["--runs", str(path)], ["--drive", "base=2e-3@2.5", "--seconds", "0.1"]):
         result = CliRunner().invoke(main, [*asked, *more])
-        assert result.exit_code == 1
+        assert result.exit_code == 2
         assert "stroke allows 1 mm" in result.output
         assert not records.exists()
     assert CliRunner().invoke(main, [*asked, "--runs", str(path), "--seconds", "3"]).exit_code == 2

@@ -373,7 +373,7 @@ def acquire(
     """
     wanted, output = wanted or Wanted(), Path(output)
     every = list(device) if isinstance(device, Sequence) else [device]
-    require_possible(every, wanted)
+    _require(every, wanted)
     outputs = [output] if len(every) == 1 else [_beside(output, one.name) for one in every]
     for path in {output, *outputs}:
         require_writable(path)
@@ -393,14 +393,8 @@ def _beside(output: Path, name: str) -> Path:
     return output.with_name(f"{output.stem}-{name}{output.suffix}")
 
 
-def require_possible(devices: Sequence[Device], wanted: Wanted) -> None:
-    """Refuse what can not be, before anything is measured.
-
-    Raises
-    ------
-    ModelError
-        Devices of one name, no time, a trigger or a drive of what no device has, or one beyond an output's limits.
-    """
+def _require(devices: Sequence[Device], wanted: Wanted) -> None:
+    """Refuse what can not be, before anything is measured."""
     if not devices or len({one.name for one in devices}) < len(devices):
         raise ModelError(f"{len(devices)} devices", "each has a name of its own", "name them in [devices.NAME]")
     if wanted.seconds is not None and not 0 < wanted.seconds < math.inf:

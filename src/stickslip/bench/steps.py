@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -33,6 +34,7 @@ from stickslip.rig.settings import CommissionSettings, RigSettings, rig_settings
 from stickslip.settings import nearest
 from stickslip.signals.repair import fill_missing
 from stickslip.units import parse_unit
+from stickslip.whole import whole_file
 
 CALIBRATIONS = {"gauge-x": "x", "gauge-z": "z", "turn": "a", "weigh": "load"}  # step -> channel
 # Of a channel's samples, that may be lost and bridged: a hundredth leaves noise and level as they are within a percent.
@@ -487,6 +489,20 @@ class Known:
         rig_settings(settings, source="what commissioning found")
         notes = ["# Written by stickslip commission: values with their standard uncertainty.", *self._notes()]
         return "\n".join([*notes, "", *rig_toml(settings)]) + "\n"
+
+    def write(self, path: Path) -> None:
+        """Write that text, whole or not at all.
+
+        Raises
+        ------
+        ModelError
+            What was found can not be stated.
+        OSError
+            The disk can not be written.
+        """
+        text = self.toml()
+        with whole_file(path) as draft:
+            draft.write_text(text, encoding="utf-8")
 
     def _notes(self) -> list[str]:
         stick = self.of("stick", OntoStick)

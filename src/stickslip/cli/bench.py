@@ -14,11 +14,9 @@ import click
 
 import stickslip as ss
 import stickslip.bench as bench
-from stickslip.bench.recording import require_possible
 from stickslip.cli.records import all_option, groups_of, pair, usable
 from stickslip.cli.terminal import aligned, deliver, print_json, progress, redrawn, say, say_json, wrapped
 from stickslip.errors import INTERRUPTED
-from stickslip.whole import whole_file
 
 if TYPE_CHECKING:
     from stickslip import Record
@@ -89,8 +87,7 @@ def commission(
             done = bench.commission(source, rig=rig, steps=chosen, truth=truth, progress=tell)
     if folder:
         folder.mkdir(parents=True, exist_ok=True)
-        with whole_file(folder / "rig.toml") as draft:
-            draft.write_text(done.known.toml(), encoding="utf-8")
+        done.known.write(folder / "rig.toml")
     deliver(done, folder and folder / "report", as_json=as_json, everything=everything)
     if folder and not as_json:
         say(f"Settings: {folder / 'rig.toml'}")
@@ -265,8 +262,9 @@ def acquire(names: tuple[str, ...], config: Path | None, output: Path, as_json: 
 
 
 def _require_moved(devices: Any, wanted: bench.Wanted, shaker: Any) -> None:
-    """Refuse a recording that can not be, also by what the rig's shaker can."""
-    require_possible(devices, wanted)
+    """Refuse a motion that a device's output, or the rig's shaker, can not make."""
+    for output in (output for device in devices for output in device.outputs):
+        output.require(wanted.drive.get(output.name), fs=devices[0].fs)
     tone = wanted.drive.get("base")
     if shaker is not None and isinstance(tone, bench.Tone):
         shaker.require(tone.frequency, tone.amplitude)
