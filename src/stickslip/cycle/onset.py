@@ -43,6 +43,7 @@ PULLED = 0.025  # share by which smoothing and lags move the level that a pull i
 NOTHING = 0.9  # of its level, by which a friction that tells nothing of its peak strays after a slip
 ALIKE = 3.0  # times the other, within which the time of a peak's fall is that of the rise before it
 OVERSHOOT = 0.09  # of the level, by which a Butterworth filter of order two overshoots a jump from it to its opposite
+EARLY = "the mass moves before the friction has come near its level: the first peak holds the ring that follows"
 NEAR = 12  # samples before a slip in which the friction's rise is looked for
 CREEPS = 0.1  # of a stroke's largest speed, below which it does not slide for good
 RINGS = 1.5  # times what a mount's ring is after half a cycle it is at its start, at most
@@ -398,10 +399,7 @@ def _borne(record: Record, strokes: Strokes) -> _Borne:
         return pulled
     peak = _by_peak(record, strokes)
     if not mostly:
-        sentence = (
-            "the mass moves before the friction has come near its level: the first peak holds the ring that follows"
-        )
-        return replace(peak, status=Status(sentence, peak.status))
+        return replace(peak, status=Status(EARLY, peak.status))
     if pulled is None:
         return peak
     sentence = (
@@ -481,25 +479,20 @@ def _by_peak(record: Record, strokes: Strokes) -> _Borne:
 
 
 def _filtered(strokes: Sequence[Stroke]) -> tuple[float, float]:
-    """How much less and more than its measured peak a contact may have borne [N], by samples and sensor.
-
-    Between two samples it may have borne as much more as it then falls in one. A sensor's filter overshoots a jump,
-    with no static friction there, and cuts a peak that is as brief as the jump; a fall far quicker than the rise before
-    it shows that the sensor is not in the way.
-    """
-    rises, falls, excesses, steps = [], [], [], []
+    """How much less and more than its measured peak a contact may have borne [N], by samples and sensor."""
+    seen = []
     for stroke in strokes:
-        peak, then = stroke.friction[stroke.slip], stroke.friction[stroke.slip + 1 :]
-        rises.append(1 + np.count_nonzero(np.abs(stroke.friction[: stroke.slip]) < HIGH * stroke.level))
-        falls.append(1 + int(np.argmax(then < (peak + stroke.level) / 2)))
-        excesses.append(peak - stroke.level)
-        steps.append(peak - then[0])
-    rise, fall, excess, between = (float(np.median(values)) for values in (rises, falls, excesses, steps))
+        before, peak = stroke.friction[: stroke.slip], stroke.friction[stroke.slip]
+        then = np.append(stroke.friction[stroke.slip + 1 :], stroke.level)
+        rise = 1 + np.count_nonzero(np.abs(before) < HIGH * stroke.level)
+        fall = 1 + int(np.argmax(then <= (peak + stroke.level) / 2))
+        seen.append((rise, fall, peak - stroke.level, peak - then[0]))
+    rise, fall, excess, between = np.median(np.array(seen, dtype=float), axis=0).tolist()  # between: two samples
     if excess < 0:  # still on its way to the level, or held back by what follows the speed
         return 0.0, max(between, -excess)
-    if fall < rise / ALIKE:
+    if fall < rise / ALIKE:  # no sensor in the way is slow, then
         return 0.0, max(between, 0.0)
-    if fall <= ALIKE * rise:
+    if fall <= ALIKE * rise:  # as brief as a filter's overshoot, and as a peak that it cuts
         return excess, max(between, excess)
     return OVERSHOOT * float(np.median([stroke.level for stroke in strokes])), max(between, 0.0)
 
