@@ -556,3 +556,39 @@ def test_a_unit_that_is_no_unit_is_a_sentence(tmp_path: Path, unit: str) -> None
     (tmp_path / "run.csv").write_text("t [s],x\n0,1\n1,2\n2,-1\n")
     with pytest.raises(ss.errors.RecordError, match="is not known"):
         ss.read_record(tmp_path / "run.csv", units={"x": unit})
+
+
+@pytest.mark.parametrize(
+    "title", ["Temps (s)", "时间 (s)", "Zeit [s]", "Tiempo", "tempo", "Czas [s]", "Temps écoulé (s)", "时间"]
+)
+def test_time_is_known_in_several_languages(csv: Callable[..., Path], title: str) -> None:
+    time = np.arange(100) / 250
+    rows = "\n".join(f"{second:.3f},{np.sin(second):.6f}" for second in time)
+    record = ss.read_record(csv(f"{title},x [mm]\n{rows}\n"))
+    assert list(record) == ["x"]
+    assert record.fs == pytest.approx(250)
+
+
+@pytest.mark.parametrize("title", ["Temps", "Temps [°C]", "Dauer"])
+def test_what_may_be_no_time_is_refused_with_the_columns_that_there_are(csv: Callable[..., Path], title: str) -> None:
+    rows = "\n".join(f"{second / 250:.3f},{np.sin(second / 250):.6f}" for second in range(100))
+    path = csv(f"{title},x [mm]\n{rows}\n")
+    with pytest.raises(ss.errors.RecordError, match=rf"time= \(columns: {title.partition(' ')[0]}, x\)"):
+        ss.read_record(path)
+    assert ss.read_record(path, time=title.partition(" ")[0] + " [s]").fs == pytest.approx(250)
+
+
+def test_the_columns_of_one_struct_go_by_its_fields(tmp_path: Path) -> None:
+    from scipy.io import savemat
+
+    time = np.arange(200) / 500
+    one, other = {"t": time, "x": np.sin(time)}, {"t": time + 1, "x": np.cos(time)}
+    savemat(tmp_path / "one.mat", {"data": one, "about": "text"})
+    record = ss.read_record(tmp_path / "one.mat")
+    assert list(record) == ["x"]
+    assert record.fs == pytest.approx(500)
+    by_name = ss.read_record(tmp_path / "one.mat", channels={"x": "data.x [mm]"})
+    assert np.allclose(by_name["x"], np.sin(time) / 1000)
+    savemat(tmp_path / "two.mat", {"first": one, "second": other})
+    with pytest.raises(ss.errors.RecordError, match=r"first\.t"):
+        ss.read_record(tmp_path / "two.mat")

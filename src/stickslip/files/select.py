@@ -104,7 +104,7 @@ def path_parts(name: str) -> list[str]:
 
 TIME_WORDS = (
     "t", "time", "timestamp", "timestamps", "elapsed", "timeelapsed", "elapsedtime", "xvalue", "zeit", "times",
-    "seconds", "timechannel", "testtime", "runtime",
+    "seconds", "timechannel", "testtime", "runtime", "tiempo", "tempo", "tijd", "czas", "время", "时间", "時間", "시간",
 )  # fmt: skip
 
 
@@ -174,6 +174,9 @@ class Columns:
         self.columns: dict[Key, Column] = {
             (number, column.name): column for number, source in enumerate(sources) for column in source.table.columns
         }
+        # the columns of one struct are called by its fields: data.t is t
+        stems = [_stem(source.table) for source in sources]
+        self._fields = {key: key[1].removeprefix(stems[key[0]]) for key in self.columns}
         self.notes: list[str] = []
         self._by_name: dict[str, Key] = {}
         exact = [(name, (number, name)) for number, name in self.columns]
@@ -185,9 +188,10 @@ class Columns:
             else:
                 qualified = [(f"{source.path.name}:{name}", key) for name, key in exact if key[0] == number]
                 self._admit(qualified + [(f"{source.path.name}:{name}", key) for name, key in numbered])
-        self._admit([(last_part(name), key) for name, key in exact])
+        last = [(last_part(name), key) for key, name in self._fields.items()]
+        self._admit(last)
         self._admit([(f"{name} [{self.columns[key].unit}]", key) for name, key in exact])
-        self._admit([(_word_of(last_part(name)), key) for name, key in exact])  # as a check-up shows it
+        self._admit([(_word_of(name), key) for name, key in last])  # as a check-up shows it
         self._stated = {key: unit for name, unit in self.units.items() for key in self._called(name, set(channels))}
         self.constants = {name: value for source in sources for name, value in source.table.constants.items()}
 
@@ -239,7 +243,7 @@ class Columns:
     def every(self, times: Mapping[int, TimeColumn]) -> tuple[list[Wanted], list[str]]:
         """All columns that share one clock, named by the vocabulary where they match it; and notes on the others."""
         taken = {time.key for time in times.values()}
-        keys = [key for key, column in self.columns.items() if key not in taken and not is_time(column)]
+        keys = [key for key in self.columns if key not in taken and not self._is_time(key)]
         kept = self._on_one_clock(keys, times)
         others = dict.fromkeys(keys).keys() - dict.fromkeys(kept).keys()
         notes = [f"left out {self.columns[key].name} (another length or rate)" for key in keys if key in others]
@@ -268,7 +272,7 @@ class Columns:
 
     def _title(self, key: Key) -> str:
         """A channel name for a column: a word of the vocabulary where name and unit fit one."""
-        last, unit = last_part(key[1]), self.unit_of(key)
+        last, unit = last_part(self._fields[key]), self.unit_of(key)
         word = last.lower() if len(last) > 1 and unit else last  # "Friction" without unit may be a coefficient
         if word in VOCABULARY:
             try:
@@ -316,24 +320,33 @@ class Columns:
     def time(self, wanted: str | None) -> dict[int, TimeColumn]:
         """The time column of each file that has one: the one asked for, or one recognised by its name."""
         times = {}
-        for number, source in enumerate(self.sources):
+        for number in range(len(self.sources)):
             if wanted is not None:
                 key = self._asked_time(number, wanted)
             else:
-                named = [column for column in source.table.columns if is_time(column)]
-                best = min(named, key=_time_rank, default=None)
-                key = self._time_column(number, best, named) if best else None
+                mine = [key for key in self.columns if key[0] == number]
+                named = [key for key in mine if self._is_time(key)]
+                named = named or [key for key in mine[:1] if is_unit_of_time(self.columns[key].unit)]
+                best = min(named, key=self._time_rank, default=None)
+                key = self._time_column(best, named) if best else None
             if key:
                 times[number] = key
         if wanted is not None and not times:
             raise unknown("time column", wanted, [name for _, name in self.columns])
         return times
 
-    def _time_column(self, number: int, best: Column, named: Sequence[Column]) -> TimeColumn:
-        twins = [column.name for column in named if re.fullmatch(re.escape(best.name) + r"_\d+", column.name)]
-        stated = self.unit_of((number, best.name)) or unit_in_name(best.name, "s")
-        scale = parse_unit(stated or "s", expect="s").scale
-        return TimeColumn((number, best.name), scale, tuple((number, name) for name in twins), stated is None)
+    def _is_time(self, key: Key) -> bool:
+        return is_time(replace(self.columns[key], name=self._fields[key]))
+
+    def _time_rank(self, key: Key) -> tuple[int, bool]:
+        word = _word(replace(self.columns[key], name=self._fields[key]))
+        rank = 0 if word in ("t", "time") else 1 if "elapsed" in word else 2
+        return rank, self.columns[key].unit is None
+
+    def _time_column(self, best: Key, named: Sequence[Key]) -> TimeColumn:
+        twins = [key for key in named if re.fullmatch(re.escape(best[1]) + r"_\d+", key[1])]
+        stated = self.unit_of(best) or unit_in_name(self._fields[best], "s")
+        return TimeColumn(best, parse_unit(stated or "s", expect="s").scale, tuple(twins), stated is None)
 
     def _asked_time(self, number: int, wanted: str) -> TimeColumn | None:
         spec = split_spec(wanted)
@@ -365,10 +378,23 @@ def is_time(column: Column) -> bool:
     """Whether a column is time by its name, and its unit does not contradict."""
     if _word(column) not in TIME_WORDS:
         return False
+    return column.unit is None or is_unit_of_time(column.unit)
+
+
+def is_unit_of_time(unit: str | None) -> bool:
+    """Whether a unit is stated, and one of time."""
     try:
-        return column.unit is None or parse_unit(column.unit).si == "s"
+        return unit is not None and parse_unit(unit).si == "s"
     except RecordError:
         return False
+
+
+def _stem(table: Table) -> str:
+    """The name of the one struct that holds all columns, with its dot; empty where there is none."""
+    stems = {
+        match[1] if (match := re.match(r"([A-Za-z]\w*\.)[A-Za-z]", column.name)) else "" for column in table.columns
+    }
+    return stems.pop() if len(stems) == 1 and len(table.columns) > 1 else ""
 
 
 def _word(column: Column) -> str:
@@ -376,10 +402,4 @@ def _word(column: Column) -> str:
     if column.unit is None and (unit := unit_in_name(last, "s")):
         last = last.removesuffix(f"_{unit}")
     last = last.lower()
-    return re.sub(r"(_\d+$|[^a-z])", "", last)
-
-
-def _time_rank(column: Column) -> tuple[int, bool]:
-    word = _word(column)
-    rank = 0 if word in ("t", "time") else 1 if "elapsed" in word else 2
-    return rank, column.unit is None
+    return re.sub(r"[\W\d_]", "", last)
