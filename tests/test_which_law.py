@@ -503,3 +503,17 @@ def test_the_command_says_what_it_lacks(tmp_path: Path) -> None:
     answer = CliRunner().invoke(main, ["fit", str(file)])
     assert answer.exit_code == 2
     assert "--mass" in answer.output
+
+
+def test_an_exponent_that_is_not_told_may_be_any_of_its_range() -> None:
+    """Its middle less two of its deviations left out the true 0.5."""
+    chance = np.random.default_rng([11, 41])
+    rig = replace(stepped.drawn("Stribeck", chance), exponent=float(chance.choice([0.5, 1.0, 2.0])))
+    assert rig.exponent == 0.5
+    measured = stepped.record(rig, chance, noise=2e-3, cycles=8)
+    drive = ss.drives.HarmonicBase(rig.amplitude, frequency=rig.frequency)
+    begun = ss.Oscillator(law=ss.laws.Coulomb(rig.kinetic), drive=drive, **rig.stated)
+    exponent = ss.fit_law(measured, begun, law="Stribeck").parameters["exponent"]
+    assert exponent.includes(0.5)
+    assert exponent.includes(4.0)
+    assert "any from 0.5 to 4" in exponent.status

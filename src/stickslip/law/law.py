@@ -44,6 +44,7 @@ REMAINDER = "remainder"  # the kind of doubt where a law leaves more than noise
 MISFIT = 1.2  # times its noise that a law may leave of any channel and yet explain it: readings alone stray by 1 or 2 %
 METHOD = "least squares of what the sensors read, the motion simulated"
 STRAYED = 16  # draws of the noise of what drives the mass: a variance within a third
+UNTOLD = 0.5  # of what is known of a bounded parameter beforehand: one that is no surer is hardly told by the record
 UNSURE = 0.25  # of a coordinate: a wider deviation is looked at by the likelihood itself
 REACH = (0.7, 1.6, 3.2, 7.0)  # steps of the coordinate that the look takes, to three decades away
 FAINT = 1e-12  # of the sharpest direction: below it a direction is not seen at all
@@ -279,6 +280,8 @@ def _status_of(knob: Knob, word: str, values: Sequence[float], unit: str, sure: 
     if sure is None:
         return "not asked how sure"
     _, low, high = values
+    if knob.kind == "within" and low <= knob.value(knob.least) and high >= knob.value(knob.most):
+        return f"{word} can not be told from these records: any from {low:.2g} to {high:.2g} does as well"
     if not math.isinf(high) and not math.isinf(low) and (low > 0 or knob.kind != "log"):
         return "ok"
     if low > 0 and math.isinf(high):
@@ -332,7 +335,9 @@ def surety(problem: Problem, point: Point, tell: Callable[[], None]) -> Surety:
     faint = [
         k
         for k, knob in enumerate(problem.knobs)
-        if knob.kind == "above" or (sd[k] > UNSURE and knob.kind == "log" and not undone[k])
+        if knob.kind == "above"
+        or (sd[k] > UNSURE and knob.kind == "log" and not undone[k])
+        or (knob.kind == "within" and sd[k] > UNTOLD * knob.prior)
     ]
     if faint:
         part = thinned_out(problem)
@@ -342,6 +347,9 @@ def surety(problem: Problem, point: Point, tell: Callable[[], None]) -> Surety:
             low, high = (_end(part, near, k, side, allowed, tell) for side in (-1.0, 1.0))
             apart = float(point.u[k] - near.u[k])  # what thinning moved: the ends are to hold about either peak
             ends[k] = max(problem.knobs[k].least, low + min(0.0, apart)), high + max(0.0, apart)
+    for k, knob in enumerate(problem.knobs):
+        if knob.kind == "within":
+            ends[k] = np.clip(ends[k], knob.least, knob.most) + np.array([-1e-12, 1e-12])  # no end is rounded away
     return Surety(sd, freedom, ends, correlations)
 
 
@@ -440,7 +448,7 @@ def _end(problem: Problem, point: Point, k: int, side: float, allowed: float, te
         if outside == least:
             return least
         if outside == most:
-            return math.inf
+            return most if problem.knobs[k].kind == "within" else math.inf
     else:
         return side * math.inf
     for _ in range(HALVINGS):
