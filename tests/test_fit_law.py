@@ -260,3 +260,40 @@ def test_noise_of_a_base_that_moves_by_no_tone_is_in_the_intervals() -> None:
             (fit.parameters[name].value - true[name]) / fit.parameters[name].sd for name in ("kinetic", "damping")
         ]
     assert np.sqrt(np.mean(np.square(strays))) < 1.5
+
+
+def shaken(seed: int, friction: float = 1.5, noise: float = 5e-6) -> ss.Record:
+    """A mass on a spring under a force of no period, by small steps of its own: 20 us, as a turn is found to a step."""
+    from scipy.interpolate import CubicSpline
+
+    chance, fs, every, seconds = np.random.default_rng(seed), 1000.0, 50, 4
+    step, count = 1 / (fs * every), round(seconds * fs) * every
+    knots = np.arange(0.0, seconds + 0.5, 0.1)
+    force = 6 * CubicSpline(knots, chance.standard_normal(len(knots)))(step * np.arange(count + 1))
+    x, v, way = 0.0, 0.0, np.empty(count)
+    for row in range(count):
+        way[row] = x
+        pull = force[row] - 2000.0 * x - v
+        if v == 0.0 and abs(pull) <= friction:
+            continue
+        against = friction * math.copysign(1.0, v or pull)
+        after = x + step * v + step**2 / 2 * (pull - against) / 2.0
+        faster = v + step * (pull - against) / 2.0
+        faster = v + step / 4.0 * (pull - against + force[row + 1] - 2000.0 * after - faster - against)
+        x, v = after, 0.0 if v * faster < 0 else faster
+    read = {"x": way[::every], "force": force[:count:every]}
+    noises = {"x": noise, "force": 0.01}
+    return ss.Record.of({n: one + noises[n] * chance.standard_normal(len(one)) for n, one in read.items()}, fs=fs)
+
+
+def test_a_force_of_no_period_drives_the_simulation_as_it_was_recorded() -> None:
+    mass = ss.Oscillator(mass=2.0, stiffness=2000.0, damping=1.0, law=ss.laws.Coulomb(1.0), drive=ss.drives.Release())
+    fit = ss.fit_law(shaken(1), mass)
+    kinetic = fit.parameters["kinetic"]
+    assert kinetic.value == pytest.approx(1.5, rel=3e-3)
+    assert abs(kinetic.value - 1.5) < 4 * kinetic.sd
+    assert kinetic.sd < 5e-3
+    assert fit.misfit["x"] < 1.2
+    assert ss.compare_laws([shaken(2)], mass, laws=["Coulomb", "static"]).fit.parameters["kinetic"].value == (
+        pytest.approx(1.5, rel=5e-3)
+    )

@@ -94,11 +94,12 @@ class Smoothed(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Sampled:
-    """A motion of any shape, smoothed, at instants as dense as its bandwidth asks for."""
+    """A motion or force of any shape, smoothed, at instants as dense as its bandwidth asks for."""
 
     values: Array
     fs: float
     late: float
+    on: str
     contact: str
     unsure: tuple[float]
     smoothed: Smoothed
@@ -124,14 +125,14 @@ class Sampled:
         count = max(4, int(np.ceil((end - begin) * self.fs)) + 1)
         step = max((end - begin) / (count - 1), 1e-12)
         samples = (1 + share) * CubicSpline(own, self.values)(begin + step * np.arange(count + 1))
-        return Recorded(samples, fs=1 / step, contact=self.contact)
+        return Recorded(samples, fs=1 / step, on=self.on, contact=self.contact)
 
 
 def measured_drive(record: Record, given: Drive) -> DriveFrom:
     """What moves the oscillator during a record, from any instant on.
 
-    The base's motion z, or the applied force, is a tone with its harmonics where these reach its noise; any other
-    motion of the base is smoothed and followed as it was recorded. A record of neither is driven as `given`.
+    The base's motion z, or the applied force, is a tone with its harmonics where these reach its noise; any other is
+    smoothed and followed as it was recorded. A record of neither is driven as `given`.
     """
     channel = driving(record)
     return Known(given) if channel is None else _driven(record, channel, getattr(given, "contact", "ground"))
@@ -172,15 +173,9 @@ def _driven(record: Record, channel: str, contact: str) -> DriveFrom:
         share, length = share / tones[0][0], time[-1] - time[0]
         unsure = (share, share, share * np.sqrt(12) / (2 * np.pi))
         return Tones(tones, on, contact, unsure, float(time[0] + length / 2), length)
-    if on == "force":
-        raise EstimateError(
-            "an applied force that is no tone with harmonics",
-            "the force on the mass is periodic",
-            "cut the record to where it is, drive the base, or fit a curve of friction instead (fit_curve, --curve)",
-        )
     smoothed = Smoothed(len(values), record.fs, noise, best_bandwidth(values, record.fs))
     knots, rate = _knots(smoothed.apply(values - values.mean()), record.fs, noise)
-    return Sampled(knots, rate, late, contact, (share / (2**0.5 * float(np.std(values))),), smoothed)
+    return Sampled(knots, rate, late, on, contact, (share / (2**0.5 * float(np.std(values))),), smoothed)
 
 
 def _knots(smooth: Array, fs: float, noise: float) -> tuple[Array, float]:
