@@ -143,6 +143,18 @@ def test_a_mark_stands_in_the_history(tmp_path: Path) -> None:
     assert marks == [(0.02, "after 500"), (0.04, "after 1500")]
 
 
+@pytest.mark.parametrize(
+    ("factor", "told"), [(1.0, ""), (1.03, ""), (0.5, "came at 25000 Hz"), (2.0, "came at 100000 Hz")]
+)
+def test_a_rate_that_is_not_the_stated_one_is_named(factor: float, told: str, tmp_path: Path) -> None:
+    tape = Tape(Counter(), tmp_path / "run.h5")
+    for first in range(0, 400_000, 10_000):
+        after = first + 10_000
+        tape.write(Block(first, after / 50_000 / factor, counts(first, after, 2)))
+    assert ("by this computer's clock" in tape.close()) == bool(told)
+    assert told in ss.read_record(tape.finish()).history[-1].outcome
+
+
 def test_a_damaged_journal_is_read_up_to_the_damage_or_refused(tmp_path: Path) -> None:
     path = tmp_path / "run.h5.journal"
     tape = Tape(Counter(), tmp_path / "run.h5")

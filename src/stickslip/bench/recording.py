@@ -29,6 +29,7 @@ from stickslip.signals.interpolate import clock_rate, synchronise
 SYNC = 1.0  # s between two times that the journal is put on the disk itself
 SILENCE = 10.0  # s without a sample after which a device is given up
 EDGE = 1e-9  # of the range: a reading nearer to its end than this stands at it
+LONG_ENOUGH, OFF_PACE = 2.0, 0.1  # s, and part of the rate: buffers and a busy computer make less of a difference
 TOLD = 3  # gaps and clipped stretches that a sentence names
 
 Watch = Callable[[Device, Block], object]
@@ -80,6 +81,7 @@ class Seen:
         self.gaps: list[tuple[int, int]] = []  # first lost sample and how many, the first thousand
         self.clipped: dict[str, tuple[int, int]] = {}  # how many, and the first one's counter
         self.after: int | None = None  # counter of the sample that should come
+        self.came: tuple[Block, Block] | None = None  # the first block and the last, without their samples
         counts = [min(one.limit / one.scale, 1e300) for one in inputs]
         self.edges = np.array(counts)[:, None] * (1 - EDGE)
 
@@ -93,6 +95,8 @@ class Seen:
         """
         self.skip(block.first)
         self.after = block.after
+        stamp = Block(block.after, block.clock, block.samples[:, :0])
+        self.came = (self.came[0] if self.came else stamp, stamp)
         self.samples += block.samples.shape[1]
         high, low = np.fmax.reduce(block.samples, axis=1), np.fmin.reduce(block.samples, axis=1)
         for row in np.flatnonzero((high >= self.edges[:, 0]) | (low <= -self.edges[:, 0])).tolist():
@@ -127,9 +131,20 @@ class Seen:
             gaps = [f"{count} at {(first - begin) / fs:.3f} s" for first, count in self.gaps[:TOLD]]
             more = f" and {len(self.gaps) - TOLD} gaps more" if len(self.gaps) > TOLD else ""
             parts.append(f"{self.lost} samples lost ({', '.join(gaps)}{more})")
+        parts += self._pace(fs)
         for name, (count, first) in self.clipped.items():
             parts.append(f"{name} clipped in {count} samples, first at {(first - begin) / fs:.3f} s")
         return "; ".join(parts)
+
+    def _pace(self, fs: float) -> list[str]:
+        """At which rate the samples came by this computer's clock, where that is another than the device states."""
+        first, last = self.came or (None, None)
+        if first is None or last is None or last.clock - first.clock < LONG_ENOUGH:
+            return []
+        pace = float(f"{(last.first - first.first) / (last.clock - first.clock):.3g}")
+        return (
+            [] if abs(pace / fs - 1) < OFF_PACE else [f"they came at {pace:g} Hz by this computer's clock: correct fs"]
+        )
 
 
 class Tape:
