@@ -305,9 +305,6 @@ def _answer(
 ) -> JointFriction:
     if fall is not None:
         fit, terms, pull = fall.fits[fall.best], fall.terms, fall.pull
-    slides = data.logs[0].sliding
-    rows = slides.rows
-    carried = _carried(data, pull)
     status = Status(*_worries(data, fit, terms, record))
     tell = Telling(data, fit, terms, turning(record), status)
     if fall is not None:
@@ -321,9 +318,6 @@ def _answer(
     if "uneven" in terms:
         ways = [tell.sum({"viscous": 1, "uneven": by}, f"viscous friction {way}") for by, way in WAYS]
     inertia = replace(data.stated["inertia"], name="inertia") if "inertia" in data.stated else known["inertia"]
-    speed, acceleration = (slides.at(data.logs[0].turned, order) for order in (1, 2))
-    weight = pull[0] * slides.at(np.sin(data.logs[0].position))
-    weight += pull[1] * slides.at(np.cos(data.logs[0].position))
     damped = known["damping"].value * _error_rate(data) if "damping" in known else np.zeros(len(data.raw))
     return JointFriction(
         level=level.within(0.0),
@@ -342,19 +336,31 @@ def _answer(
         temperature=data.logs[0].about if "warming" in known else None,
         torque=data.raw + damped,
         gain=data.stated["kp"].value if data.source == "reference" else 0.0,
-        carried=carried,
+        carried=_carried(data, pull),
         residual=float(np.linalg.norm(fit.residual) / np.linalg.norm(data.torque)),
         condition=fit.condition,
-        time=record.start + rows / record.fs,
-        speed=speed / slides.weights,
-        measured=data.torque / slides.weights,
-        explained=(data.torque - fit.residual) / slides.weights,
-        friction=(data.torque - inertia.value * acceleration - weight) / slides.weights + damped[rows],
         left_out=left_out,
         source=data.source,
         status=status,
+        **_rows(record, data, fit, pull, inertia.value, damped),
         **_stribeck(tell, fall, pull, known.get("load")),
     )
+
+
+def _rows(
+    record: Record, data: JointData, fit: LeastSquares, pull: tuple[float, float], inertia: float, damped: Array
+) -> dict[str, Any]:
+    """Speed, torque and friction wherever it slides."""
+    slides, position = data.logs[0].sliding, data.logs[0].position
+    speed, acceleration = (slides.at(data.logs[0].turned, order) for order in (1, 2))
+    weight = pull[0] * slides.at(np.sin(position)) + pull[1] * slides.at(np.cos(position))
+    return {
+        "time": record.start + slides.rows / record.fs,
+        "speed": speed / slides.weights,
+        "measured": data.torque / slides.weights,
+        "explained": (data.torque - fit.residual) / slides.weights,
+        "friction": (data.torque - inertia * acceleration - weight) / slides.weights + damped[slides.rows],
+    }
 
 
 def _stribeck(tell: Telling, fall: Fall | None, pull: tuple[float, float], load: Estimate | None) -> dict[str, Any]:
