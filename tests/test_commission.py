@@ -100,6 +100,17 @@ def test_the_command_writes_goes_on_and_answers_single_files(tmp_path: Path) -> 
     assert "±" in ss.rig.read_rig(folder / "rig.toml").channels["load"]
 
 
+def test_a_rig_file_names_its_devices_files_from_its_own_folder(tmp_path: Path) -> None:
+    config, folder = tmp_path / "lab" / "devices.toml", tmp_path / "out"
+    config.parent.mkdir()
+    system = '[system]\nmass = 2.0\nstiffness = 2000\n[law]\nname = "Coulomb"\nkinetic = 1.0\n'
+    (config.parent / "slider.toml").write_text(system, "utf-8")
+    config.write_text('[devices.desk]\nkind = "sim"\nfs = 1000\nsystem = "slider.toml"\n', "utf-8")
+    run("commission", "--device", "desk", "--config", config, "--step", "rest", "--output", folder, "--json")
+    again = ("commission", "--device", "desk", "--config", folder / "rig.toml", "--step", "rest", "--json")
+    assert json.loads(run(*again, "--again", "rest", "--output", tmp_path / "next"))["steps"]
+
+
 def test_steps_are_listed_and_unknown_ones_refused() -> None:
     assert "Tap the mass once" in run("commission", "--list", "--step", "tap").replace("\n", " ")
     for wrong in (["--step", "nap", "--device", "sim"], []):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import importlib.util
+import os
 import re
 import time
 from collections.abc import Callable, Iterator
@@ -80,6 +81,7 @@ def commission(
     if device is None and not given and not (folder and (folder / "records").is_dir()):
         raise click.UsageError("nothing measures; name a --device (sim needs no hardware), or STEP=FILE")
     source, truth = _source(given, device, rig, folder, seed=options["seed"], anew=anew)
+    rig = _seen_from(folder, rig, config) if folder and config else rig
     if device is not None and not isinstance(device, bench.Sim):  # who is at the rig is asked, and no bar runs beside
         done = bench.commission(source, rig=rig, steps=chosen, answered=_answered)
     else:
@@ -91,6 +93,17 @@ def commission(
     deliver(done, folder and folder / "report", as_json=as_json, everything=everything)
     if folder and not as_json:
         say(f"Settings: {folder / 'rig.toml'}")
+
+
+def _seen_from(folder: Path, rig: RigSettings, config: Path) -> RigSettings:
+    """The settings with the files that devices name, as they are called from another folder than that of `config`."""
+
+    def named(value: Any) -> Any:
+        is_file = isinstance(value, str) and (config.parent / value).is_file()
+        return os.path.relpath(config.parent / value, folder) if is_file else value
+
+    tables = {name: {key: named(value) for key, value in table.items()} for name, table in rig.devices.items()}
+    return rig.model_copy(update={"devices": tables})
 
 
 def _step_and_file(text: str) -> tuple[str, Path]:
