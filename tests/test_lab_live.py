@@ -123,3 +123,5 @@ def test_what_a_page_may_not_ask_is_told_to_it(client: TestClient) -> None:
         send(page, "record")  # nothing is open
         send(page, "open", device="sim")
         assert until(page, "state", open="sim")[0]["fs"] == 4000
+        send(page, "drive", output="base", amplitude="much", frequency=2.5)
+        assert "amplitude = 'much'" in until(page, "error")[0]["error"]

@@ -336,11 +336,13 @@ async def _ordered(live: Live, request: Mapping[str, Any], watcher: asyncio.Queu
 
 
 def _order(request: Mapping[str, Any]) -> dict[str, Any]:
-    """What a page orders, cut to what is known; numbers are numbers."""
+    """What a page orders, cut to what is known; nothing is no motion."""
     order = {"want": request["want"], "text": request.get("text"), "output": request.get("output")}
     for name in ("amplitude", "frequency"):
-        value = request.get(name)
-        order[name] = float(value) if isinstance(value, int | float) and math.isfinite(value) else 0.0
+        value = request.get(name) or 0.0
+        if not (isinstance(value, int | float) and math.isfinite(value)):
+            raise ss.errors.ModelError(f"{name} = {str(value)[:20]!r}", "a motion is told in SI numbers", "correct it")
+        order[name] = float(value)
     return order
 
 
