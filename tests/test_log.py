@@ -70,7 +70,7 @@ def test_a_rig_file_states_it_and_a_file_of_its_own_goes_before(record: ss.Recor
 def test_the_load_logged_makes_a_coefficient_and_the_page_has_the_log() -> None:
     demo = ss.datasets.demo().rows(0, 8000).with_log(ENTRIES)
     findings = ss.analyze(demo, mass=2.42, stiffness=2310)
-    assert findings.normal == 2.45
+    assert findings.normal.value == 2.45
     story = ss.summary(findings)
     rows = next(table.rows for table in story.tables if table.title.startswith("What was logged"))
     assert ("Surfaces", "steel on steel, 400-grit") in rows

@@ -217,8 +217,8 @@ class Estimate(Plain):
 
         Examples
         --------
-        >>> Estimate.normal("friction coefficient", 0.3, sd=0.003, unit="1", method="").widened(0.02).sd
-        0.006708203932499369
+        >>> print(Estimate.normal("friction coefficient", 0.3, sd=0.003, unit="1", method="").widened(0.02))
+        friction coefficient 0.300 (95 %: 0.287 to 0.313)
         """
         more = share * abs(self.value)
         below, above = (times * math.hypot(end - self.value, NORMAL_95 * more) for end in self.interval)

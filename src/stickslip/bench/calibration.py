@@ -119,7 +119,7 @@ def calibrate(
     gain_sd = math.hypot(sd[0], reference_sd * fit[0])
     if not abs(fit[0]) > 3 * sd[0]:
         raise EstimateError(
-            f"{channel} changes by {np.ptp(read):.3g} {unit} over levels of {np.ptp(known):.3g} {unit}",
+            f"{channel} changes by {np.ptp(read):.3g} {unit} over levels that differ by {np.ptp(known):.3g}",
             f"{QUESTION} needs readings that follow what is put on it",
             "check the cable, the channel and the list of levels",
         )

@@ -171,6 +171,7 @@ _SPOKEN = (
     (r", or ask (?:extreme|fit)_decay\(record\)[^;.]*", ""),
     (r', or choose form="plain"[^;.]*', ""),
     (r" \(see choose_motion\)", ""),
+    (r", or overwrite=True", ""),
     (r"; use log_decrement or fit_decay instead", ""),
     (r'\brestoring="pendulum"', "--restoring pendulum"),
     (r"\brecord\.rows\((\d+), (\d+)\)", r"--rows \1:\2"),

@@ -41,7 +41,7 @@ def constant(value: float, sd: float, unit: str) -> str:
     Examples
     --------
     >>> constant(2.42, 0.0, "kg"), constant(2.42, 0.02, "kg")
-    ('2.420 kg', '2.42 kg, standard uncertainty 0.02 kg')
+    ('2.42 kg', '2.42 kg, standard uncertainty 0.02 kg')
     """
     return number(value, sd, unit) + (f", standard uncertainty {number(sd, sd, unit)}" if sd else "")
 
