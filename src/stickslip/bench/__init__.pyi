@@ -27,7 +27,6 @@ from stickslip.bench.monitor import Monitor as Monitor
 from stickslip.bench.monitor import Picture as Picture
 from stickslip.bench.monitor import answers as answers
 from stickslip.bench.recording import Acquired as Acquired
-from stickslip.bench.recording import Tape as Tape
 from stickslip.bench.recording import Trigger as Trigger
 from stickslip.bench.recording import Wanted as Wanted
 from stickslip.bench.recording import acquire as acquire
@@ -54,6 +53,7 @@ from stickslip.bench.steps import Commissioned as Commissioned
 from stickslip.bench.steps import Known as Known
 from stickslip.bench.steps import commission as commission
 from stickslip.bench.steps import step_named as step_named
+from stickslip.bench.tape import Tape as Tape
 from stickslip.bench.through import SimulatedBench as SimulatedBench
 from stickslip.bench.through import Tour as Tour
 from stickslip.bench.through import sweep_of as sweep_of
