@@ -131,6 +131,20 @@ def test_two_devices_come_onto_one_clock(tmp_path: Path) -> None:
     assert [*tmp_path.iterdir()] == [tmp_path / "run.h5"]
 
 
+def test_a_folder_that_is_gone_at_the_end_is_one_sentence(tmp_path: Path) -> None:
+    folder = tmp_path / "stick"
+    folder.mkdir()
+    tape = Tape(Counter(), folder / "run.h5")
+    tape.write(Block(0, 0.0, counts(0, 1000, 2)))
+    tape.close()
+    kept = (folder / "run.h5.journal").rename(tmp_path / "run.h5.journal")
+    tape.path = kept
+    folder.rmdir()
+    with pytest.raises(ss.errors.FormatError, match=r"can not be written.*run\.h5\.journal holds all of it"):
+        tape.finish()
+    assert len(ss.read_record(kept)) == 1000
+
+
 def test_a_mark_stands_in_the_history(tmp_path: Path) -> None:
     device = Counter()
     tape = Tape(device, tmp_path / "run.h5")

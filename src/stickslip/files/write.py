@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import shutil
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -202,8 +202,10 @@ def write_table(table: Table, path: Path) -> Path:
     require_free(path)
     units, digests = units_of(table.record), Digests()
     rows = int(table.record["rows"])
-    _require_room(path, 8 * rows * len(units) + len(json.dumps(table.record)))
-    with whole(path, replace=False) as part, h5py.File(part, "w", libver="latest") as file:
+    with ExitStack() as stack:
+        part = stack.enter_context(whole(path, replace=False))
+        _require_room(part, 8 * rows * len(units) + len(json.dumps(table.record)))
+        file = stack.enter_context(h5py.File(part, "w", libver="latest"))
         for name, unit in units.items():
             file.create_dataset(name, shape=(rows,), dtype="<f8").attrs["unit"] = unit
         first = 0
