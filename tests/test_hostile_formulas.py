@@ -225,7 +225,7 @@ def test_a_law_that_only_bears_the_name_of_another_has_its_own_formula() -> None
     assert "1.25" in first
 
 
-COSTLIER = 20.0  # times a plain formula: the four take 2 to 15 times as long
+COSTLIER = 20.0  # times a plain formula, where the machine is slow: they take up to 25 times as long, 9 s here
 COSTLY = [
     "1+" + "*".join(["exp(v/(1+v))"] * 22),
     "1+" + "*".join(f"exp(v/({k}+v))" for k in range(1, 20)),
