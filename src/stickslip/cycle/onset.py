@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from stickslip.balance.balance import ALONE, Balance
 from stickslip.balance.force import FUSIONS
 from stickslip.balance.motion import FORCES, is_measured
+from stickslip.cycle.peak import Peak, unseen
 from stickslip.cycle.slips import FAST, Stroke, Strokes, find_strokes, ringing_of, sliding_swing
 from stickslip.errors import EstimateError
 from stickslip.estimate import UNSTATED, Doubt, Estimate, Result, Status
@@ -41,8 +42,6 @@ BLUNT = {"load": 1, "a": 4, "x": 12}  # samples in which a corner of the frictio
 ROUNDED = {"load": 0.15, "a": 0.3, "x": 0.6}  # share of a sudden fall of the friction that smoothing takes off its peak
 PULLED = 0.025  # share by which smoothing and lags move the level that a pull is held against, on simulated rigs
 NOTHING = 0.9  # of its level, by which a friction that tells nothing of its peak strays after a slip
-ALIKE = 3.0  # times the other, within which the time of a peak's fall is that of the rise before it
-OVERSHOOT = 0.09  # of the level, by which a Butterworth filter of order two overshoots a jump from it to its opposite
 EARLY = "the mass moves before the friction has come near its level: the first peak holds the ring that follows"
 NEAR = 12  # samples before a slip in which the friction's rise is looked for
 CREEPS = 0.1  # of a stroke's largest speed, below which it does not slide for good
@@ -297,18 +296,18 @@ def breakaway(record: Record, *, contact: str | None = None) -> Breakaway:
     the instant and f; the pull can not be less than f then. Static friction is the pull at that instant, from a line
     through the stick's last fifth. Of a friction that was measured, or found by all sensors together, it is the largest
     value before the contact moves, which noise makes too large by two of its deviations at most: the interval's low end
-    goes as far down. It goes down to the level where the peak is as brief as the jump before it, for the sensor's own
-    filter overshoots so, and by 9 % of the level where a jump leads to it at all; its high end goes up by what the
-    friction falls in a sample, or by the whole of a brief peak, which a filter cuts. Where the mass moves before
-    friction is near its level it is the first peak thereafter.
+    goes as far down. It goes down by as much as a load cell that rises so and is let go would swing on, or to the level
+    where the peak is as brief as the jump before it, for a sensor's own filter overshoots so, at most by 9 % of the
+    level where it lasts longer; its high end goes up by what the friction rises or falls in a sample, or by the whole
+    of a brief peak, which a filter cuts. Where the mass moves before friction is near its level it is the first peak
+    thereafter.
 
     A mass that is not at rest while it sticks, ringing on a contact that gives way, bears its own inertia beside the
     pull: then it is the friction's peak, and the interval reaches from the pull on. The interval of a peak that was
     not measured has what sensors and smoothing do to it: as much as the friction rises in a sample before it (in four
     without a load cell, in twelve from the displacement alone) or 15 % (30 %, 60 %) of what it then falls, for a
-    corner is not sharper known; as much as the
-    friction strays from its level while it slides; and where a sensor's mount is not stated one and a half times as
-    much as it strays and rings after the slip.
+    corner is not sharper known; as much as the friction strays from its level while it slides; and where a sensor's
+    mount is not stated one and a half times as much as it strays and rings after the slip.
 
     Parameters
     ----------
@@ -448,10 +447,12 @@ def _by_peak(record: Record, strokes: Strokes) -> _Borne:
     """The friction's largest value before each slip, with what sensors and smoothing do to it."""
     chosen = strokes.strokes
     friction = [float(stroke.friction[stroke.slip]) for stroke in chosen]
-    noise = 2 * (record.channels["friction"].noise or noise_level(record["friction"], record.fs))
+    deviation = record.channels["friction"].noise or noise_level(record["friction"], record.fs)
+    noise = 2 * deviation
     if is_measured(record, "friction"):
-        below, above = _filtered(chosen)
-        return _Borne(chosen, friction, PEAK, max(noise, below), above)
+        peaks = [Peak.at(stroke.slip, stroke.friction, stroke.level, deviation) for stroke in chosen]
+        below, above = unseen(Peak.median(peaks))
+        return _Borne(chosen, friction, PEAK, below + noise, above)
     rows = float(np.median([stroke.slip for stroke in chosen]))
     if rows < FEW:
         raise EstimateError(
@@ -476,25 +477,6 @@ def _by_peak(record: Record, strokes: Strokes) -> _Borne:
     blurred = "told from the displacement alone, which blurs a peak" if best == "x" else "ok"
     status = Status(Doubt(unknown, UNSTATED) if unknown else blurred)
     return _Borne(chosen, friction, PEAK, max(noise, corner / 4) + stray, corner + stray, status)
-
-
-def _filtered(strokes: Sequence[Stroke]) -> tuple[float, float]:
-    """How much less and more than its measured peak a contact may have borne [N], by samples and sensor."""
-    seen = []
-    for stroke in strokes:
-        before, peak = stroke.friction[: stroke.slip], stroke.friction[stroke.slip]
-        then = np.append(stroke.friction[stroke.slip + 1 :], stroke.level)
-        rise = 1 + np.count_nonzero(np.abs(before) < HIGH * stroke.level)
-        fall = 1 + int(np.argmax(then <= (peak + stroke.level) / 2))
-        seen.append((rise, fall, peak - stroke.level, peak - then[0]))
-    rise, fall, excess, between = np.median(np.array(seen, dtype=float), axis=0).tolist()  # between: two samples
-    if excess < 0:  # still on its way to the level, or held back by what follows the speed
-        return 0.0, max(between, -excess)
-    if fall < rise / ALIKE:  # no sensor in the way is slow, then
-        return 0.0, max(between, 0.0)
-    if fall <= ALIKE * rise:  # as brief as a filter's overshoot, and as a peak that it cuts
-        return excess, max(between, excess)
-    return OVERSHOOT * float(np.median([stroke.level for stroke in strokes])), max(between, 0.0)
 
 
 def _used(record: Record, method: str) -> list[str]:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stickslip.balance.motion import is_measured
+from stickslip.cycle.peak import Peak, unseen
 from stickslip.cycle.slips import FALL, Cut, cut_at_reversals
 from stickslip.cycle.tribometer import Coefficients
 from stickslip.errors import EstimateError, RecordError
@@ -24,13 +25,7 @@ QUESTION, NAME = "the static coefficient", "coefficient of friction, static"
 AUDIBLE = 5.0  # deviations of its noise, by which a peak's fall is seen
 NEAR = 0.5  # of the sliding friction: a first peak is looked for from here on
 MOSTLY = 2 / 3  # of the strokes that show a peak
-STEP, QUIET = 0.05, 6.0  # of a peak, and deviations of noise: steps in which its sides are followed
 COARSE = 0.5  # of the sliding friction: what rises by more from a sample to the next may peak anywhere
-# How far a load cell swings beyond the friction when the contact lets go: as far as the peak lies below the line of its
-# rise where friction falls at once (parabola), 1.75 times as far where it falls slowly (sine); 0.64 of a sample's rise
-# where that is not resolved. By 80 simulated tests and 60 without a static friction.
-SWING, UNSEEN = 1.75, 0.64
-FLAT = 0.01  # of the peak: friction and cell are not told apart closer: of those 80, one lay off by 0.1 %
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -52,18 +47,13 @@ class StaticCoefficient(Result):
     time: Array
 
 
-class _Peak(NamedTuple):
-    """The first peak of a stroke: its height, the level after it, and what its sides tell [N, samples]."""
+class _Turn(NamedTuple):
+    """What a stroke begins with: its row of the record, that of the friction's first peak, and the peak."""
 
     start: int
     row: int
-    height: float
-    level: float
-    falls: float  # 1 where the friction falls after it by what would be seen
-    last: float  # rise in the sample before it
-    slope: float  # steepest rise
-    lacks: float  # what it lacks to the line of that rise
-    swing: float  # of a cell that falls as fast as this one, at most
+    peak: Peak
+    shown: bool  # whether the friction falls after it by what would be seen
 
 
 def static_coefficient(record: Record, *, coefficients: Coefficients) -> StaticCoefficient:
@@ -114,40 +104,40 @@ def static_coefficient(record: Record, *, coefficients: Coefficients) -> StaticC
     cut = cut_at_reversals(record, contact="ground", question=QUESTION)
     noise = record.channels["friction"].noise or noise_level(record["friction"], record.fs)
     begin = coefficients.time[coefficients.steady] if coefficients.steady else -math.inf
-    peaks = _peaks(cut, noise, begin)
-    middle = _Peak._make(np.median(peaks, axis=0))
+    turns = _turns(cut, noise, begin)
+    middle = Peak.median([turn.peak for turn in turns])
     _require_fine(middle, record.fs)
-    beyond = max(min(SWING * max(middle.lacks, 0.0) + UNSEEN * middle.slope, middle.swing), FLAT * middle.height)
-    loads = _loads(record, coefficients, peaks)
-    of_strokes = (np.array([peak.height for peak in peaks]) + (middle.last - beyond) / 2) / loads
+    below, above = unseen(middle)
+    loads = _loads(record, coefficients, turns)
+    of_strokes = (np.array([turn.peak.height for turn in turns]) + (above - below) / 2) / loads
     load = float(np.median(loads))
     static = mean_of_cycles(NAME, of_strokes, unit="1", method="peak after each reversal, mean of strokes", of="stroke")
     relative = math.hypot(record.channels["friction"].gain_sd, coefficients.load.sd / coefficients.load.value)
-    half = ((middle.last + beyond) / 2 + noise) / load
+    half = ((above + below) / 2 + noise) / load
     low, high = static.interval
     static = replace(static, interval=(low - half, high + half), sd=math.hypot(static.sd, half / NORMAL_95))
     if static.interval[0] * load <= middle.level:
         raise EstimateError(
             f"the friction peaks at {middle.height:.3g} N, {middle.height - middle.level:.2g} N above its level",
-            f"a load cell that is let go may swing {beyond + noise:.2g} N beyond it, by how the peak rises and falls",
+            f"a load cell that is let go may swing {below + noise:.2g} N beyond it, by how the peak rises and falls",
             "turn round more slowly, take a stiffer or lighter holder, or sample faster",
         )
-    starts = np.array([peak.start for peak in peaks])
+    starts = np.array([turn.start for turn in turns])
     return StaticCoefficient(static.widened(relative).within(0.0), of_strokes, record.start + starts / record.fs)
 
 
-def _peaks(cut: Cut, noise: float, begin: float) -> list[_Peak]:
+def _turns(cut: Cut, noise: float, begin: float) -> list[_Turn]:
     """The first peak of each stroke, where most of them show one."""
     start, fs = cut.motion.start, cut.motion.fs
     strokes = zip(cut.ways, cut.levels, strict=True)
-    peaks = [_peak(cut, stroke, level, noise) for stroke, level in strokes if start + stroke[0] / fs >= begin]
-    turned = [peak for peak in peaks if peak is not None]
-    shown = [peak for peak in turned if peak.falls]
+    turns = [_turn(cut, stroke, level, noise) for stroke, level in strokes if start + stroke[0] / fs >= begin]
+    turned = [turn for turn in turns if turn is not None]
+    shown = [turn for turn in turned if turn.shown]
     if not turned or len(shown) < MOSTLY * len(turned):
         lacking = (
             f"in {len(turned) - len(shown)} of {len(turned)} strokes the friction comes to its level without a peak"
         )
-        fall = f" of {max(FALL * turned[0].level, AUDIBLE * noise):.2g} N" if turned else ""
+        fall = f" of {max(FALL * turned[0].peak.level, AUDIBLE * noise):.2g} N" if turned else ""
         raise EstimateError(
             f"{lacking}{fall}",
             "a static coefficient above the kinetic one shows as a peak of the friction after a reversal",
@@ -156,53 +146,26 @@ def _peaks(cut: Cut, noise: float, begin: float) -> list[_Peak]:
     return shown
 
 
-def _peak(cut: Cut, stroke: tuple[int, int, int], level: float, noise: float) -> _Peak | None:
+def _turn(cut: Cut, stroke: tuple[int, int, int], level: float, noise: float) -> _Turn | None:
     """The first peak after a reversal; None where the friction does not turn round."""
     first, last, way = stroke
     begin = max(0, first - cut.motion.blur)  # a differentiated speed turns round so much later at most
     force = way * (cut.friction[begin:last] - cut.offset)
     lowest = int(np.argmin(force[: max(2, len(force) // 2)]))
-    near = np.flatnonzero(force[lowest:] >= NEAR * level)
+    rising = force[lowest:]
+    near = np.flatnonzero(rising >= NEAR * level)
     if level <= 0 or not len(near):
         return None
-    near_row = lowest + int(near[0])
-    highest = np.maximum.accumulate(force[near_row:])
-    fallen = np.flatnonzero(highest - force[near_row:] > max(FALL * level, AUDIBLE * noise))
-    end = near_row + int(fallen[0]) if len(fallen) else len(force) - 1
-    row = near_row + int(np.argmax(force[near_row : end + 1]))
-    rise = float(force[row] - force[row - 1]) if row else math.inf
-    sides = _sides(force, row, max(STEP * force[row], QUIET * noise)) or (rise, 0.0, math.inf)
-    return _Peak(begin, begin + row, float(force[row]), level, float(bool(len(fallen))), max(rise, 0.0), *sides)
+    highest = np.maximum.accumulate(rising[near[0] :])
+    fallen = np.flatnonzero(highest - rising[near[0] :] > max(FALL * level, AUDIBLE * noise))
+    end = int(near[0] + fallen[0]) if len(fallen) else len(rising) - 1
+    row = int(near[0] + np.argmax(rising[near[0] : end + 1]))
+    return _Turn(begin, begin + lowest + row, Peak.at(row, rising, level, noise), bool(len(fallen)))
 
 
-def _sides(force: Array, row: int, step: float) -> tuple[float, float, float] | None:
-    """The steepest rise before a peak, what the peak lacks to its line, and the swing by its fall; None unresolved."""
-    height = force[row]
-    marks = height - step * np.arange(0.5, max(2.5, 0.9 * height / step), 0.5)
-    before = np.array([_since(force[row::-1], mark) for mark in marks])
-    spans = before[2:] - before[:-2]
-    if not np.isfinite(spans).any():
-        return None
-    slopes = (marks[:-2] - marks[2:]) / spans
-    steepest = int(np.nanargmax(slopes))
-    slope = float(slopes[steepest])
-    lacks = (marks[steepest] + marks[steepest + 2] + slope * (before[steepest] + before[steepest + 2])) / 2 - height
-    falls = _since(force[row:], height - step) + 0.5  # the peak lies half a sample off at most, on average
-    return slope, float(lacks), (slope * falls) ** 2 / (2 * step)
-
-
-def _since(force: Array, mark: float) -> float:
-    """Samples, with parts, until a force falls below a mark; NaN where it does not."""
-    below = np.flatnonzero(force < mark)
-    if not len(below) or below[0] == 0:
-        return math.nan
-    row = int(below[0])
-    return row - 1 + float((force[row - 1] - mark) / (force[row - 1] - force[row]))
-
-
-def _require_fine(peak: _Peak, fs: float) -> None:
+def _require_fine(peak: Peak, fs: float) -> None:
     """Refuse a peak that so few samples rise to that it may have been anywhere between them."""
-    rise = max(peak.last, peak.slope)
+    rise = max(peak.before, peak.slope)
     if not rise < COARSE * peak.level:
         faster = f"sample it at {2 * fs * rise / (COARSE * peak.level):.0f} Hz or more" if rise < math.inf else ""
         raise EstimateError(
@@ -212,9 +175,9 @@ def _require_fine(peak: _Peak, fs: float) -> None:
         )
 
 
-def _loads(record: Record, coefficients: Coefficients, peaks: list[_Peak]) -> Array:
+def _loads(record: Record, coefficients: Coefficients, turns: list[_Turn]) -> Array:
     """The load while each peak is come to: as stated, or the mean of what was measured."""
     if not coefficients.measured:
-        return np.full(len(peaks), coefficients.load.value)
+        return np.full(len(turns), coefficients.load.value)
     load = np.abs(record["normal"])
-    return np.array([load[peak.start : peak.row + 1].mean() for peak in peaks])
+    return np.array([load[turn.start : turn.row + 1].mean() for turn in turns])
