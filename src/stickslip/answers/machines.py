@@ -17,8 +17,7 @@ from stickslip.cycle.joint import JointFriction, regress_joint
 from stickslip.cycle.joint_logs import regress_joint_logs
 from stickslip.cycle.joint_onset import joint_backlash, joint_breakaway
 from stickslip.cycle.sticks import find_sticks
-from stickslip.cycle.tribometer import DEFINITIONS, friction_coefficients
-from stickslip.cycle.tribometer_static import static_coefficient
+from stickslip.cycle.tribometer import DEFINITIONS, friction_coefficients, static_coefficient
 from stickslip.errors import RecordError
 from stickslip.estimate import UNTRIED, Constant, Doubt, Estimate
 from stickslip.laws.coulomb import LinearSlope
