@@ -441,8 +441,7 @@ def sensitivities(run: Trajectory, *names: str) -> Sensitivities:
         else sensitivity(run, moved, step=step, starts={}, scaled=(), outputs=OUTPUTS, opening=True)
     )
     shares = sides / (2 * scales)
-    begun = np.flatnonzero(run.exits[:-1] >= 0) + 1
-    return Sensitivities(names, _joined(motion.later[begun].T, shares), motion, shares)
+    return Sensitivities(names, _joined(motion.later[run.event_pieces].T, shares), motion, shares)
 
 
 def _joined(derivatives: Array, shares: Array) -> Array:

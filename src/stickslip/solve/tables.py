@@ -60,11 +60,11 @@ class JointMode(Mode):
         )
 
     def changes(self, before: Mode, leaving: int) -> Iterator[tuple[int, Mode, Mode]]:
-        """Each contact whose mode has changed, and the one whose exit it was."""
+        """Each contact whose mode has changed, and the one whose exit it was; by -1, a jump of the drive, of none."""
         if not isinstance(before, JointMode):
             raise TypeError(f"{before.name} is no mode of several contacts")
         for contact, (old, new) in enumerate(zip(before.parts, self.parts, strict=True)):
-            if old is not new or contact == before.owners[leaving]:
+            if old is not new or (leaving >= 0 and contact == before.owners[leaving]):
                 yield contact, old, new
 
 

@@ -217,22 +217,34 @@ class Trajectory:
 
     @cached_property
     def _changes(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        """Pieces that begin with an event, and a number for what happens there: by which exit, into which mode."""
-        changed = self.exits[:-1] >= 0
+        """Pieces that begin with an event, and a number for what happens there: by which exit, from and into which mode.
+
+        By none (-1) where the drive jumps and the mass goes on in another mode.
+        """
+        leaving, count = self.exits[:-1].astype(np.int64), len(self.table.modes)
+        before, entered = self.modes[:-1].astype(np.int64), self.modes[1:].astype(np.int64)
+        left = np.where(leaving < 0, before, np.searchsorted(self.table.first, leaving, side="right") - 1)
+        changed = (leaving >= 0) | (left != entered)
         if self.table.settling:
-            changed &= ~np.isin(self.exits[:-1], list(self.table.settling))
-        begun = np.flatnonzero(changed) + 1
-        return begun, self.exits[begun - 1].astype(np.int64) * len(self.table.modes) + self.modes[begun]
+            changed &= ~np.isin(leaving, list(self.table.settling))
+        begun = np.flatnonzero(changed)
+        return begun + 1, ((leaving[begun] + 1) * count + left[begun]) * count + entered[begun]
 
     def _words(self, code: int) -> list[tuple[str, str, int, int]]:
-        """Kind, mode, side and contact of the events that an exit into a mode stands for."""
-        leaving, entered = divmod(code, len(self.table.modes))
-        left = int(np.searchsorted(self.table.first, leaving, side="right")) - 1
+        """Kind, mode, side and contact of the events that an exit from a mode into another stands for."""
+        count = len(self.table.modes)
+        leaving, left, entered = code // count**2 - 1, code // count % count, code % count
+        number = leaving - int(self.table.first[left]) if leaving >= 0 else -1
         before, after = self.table.modes[left], self.table.modes[entered]
         return [
             ("reversal" if old.side * new.side < 0 else new.kind, new.name, new.side, contact)
-            for contact, old, new in after.changes(before, leaving - int(self.table.first[left]))
+            for contact, old, new in after.changes(before, number)
         ]
+
+    @property
+    def event_pieces(self) -> NDArray[np.int64]:
+        """Numbers of the pieces that begin with an event."""
+        return self._changes[0]
 
     def state(self, time: float) -> dict[str, float]:
         """The exact state at one instant: x [m], v [m/s], the law's memory, a [m/s^2], friction [N], and the mode.
