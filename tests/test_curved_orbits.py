@@ -159,3 +159,22 @@ def test_a_law_with_a_lag_is_refused_in_words(question: object) -> None:
     law = ss.laws.TimeDelay(ss.laws.LinearSlope(1.0, slope=1.0), lag=0.1)
     with pytest.raises(ss.errors.ModelError, match="time lag"):
         question(SMOOTH.having(law=law))  # type: ignore[operator]
+
+
+@pytest.mark.parametrize("start", [{}, {"x": 8e-3}], ids=["from the belt's start", "from equilibrium"])
+@pytest.mark.parametrize(
+    "law",
+    [
+        ss.laws.Coulomb(2.0),
+        ss.laws.Coulomb(2.0, static=3.0),
+        ss.laws.FrictionCurve(lambda v: 2.0 + 0.0 * v, static=3.0),
+        ss.laws.LuGre(2.0, 2.0, speed=0.1, stiffness=1e5, damping=300.0),
+    ],
+    ids=lambda law: type(law).__name__,
+)
+def test_a_belt_that_is_fast_enough_leaves_steady_sliding(law: object, start: dict[str, float]) -> None:
+    """It was said not to be periodic, with the displacement of the beginning for an amplitude."""
+    system = ss.Oscillator(1.3, 250.0, law, ss.drives.Belt(0.16), damping=0.721)
+    orbit = ss.steady_state(system, start=start)
+    assert orbit.status == "steady sliding"
+    assert orbit.amplitude == pytest.approx(2.0 / 250.0, rel=1e-5)

@@ -38,11 +38,11 @@ class SteadyState:
     Attributes
     ----------
     status : str
-        "unique" (isolated and stable; from other starts there may be others), "unstable", "grazing" (an
-        exit is met at a tangent: no derivative, no multipliers), "not unique" (a family of orbits: a
-        multiplier is 1), "rest" (held all the time), "unbounded" (the amplitude grows without end),
-        "quasi-periodic" (several frequencies without a common period), "chaotic" (neighbours part for good), "not
-        periodic" (no orbit found, and neither of these).
+        "unique" (isolated and stable; from other starts there may be others), "unstable", "grazing" (an exit is met at
+        a tangent: no derivative, no multipliers), "not unique" (a family of orbits: a multiplier is 1), "rest" (held
+        all the time), "steady sliding" (on a belt or under a ramp: nothing else is left), "unbounded" (the amplitude
+        grows without end), "quasi-periodic" (several frequencies without a common period), "chaotic" (neighbours part
+        for good), "not periodic" (no orbit found, and neither of these).
     period : float
         Period [s]; of several periods of the drive where `order` is above 1.
     order : int

@@ -165,7 +165,7 @@ def self_excited(system: System, table: Table, start: Mapping[str, float | str],
             if np.all(gap <= 1e-9 * np.max(np.abs(motion.states[first : last + 1, own]), axis=0)):
                 return _between(motion, first, last)
         if not ends or motion.starts[ends[-1]] < duration / 2:
-            orbit = _without_sticks(motion)
+            orbit = _slid_on(motion) or _without_sticks(motion)
             if orbit is not None:
                 return orbit
         duration *= 2
@@ -176,9 +176,22 @@ def self_excited(system: System, table: Table, start: Mapping[str, float | str],
     )
 
 
+def _slid_on(motion: Trajectory) -> SteadyState | None:
+    """Steady sliding, where nothing else is left of a motion in its last natural period."""
+    system, mode = motion.system, motion.table.modes[motion.modes[-1]]
+    if not system.frequency or mode.side == 0 or motion.durations[-1] < 1 / system.frequency:
+        return None
+    times = motion.duration - np.linspace(1.0, 0.0, LOOKED) / system.frequency
+    v, slip = motion.sample(times, ("v", "slip"))[0]
+    if np.ptp(v) > STEADY * np.max(np.abs(slip)):
+        return None
+    lasting = stretch(system, motion.table, *motion.end(), span=(0.0, 1 / system.frequency))
+    none = np.full(motion.table.physical, np.nan, dtype=np.complex128)
+    return SteadyState("steady sliding", math.nan, 0, lasting, none)
+
+
 def _without_sticks(motion: Trajectory) -> SteadyState | None:
-    """The orbit that a motion ends in which does not stick; one of linear modes has events, since nothing else bounds
-    it, and one of a curved law moves by more than what steady sliding leaves of it."""
+    """The orbit that a motion ends in which does not stick; one of linear modes has events: nothing else bounds it."""
     curved, system = isinstance(motion, CurvedTrajectory), motion.system
     if curved and not system.frequency:
         return None
@@ -187,10 +200,6 @@ def _without_sticks(motion: Trajectory) -> SteadyState | None:
     if cycle is None or (len(cycle[0].modes) == 1 and not curved):
         return None
     orbit, across = cycle
-    if curved:
-        v, slip = orbit.sample(np.linspace(0.0, orbit.duration, LOOKED) * (1 - 1e-12), ("v", "slip"))[0]
-        if np.ptp(v) <= STEADY * np.max(np.abs(slip)):
-            return None
     multipliers = np.append(across, 0.0)  # along the orbit nothing grows: its phase is free
     return SteadyState("unique" if abs(across[0]) < 1 else "unstable", orbit.duration, 1, orbit, multipliers)
 
@@ -202,6 +211,8 @@ def _between_turns(system: System, table: Tape, state: Array, mode: int, duratio
         motion = stretch(system, table, state, mode, span=(0.0, duration))
         assert isinstance(motion, CurvedTrajectory)
         turns = _turns(motion)
+        if (steady := _slid_on(motion)) is not None:
+            return steady
         if len(turns) < 2 or table.motion.base or table.motion.tones:
             break
         values, pieces = motion.sample(turns, ("state",))

@@ -217,9 +217,9 @@ class Trajectory:
 
     @cached_property
     def _changes(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        """Pieces that begin with an event, and a number for what happens there: by which exit, from and into which mode.
+        """Pieces that begin with an event, and a number for what happens there.
 
-        By none (-1) where the drive jumps and the mass goes on in another mode.
+        By which exit, from which mode, into which; by none (-1) where the drive jumps and the mass goes on in another mode.
         """
         leaving, count = self.exits[:-1].astype(np.int64), len(self.table.modes)
         before, entered = self.modes[:-1].astype(np.int64), self.modes[1:].astype(np.int64)
