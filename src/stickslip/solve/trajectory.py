@@ -219,7 +219,7 @@ class Trajectory:
     def _changes(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         """Pieces that begin with an event, and a number for what happens there.
 
-        By which exit, from which mode, into which; by none (-1) where the drive jumps and the mass goes on in another mode.
+        By which exit, from which mode, into which; by none (-1) where the drive jumps and the mass goes on in another.
         """
         leaving, count = self.exits[:-1].astype(np.int64), len(self.table.modes)
         before, entered = self.modes[:-1].astype(np.int64), self.modes[1:].astype(np.int64)
