@@ -319,6 +319,9 @@ def test_what_has_no_form_is_refused() -> None:
     for format in FORMATS:
         with pytest.raises(ModelError, match=r"has no formula; export the contact on it"):
             ss.laws.export_law(rough, format=format)
+    for format in ("modelica", "simulink"):
+        with pytest.raises(ModelError, match=r"LinearSlope falls below zero before 0\.5\d* m/s"):
+            ss.laws.export_law(ss.laws.LinearSlope(1.1, -2.0), format=format)
     behind = ss.laws.InSeries(ss.laws.StateVariable(1.1, rate=100.0), stiffness=192000)
     with pytest.raises(ModelError, match="rate of its own friction"):
         ss.laws.export_law(behind, format="c")

@@ -159,3 +159,10 @@ def test_what_would_jump_is_refused(call, words: str) -> None:  # type: ignore[n
     with pytest.raises(ModelError) as refused:
         call()
     assert words in str(refused.value)
+
+
+def test_elements_that_are_no_list_are_refused_in_a_sentence() -> None:
+    with pytest.raises(
+        ModelError, match=r"stiffnesses = 2.0; stiffnesses are a list of numbers; write stiffnesses=\[2.0\]"
+    ):
+        ElastoSlip(2.0, [1.0])  # type: ignore[arg-type]

@@ -10,7 +10,7 @@ import inspect
 import math
 import re
 import textwrap
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import MISSING, Field, dataclass, field, fields, is_dataclass, replace
 from typing import Any, TypeVar, dataclass_transform, overload
 
@@ -48,6 +48,10 @@ class Parameter:
         if self.choices and value not in self.choices:
             raise ModelError(
                 f"{name} = {value!r}", f"{self.name}: {' or '.join(map(repr, self.choices))}", f"choose one as {name}="
+            ).of(name)
+        if self.size == "row" and (isinstance(value, str) or not isinstance(value, Iterable)):
+            raise ModelError(
+                f"{name} = {value!r}", f"{self.name} are a list of numbers", f"write {name}=[{value!r}]"
             ).of(name)
         if self.unit and self.size != "array":
             for number in value if self.size == "row" else [value]:

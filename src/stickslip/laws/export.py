@@ -310,8 +310,19 @@ def _table(law: Law | CurvedLaw) -> Tabulated | None:
         return law if isinstance(law, Tabulated) else None
     scale = getattr(law, "speed", FASTEST / WIDE)
     speeds = [WIDE * scale * (number / (TABLE - 1)) ** 2 for number in range(TABLE)]
-    ((_, curve),) = law.branches()
-    return Tabulated.of(lambda speed: lifted(curve(lifted(speed))).at(), speeds, law.breakaway)
+    ((_, branch),) = law.branches()
+
+    def curve(speed: float) -> float:
+        return lifted(branch(lifted(speed))).at()
+
+    below = next((speed for speed in speeds if curve(speed) < 0), None)
+    if below is not None:
+        raise ModelError(
+            f"the friction of {type(law).__name__} falls below zero before {below:.3g} m/s",
+            f"a table over the speed, here to {speeds[-1]:.3g} m/s, has friction that brakes",
+            "give a law that levels off, or export it to C or Python",
+        )
+    return Tabulated.of(curve, speeds, law.breakaway)
 
 
 # MuJoCo gives way to friction by a spring and damper of 20 ms, so that a joint creeps; for a shorter time than two of
