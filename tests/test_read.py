@@ -212,6 +212,22 @@ def test_without_a_map_names_that_fit_become_channels(csv: Callable[..., Path]) 
     assert record["force"][0] == 2000
 
 
+@pytest.mark.parametrize(
+    ("titles", "name", "note"),
+    [
+        ("t [s],x [N]", "x_N", "'x' is x_N: N is no unit of x"),
+        ("t [s],x [mm],x [mm]", "x_2", "another column is called x: it is x_2"),
+    ],
+)
+def test_a_title_that_is_not_what_it_seems_is_in_the_history(
+    csv: Callable[..., Path], titles: str, name: str, note: str
+) -> None:
+    rows = [",".join([f"{row / 100}"] + [f"{row % 7}"] * titles.count("x")) for row in range(20)]
+    record = ss.read_record(csv("\n".join([titles, *rows, ""])))
+    assert name in record
+    assert record.history[0].outcome == f"20 samples at 100 Hz; {note}"
+
+
 def test_a_unit_nobody_states_is_taken_as_si_and_said(csv: Callable[..., Path]) -> None:
     record = ss.read_record(csv("t,x\n0,1\n1,2\n"))
     assert record["x"][0] == 1

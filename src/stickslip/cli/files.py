@@ -39,6 +39,7 @@ def check(file: str, **options: Any) -> None:
         with collected(refused, group):
             record = ss.answers.read_mended(group, rig=rig)
             say(f"{record!r}")
+            say(f"- {spoken(f'read: {record.history[0].outcome}')}")
             for fault in [str(fault) for fault in record.check()] or ["nothing wrong was found"]:
                 say(f"- {spoken(fault)}")
     for error in refused[:-1]:

@@ -34,8 +34,10 @@ def titled(table: Table) -> Table:
     names = unique([name for name, _ in parts])
     written = dict(zip(names, (column.name for column in table.columns), strict=True))
     columns, notes = [], list(table.notes)
-    for name, (_, unit), column in zip(names, parts, table.columns, strict=True):
+    for name, (title, unit), column in zip(names, parts, table.columns, strict=True):
         columns.append(replace(column, name=name, unit=column.unit or unit))
+        if name != title:
+            notes.append(f"another column is called {title}: it is {name}")
         if unit and column.unit not in (None, unit):
             notes.append(f"{name} is titled in {unit}, stated in {column.unit}")
     if names == list(written.values()):
@@ -247,10 +249,14 @@ class Columns:
         kept = self._on_one_clock(keys, times)
         others = dict.fromkeys(keys).keys() - dict.fromkeys(kept).keys()
         notes = [f"left out {self.columns[key].name} (another length or rate)" for key in keys if key in others]
-        titles = unique([self._title(key) for key in kept])
+        titles = [self._title(key) for key in kept]
         wanted = []
-        for name, key in zip(titles, kept, strict=True):
+        for name, title, key in zip(unique(titles), titles, kept, strict=True):
             column = self.columns[key]
+            if name != title:
+                notes.append(f"another column is called {title}: it is {name}")
+            elif (word := self._word(key)) in VOCABULARY and word != name:
+                notes.append(f"'{column.name}' is {name}: {self.unit_of(key)} is no unit of {word}")
             stated = self.units.get(name, self.unit_of(key))
             channel, unit = self._channel(name, Spec(column.name, column.name, None, ""), stated)
             wanted.append(Wanted(channel, unit.scale, {key: 1.0}, unit.zero / unit.scale))
@@ -272,8 +278,7 @@ class Columns:
 
     def _title(self, key: Key) -> str:
         """A channel name for a column: a word of the vocabulary where name and unit fit one."""
-        last, unit = last_part(self._fields[key]), self.unit_of(key)
-        word = last.lower() if len(last) > 1 and unit else last  # "Friction" without unit may be a coefficient
+        last, unit, word = last_part(self._fields[key]), self.unit_of(key), self._word(key)
         if word in VOCABULARY:
             try:
                 described(word, channel_unit(unit, word).si if unit else VOCABULARY[word].units[0])
@@ -282,6 +287,11 @@ class Columns:
                 last = f"{last}_{unit}"
         name = _word_of(last)
         return f"{name}_" if name in VOCABULARY else name
+
+    def _word(self, key: Key) -> str:
+        """What a column is called; "Friction" without unit may be a coefficient."""
+        last = last_part(self._fields[key])
+        return last.lower() if len(last) > 1 and self.unit_of(key) else last
 
     def _channel(self, name: str, spec: Spec, stated: str | None) -> tuple[Channel, Unit]:
         """The channel's description, and its unit, which leads to SI."""
