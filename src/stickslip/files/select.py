@@ -253,9 +253,7 @@ class Columns:
         wanted = []
         for name, title, key in zip(unique(titles), titles, kept, strict=True):
             column = self.columns[key]
-            if name != title:
-                notes.append(f"another column is called {title}: it is {name}")
-            elif (word := self._word(key)) in VOCABULARY and word != name:
+            if (word := self._word(key)) in VOCABULARY and word != title:
                 notes.append(f"'{column.name}' is {name}: {self.unit_of(key)} is no unit of {word}")
             stated = self.units.get(name, self.unit_of(key))
             channel, unit = self._channel(name, Spec(column.name, column.name, None, ""), stated)

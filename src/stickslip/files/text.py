@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import date
@@ -151,6 +151,7 @@ def read(path: Path, options: Options) -> Table:
     columns = tuple(Column(layout.names[index], layout.units[index]) for index in layout.used)
     notes = [f"decimal sign '{layout.decimal}'"] if layout.decimal != "." else []
     notes += [f"clock times in {layout.names[index]} as seconds since the first" for index in sorted(layout.clocks)]
+    notes += [f"another column is called {title}: it is {name}" for name, title in layout.again.items()]
 
     stop, cut = ending(path, layout)
 
@@ -325,6 +326,8 @@ class Layout:
         Lines before it.
     names : tuple of str
         One per column, unique.
+    again : mapping of str to str
+        Of those that had to be made unique, what the header calls them.
     units : tuple of str or None
         One per column.
     clocks : frozenset of int
@@ -340,6 +343,7 @@ class Layout:
     offset: int
     header: int
     names: tuple[str, ...]
+    again: Mapping[str, str]
     units: tuple[str | None, ...]
     clocks: frozenset[int]
     used: tuple[int, ...]
@@ -415,6 +419,7 @@ def find_layout(head: bytes, whole: bool, options: Options, name: str) -> Layout
     comments = [line.lstrip()[0] for line in lines if line.lstrip().startswith(("#", "%"))]
     names, units = _header(lines[:start], delimiter, width)
     used = tuple(i for i in range(width) if names[i] or any(row[i] for row in rows))
+    own = unique([name or f"c{index + 1}" for index, name in enumerate(names)])
     clocks = frozenset(i for i in used if any(CLOCK.fullmatch(row[i]) for row in rows))
     return Layout(
         encoding,
@@ -423,7 +428,8 @@ def find_layout(head: bytes, whole: bool, options: Options, name: str) -> Layout
         comments[0] if comments else None,
         mark + sum(len(line.encode(encoding, "replace")) for line in lines[:start]),
         start,
-        tuple(unique([name or f"c{index + 1}" for index, name in enumerate(names)])),
+        tuple(own),
+        {name: title for name, title in zip(own, names, strict=True) if title and name != title},
         tuple("s" if index in clocks else unit for index, unit in enumerate(units)),
         clocks,
         used,
