@@ -311,3 +311,13 @@ def test_the_program_starts_and_simulates_as_a_process() -> None:
     assert result.returncode == 0, result.stderr
     assert json.loads(result.stdout)["status"] == "complete"
     assert result.stderr == ""
+
+
+@pytest.mark.parametrize(
+    ("cycles", "words"),
+    [(20, "In the last 4 cycles the mass sticks twice a cycle, 26 %"), (0.5, "The mass sticks once in 200 ms, ")],
+)
+def test_the_headline_says_of_which_time_it_is(cycles: float, words: str) -> None:
+    drive = ss.drives.HarmonicBase(6.5e-4, frequency=2.5)
+    run = ss.simulate(ss.Oscillator(2.42, 2310, ss.laws.Coulomb(1.1), drive), cycles=cycles)
+    assert simulation.holding(run).startswith(words)
