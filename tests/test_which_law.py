@@ -112,6 +112,15 @@ def test_the_best_law_says_what_it_leaves() -> None:
     assert "Confidence" not in comparison.verdict
 
 
+def test_a_damper_alone_is_no_dry_friction_of_any_law() -> None:
+    """It was said that the laws can not be told apart, and not that there is no friction to tell."""
+    rig = stepped.Rig("viscous", 2.42, 2310.0, 1.0, 4e-4, 8.7, slope=3.0)
+    data = stepped.record(rig, np.random.default_rng(5), noise=1e-3, cycles=12)
+    comparison = ss.compare_laws([data], ss.Oscillator(2.42, 2310.0, ss.laws.Coulomb(1.0), damping=1.0))
+    assert comparison.verdict.startswith("No dry friction is found in these records, ")
+    assert comparison.fit.parameters["kinetic"].interval[0] == 0
+
+
 def test_a_damper_that_is_understated_makes_no_other_law() -> None:
     """Held at a tenth of its value it passed for a compliant contact, at a confidence of 0.999."""
     drive = ss.drives.HarmonicBase(1.1e-3, frequency=5.0)

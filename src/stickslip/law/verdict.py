@@ -497,6 +497,11 @@ def _sentences(
     if len(laws) == 1:  # nothing was compared: how well it explains the records is all there is to say
         yield f"{best.name}, the only law tried, {remainder}, {times(remainder.over)} the noise of {remainder.channel}."
         return
+    levels = [fit.parameters[name] for name in ("kinetic", "static") if name in fit.parameters]
+    if levels and all(level.interval[0] <= 0 for level in levels):
+        most = told(max(level.interval[1] for level in levels), levels[0].unit)
+        yield f"No dry friction is found in these records, {most} at most: a damper explains them under any law."
+        return
     kept = [law.name for law in laws if law.kept]
     rivals = [law for law in laws if law.family != best.family and not law.limit]
     limits = [law.name for law in laws if law.limit]
