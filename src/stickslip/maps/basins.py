@@ -18,7 +18,7 @@ from stickslip.estimate import Doubt, Estimate, Status
 from stickslip.oscillator import Structure
 from stickslip.parameters import PARTS
 from stickslip.record.metadata import labelled_arrays
-from stickslip.solve.periodic import steady_state
+from stickslip.solve.periodic import aperiodic, settled_on
 from stickslip.solve.poincare import SteadyState, Table, alike, extent, lap, tables
 from stickslip.solve.simulate import opening
 from stickslip.solve.tables import Array, System
@@ -242,6 +242,7 @@ def regime(orbit: SteadyState) -> str:
     Examples
     --------
     >>> from stickslip.scenarios import forced
+    >>> from stickslip import steady_state
     >>> regime(steady_state(forced(0.1, 0.4)))
     '2 + 4 stops'
     """
@@ -258,7 +259,7 @@ def regime(orbit: SteadyState) -> str:
 
 def settled(system: System, start: Start, *, transient: int, orders: int) -> Attractor:
     """What a start leads to."""
-    orbit = steady_state(system, start=start, transient=transient, orders=orders)
+    orbit, _ = settled_on(system, start, transient=transient, orders=orders, patience=16 * LOOKS)
     if orbit.status == "unstable":
         orbit = replace(orbit, status="not periodic", order=0, period=math.nan)
     for turn in range(PATIENCE + 1):
@@ -272,10 +273,10 @@ def settled(system: System, start: Start, *, transient: int, orders: int) -> Att
         if _is_still(course):
             orbit = replace(orbit, status="rest", order=1, period=table.motion.period)
         elif turn == PATIENCE or not _approaches(points):
-            return Attractor(orbit, points[:-1])
+            return Attractor(aperiodic(system, table, *course.end()), points[:-1])
         else:
             onwards = as_start(table, *course.end())
-            orbit = steady_state(system, start=onwards, transient=LOOKS, orders=orders, patience=LOOKS)
+            orbit, _ = settled_on(system, onwards, transient=LOOKS, orders=orders, patience=LOOKS)
     return Attractor(orbit, orbit.orbit.section()[: max(orbit.order, 1)])
 
 

@@ -216,12 +216,26 @@ def steady_state(
             "they are whole numbers of periods, at least 1",
             "correct them",
         )
+    orbit, passed = settled_on(system, start or {}, transient=transient, orders=orders, patience=patience)
+    if orbit.status != "not periodic" or not math.isfinite(orbit.orbit.table.motion.period):
+        return orbit
+    motion = aperiodic(system, orbit.orbit.table, orbit.orbit.states[0], int(orbit.orbit.modes[0]))
+    return passed if passed is not None and motion.status == "not periodic" else motion
+
+
+def settled_on(
+    system: System, start: Mapping[str, float | str], *, transient: int, orders: int, patience: int
+) -> tuple[SteadyState, SteadyState | None]:
+    """As :func:`steady_state`; of a motion that repeats with no period of the drive it is not looked which it is.
+
+    Beside it an unstable orbit, which Newton's method closes where a motion only passes.
+    """
     table = tables(system)
     if not math.isfinite(table.motion.period):
         if table.motion.tones and table.motion.knots is None and not table.motion.base.get("way"):
-            return tonal(system, table, start or {}, (transient, patience))
-        return self_excited(system, table, start or {}, transient)
-    state, mode = opening(table, start or {})
+            return tonal(system, table, start, (transient, patience)), None
+        return self_excited(system, table, start, transient), None
+    state, mode = opening(table, start)
     laps, sizes, first = 0, [], _iterate(system, table, state, mode, 1)[2]
     count, passed = transient, None
     resonant = _repeats_freely(table)
@@ -235,19 +249,18 @@ def steady_state(
         if orbit is None and resonant:
             orbit = _family(system, table, state, mode, size, orders)
         if orbit is not None and orbit.status != "unstable":
-            return orbit
-        passed = passed or orbit  # an unstable orbit, which Newton's method closes where a motion only passes
+            return orbit, passed
+        passed = passed or orbit
         count = laps
     growing = (
         sizes[-1] > RUNAWAY * first
         or (resonant and _grows_evenly(sizes))
         or (len(sizes) > 3 and all(later > 1.5 * sooner for sooner, later in pairwise(sizes[1:])))
     )
+    none = np.full(table.physical, np.nan, dtype=np.complex128)
     if growing:
-        none = np.full(table.physical, np.nan, dtype=np.complex128)
-        return passed or SteadyState("unbounded", math.nan, 0, lap(system, table, state, mode, 1), none)
-    motion = aperiodic(system, table, state, mode)
-    return passed if passed is not None and motion.status == "not periodic" else motion
+        return passed or SteadyState("unbounded", math.nan, 0, lap(system, table, state, mode, 1), none), passed
+    return SteadyState("not periodic", math.nan, 0, beats(system, table, state, mode, 1), none), passed
 
 
 def attractors(
