@@ -167,3 +167,10 @@ def test_a_low_tone_that_begins_and_ends_is_no_hum() -> None:
     loudest = ss.find_squeaks(ss.Record.of({"sound": tone + noise}, fs=44100.0, units={"sound": "Pa"})).loudest
     assert loudest.frequency == pytest.approx(100, abs=0.5)
     assert "mains" not in loudest.evidence
+
+
+@pytest.mark.parametrize("fs", [16000.0, 48000.0, 96000.0])
+def test_white_noise_is_listened_to_at_any_rate(fs: float) -> None:
+    """A short stretch at a low line was looked for at 0 Hz, and a filter refused that."""
+    noise = 0.01 * np.random.default_rng(0).standard_normal(int(3 * fs))
+    assert {burst.kind for burst in ss.find_squeaks(ss.Record.of({"sound": noise}, fs=fs)).bursts} == {"noise"}

@@ -283,7 +283,7 @@ class Hearing:
             power, step = _spectrum(self.values[first:last], self.fs)
             low, high = max(line - bin_, NEARLY * self.band[0]), max(line, self.band[0]) + bin_
             near = _bins(step, (low + high) / 2, (high - low) / 2, len(power))
-            line = float(near.start + np.argmax(power[near])) * step
+            line = max(float(near.start + np.argmax(power[near])) * step, low)  # a short stretch's bins are wide
             own = max(OF_MAINS * line, self.fs / (last - first))
             near_hums = [hum for hum in self.hums if abs(hum - line) < own]
             line = min(near_hums, key=lambda hum: abs(hum - line), default=line)
