@@ -174,3 +174,19 @@ def test_white_noise_is_listened_to_at_any_rate(fs: float) -> None:
     """A short stretch at a low line was looked for at 0 Hz, and a filter refused that."""
     noise = 0.01 * np.random.default_rng(0).standard_normal(int(3 * fs))
     assert {burst.kind for burst in ss.find_squeaks(ss.Record.of({"sound": noise}, fs=fs)).bursts} == {"noise"}
+
+
+@pytest.mark.parametrize("count", [1, 31])
+def test_clicks_are_counted_and_are_no_burst(count: int) -> None:
+    """It was said that nothing sounds, of 31 clicks 44 dB above the noise."""
+    fs = 44100
+    values = 0.003 * np.random.default_rng(1).standard_normal(4 * fs)
+    t = np.arange(1323) / fs
+    for second in np.linspace(0.05, 3.9, count):
+        values[round(second * fs) :][: t.size] += 0.5 * np.exp(-t / 0.0014) * np.sin(2 * np.pi * 2100 * t)
+    findings = ss.analyze_squeaks(ss.Record.of({"sound": values}, fs=fs))
+    assert not findings.squeaks.bursts
+    assert findings.squeaks.clicks == count
+    assert (
+        ss.summary(findings).answer == f"Nothing squeaks: {count} click{'s' if count > 1 else ''}, and no burst in 4 s."
+    )

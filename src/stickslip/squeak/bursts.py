@@ -137,6 +137,8 @@ class Squeaks(Result):
     threshold : float
         Level [dB] from which on a squeak of a tenth of a second and a hundred cycles would have been heard, at any
         frequency in the band (19 in 20); NaN where the channel is clipped.
+    clicks : int
+        How often something sounded for too short a time to be a burst.
     """
 
     bursts: tuple[Squeak, ...]
@@ -148,6 +150,7 @@ class Squeaks(Result):
     band: tuple[float, float] = (0.0, math.inf)
     cautions: tuple[str, ...] = ()
     threshold: float = math.nan
+    clicks: int = 0
 
     @property
     def kind(self) -> str:
@@ -207,7 +210,7 @@ class Squeaks(Result):
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON."""
-        names = ("channel", "kind", "squeaking", "reference", "forcing", "threshold", "bursts", "notes")
+        names = ("channel", "kind", "squeaking", "reference", "forcing", "threshold", "clicks", "bursts", "notes")
         history = [str(step) for step in self.record.history]
         return {**plain({name: getattr(self, name) for name in names}), "history": history}
 
@@ -302,7 +305,16 @@ def find_squeaks(
         else 10 * math.log10(max(hearing.threshold, 1e-300) / REFERENCES.get(unit, 1.0) ** 2)
     )
     return Squeaks(
-        tuple(bursts), name, reference_of(unit), motion.frequency, record, notes, (low, high), cautions, heard
+        tuple(bursts),
+        name,
+        reference_of(unit),
+        motion.frequency,
+        record,
+        notes,
+        (low, high),
+        cautions,
+        heard,
+        hearing.clicks,
     )
 
 

@@ -129,9 +129,18 @@ class Hearing:
         tonal = (_decibel(strong) - _decibel(beside) > STANDS_OUT) & (np.minimum(own / whole, 1) > OF_POWER)
         return self._refined(peak), _decibel(np.asarray(lobe)), tonal & (strong > 0)
 
-    @cached_property
+    @property
     def spans(self) -> tuple[Span, ...]:
         """The bursts: creaks and broad ones where the sound is not tonal, tonal ones elsewhere."""
+        return self._heard[0]
+
+    @property
+    def clicks(self) -> int:
+        """How often something is heard for no longer than a window, apart from the bursts."""
+        return self._heard[1]
+
+    @cached_property
+    def _heard(self) -> tuple[tuple[Span, ...], int]:
         active, throughout = self._active()
         least = 2 * self.size if throughout else 0  # in noise, two windows that share no sample have to agree
         tonal = [
@@ -142,7 +151,7 @@ class Hearing:
         covered = np.zeros(len(active), dtype=bool)
         for part in tonal:
             covered[self._frame(part.first) : self._frame(part.last) + 1] = True
-        broad = []
+        broad, clicks = [], 0
         for first, last in _joined(_runs(active), round(TOGETHER * self.fs / self.hop)):
             rows = self._rows(first, last)
             rate, wander = pulse_train(self.values[rows[0] : rows[1]], self.fs)
@@ -153,7 +162,8 @@ class Hearing:
             pulses, long = not math.isnan(rate), last - first > OVERLAP
             if covered[first:last].mean() < TONAL and (pulses or (long and not background)):
                 broad.append(Span(*rows, False, rate=rate, wander=wander, throughout=bool(active.mean() > 0.97)))
-        return (*(part for part in tonal if self._stands(part, broad)), *broad)
+            clicks += not long and not pulses and not covered[first:last].any()
+        return (*(part for part in tonal if self._stands(part, broad)), *broad), clicks
 
     def _stands(self, part: Span, broad: list[Span]) -> bool:
         """Whether a tone is a burst by itself: it lasts, or no broad burst holds it."""

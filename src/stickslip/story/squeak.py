@@ -84,7 +84,9 @@ def _headline(findings: Findings) -> Iterator[str]:
     heard = squeaks.of("squeak", "squeal")
     where = "" if squeaks.channel == "sound" else f" in the channel {squeaks.channel}"
     if not squeaks.bursts:
-        yield f"Nothing sounds{where}: no burst in {record.duration:.4g} s."
+        clicks = f"{squeaks.clicks} click{'s' if squeaks.clicks > 1 else ''}"
+        what = f"Nothing squeaks{where}: {clicks}, and" if squeaks.clicks else f"Nothing sounds{where}:"
+        yield f"{what} no burst in {record.duration:.4g} s."
         yield from _power(squeaks)
         return
     creaks = [f"{burst.rate:.3g}" for burst in squeaks.of("creak")]
