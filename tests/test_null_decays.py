@@ -120,3 +120,24 @@ def test_bristles_that_the_decrements_know_nothing_of_leave_them_in_doubt() -> N
     headline = " ".join(ss.summary(findings).headline)
     assert "weakly" not in headline
     assert "times the noise" in headline
+
+
+def test_a_damping_ratio_does_not_hang_on_a_dry_friction_that_is_not_shown() -> None:
+    """The headline had the ratio that goes with a dry friction, and said of that one that it can not be told."""
+    t, zeta, omega, dry, step = np.arange(0, 8, 0.01), 0.0249, 2 * np.pi * 2.0, 0.01, 0.14
+    x, rest = np.empty(t.size), 1.0
+    for half in range(40):  # each half cycle swings about its own middle
+        inside = (t >= half / 4) & (t < (half + 1) / 4)
+        side = (-1) ** half
+        x[inside] = side * dry + (rest - side * dry) * np.exp(-zeta * omega * (t[inside] - half / 4)) * np.cos(
+            omega * (t[inside] - half / 4)
+        )
+        rest = side * dry - (rest - side * dry) * np.exp(-zeta * np.pi)
+        if abs(rest) < dry:
+            x[t >= (half + 1) / 4] = rest
+            break
+    noisy = np.round((x + np.random.default_rng(4).normal(0, 0.01, x.size)) / step) * step
+    findings = ss.analyze_decay(ss.Record.of({"x": noisy}, fs=100))
+    assert findings.decay.undecided
+    assert "damping ratio" not in [estimate.name for estimate in findings.decay.quoted]
+    assert findings.decay.whichever[0].includes(zeta)

@@ -181,6 +181,12 @@ class Decay(Result):
         return self.best is not self.motion and (self.against < CLEAR or negative)
 
     @property
+    def undecided(self) -> bool:
+        """Whether viscous and dry friction show dry friction, and a motion without any is not spoken against."""
+        sure = self.best is self.waveform and self.best.dry_displacement.interval[0] > 0
+        return sure and bool(self.whichever) and not self.denied and not self.rubs
+
+    @property
     def strays(self) -> tuple[Doubt, ...]:
         """That viscous and dry friction leave much more than the record's own noise, where they do.
 
@@ -196,9 +202,9 @@ class Decay(Result):
 
     @property
     def quoted(self) -> tuple[Estimate, ...]:
-        """The best answer's numbers, with one damping ratio: that of whichever motion, where its own is denied."""
+        """The best answer's numbers, each once: of whichever motion, where its own hang on what is not shown."""
         force = self.dry_force
-        quoted = [] if force is None else [force]
+        quoted = [] if force is None or self.undecided else [force]
         if self.motion is not None and self.best is self.motion:
             quoted += [*self.motion.terms, self.motion.frequency, *self.whichever]
         elif self.waveform is None:
@@ -206,30 +212,29 @@ class Decay(Result):
         else:
             quoted += [estimate for estimate in self.waveform.estimates if estimate is not self.waveform.dry_force]
             quoted += [] if self.waveform.motions else self.whichever
-        other = self._other_ratio
-        return tuple(estimate for estimate in quoted if estimate is not other)
+        return tuple(estimate for estimate in quoted if not any(estimate is other for other in self._others))
 
     @property
     def beside(self) -> tuple[Estimate, ...]:
-        """The other damping ratio, and what the decrements say where they are not the best answer."""
-        other, more = (
-            self._other_ratio,
-            () if self.thesis is None or self.best is self.thesis else self.thesis.estimates,
-        )
+        """What is not quoted, and what the decrements say where they are not the best answer."""
+        more = () if self.thesis is None or self.best is self.thesis else self.thesis.estimates
         denied = (
             [DENIED] if self.against < CLEAR or self.strays else []
         )  # of another motion they may be off by ten deviations
-        estimates = [
+        decrements = (
             replace(estimate, name=f"{estimate.name}{BY_DECREMENTS}", status=Status(estimate.status, *denied))
             for estimate in more
-        ]
-        return tuple(estimates) if other is None else (other, *estimates)
+        )
+        return (*self._others, *decrements)
 
     @property
-    def _other_ratio(self) -> Estimate | None:
-        """The damping ratio that is not quoted, where there are two: of the motion, and of whichever it was."""
-        either = self.whichever[0] if self.whichever and self.best is not self.thesis else None
-        return self.best.damping_ratio if either is not None and self.denied else either
+    def _others(self) -> tuple[Estimate, ...]:
+        """What is not quoted of the motion's numbers and those of whichever motion it was, where there are both."""
+        if not self.whichever or self.best is self.thesis:
+            return ()
+        if self.undecided:
+            return self.best.damping_ratio, self.best.dry_displacement
+        return (self.best.damping_ratio if self.denied else self.whichever[0],)
 
     @property
     def comparisons(self) -> tuple[Estimate, ...]:

@@ -35,6 +35,7 @@ from stickslip.statistics import student
 
 LEFT_OVER = "residual"  # the kind of doubt where the model leaves more than noise
 UNLIKE = 2.0  # times the noise that the residual may be before the model is doubted
+UNSHARED = "unshared"  # kind of doubt: the releases have no friction and frequency in common
 APART = 1e-3  # p-value of sharing friction and frequency, below which releases are not one experiment
 SHORT = 0.15  # of a half cycle: a hold so short can not be told from the turn of a swing
 AFTER = 0.08  # of a half cycle, within which the first turn is known
@@ -282,7 +283,7 @@ def _answer(
     fitted = [release.blocks.motion(p, n)[0] for release, n, p in motions_first]
     choices = [motion.choice for motion in motions]
     unlike = f"the releases do not share one friction and frequency (p = {motion.alike:.1g}): fit each alone"
-    doubts = (Doubt(unlike),) if motion.alike < APART else _misfit(releases, fitted)
+    doubts = (Doubt(unlike, UNSHARED),) if motion.alike < APART else _misfit(releases, fitted)
     status = Status(*_left_out(ring_downs), *doubts, *_seen_beside(choices))
     many = ", ".join(map(str, half_cycles))
     checks = (f"{many} half cycles" + ("" if likelihood > 0.995 else f" (likelihood {likelihood:.2f})"),)

@@ -14,7 +14,7 @@ from stickslip.answers.findings import Comparison, Findings
 from stickslip.decay.answer import beginning, rig_units
 from stickslip.decay.choice import SIZE
 from stickslip.decay.decrement import Decrement
-from stickslip.decay.fit_decay import LEFT_OVER
+from stickslip.decay.fit_decay import LEFT_OVER, UNSHARED
 from stickslip.decay.release import CAUGHT
 from stickslip.estimate import Estimate, kinds
 from stickslip.figures.decay import plates_of, plates_together
@@ -202,10 +202,20 @@ def _dying(decay: Decay) -> str:
     ratio, dry = decay.best.damping_ratio, decay.best.dry_displacement
     viscous, rubs = ratio.interval[0] > 0, decay.rubs
     shown = _both(ratio, dry)
+    if decay.waveform is not None and UNSHARED in kinds(decay.waveform.status) and decay.waveform.motions:
+        pairs = [_both(motion.damping_ratio, motion.dry_displacement) for motion in decay.waveform.motions]
+        of_each = "; ".join(f"of release {number} {both}" for number, both in enumerate(pairs, 1))
+        return f"The releases do not share one friction and frequency: {of_each}. The table fits all of them at once."
     curved = decay.best is decay.thesis and not decay.releases.ring_downs[0].isochronous
     if decay.motion is not None and decay.best is decay.motion:
         forces = decay.motion.choice.chosen.fitted.motion.words
         return f"The motion dies away by {forces}: {_listed([_with_interval(term) for term in decay.motion.terms])}."
+    if decay.undecided:
+        ratio, dry = decay.whichever
+        return (
+            f"The motion dies away by viscous friction. {_hidden(dry, 'dry friction')} Whichever it was, the damping "
+            f"ratio is {_reach(ratio)}."
+        )
     if decay.denied and decay.whichever:
         ratio, dry = decay.whichever
         reach = f"the damping ratio is {_reach(ratio)} and the dry friction displacement {_reach(dry)}"
