@@ -525,14 +525,7 @@ def _sentences(
         lead = fits if remainder.explained else f"The best of those tried {remainder.words}. Among them the"
         yield f"{lead} friction is {family_of(best.name).said}: {rivalry}."
     if best.family == "rigid" and len(families) == 1 and excess_ is not None:
-        low, high = excess_.interval
-        exceeds = (
-            f"by {100 * excess_.value:.1f} % (95 %: {100 * low:.1f} % to {100 * high:.1f} %)"
-            if math.isfinite(high)
-            else f"by {100 * low:.1f} % or more"
-            if low > 0
-            else "by what can not be told"
-        )
+        exceeds, high = _exceeds(excess_), excess_.interval[1]
         if len(kept) > 1:
             yield (
                 f"Within it {_either(kept)} can not be told apart: static friction exceeds the kinetic {exceeds}, "
@@ -547,6 +540,14 @@ def _sentences(
         yield f"Within it {_either(kept)} can not be told apart."
     if len(kept) == 1:
         yield f"Confidence {100 * confidence:.1f} %."
+
+
+def _exceeds(excess: Estimate) -> str:
+    """By how much static friction exceeds the kinetic."""
+    low, high = excess.interval
+    if math.isfinite(high):
+        return f"by {100 * excess.value:.1f} % (95 %: {100 * low:.1f} % to {100 * high:.1f} %)"
+    return f"by {100 * low:.1f} % or more" if low > 0 else "by what can not be told"
 
 
 def _falls(fit: LawFit) -> str:
