@@ -48,6 +48,20 @@ def test_lines_of_a_serial_port(tmp_path: Path) -> None:
     np.testing.assert_allclose(values[1], there / 2 / 0.5)
 
 
+@pytest.mark.skipif(not hasattr(os, "openpty"), reason="no pseudo terminals here")
+def test_lines_with_too_few_columns_are_told(tmp_path: Path) -> None:
+    pytest.importorskip("serial")
+    board, port = os.openpty()
+    table = {"kind": "serial", "port": os.ttyname(port), "fs": 20, "channels": {"x": "#1 [mm]", "load": "#3 [N]"}}
+    with find_device("board", {"board": table}).open() as stream:
+        os.write(board, b"".join(b"%d;7.5\r\n" % k for k in range(60)))
+        with pytest.raises(ss.errors.RecordError, match=r"'41;7.5'.*3 numbers") as refused:
+            stream.read(2.0)
+    assert "baud = 115200" in refused.value.next_step
+    os.close(board)
+    os.close(port)
+
+
 def test_a_port_that_is_not_there() -> None:
     pytest.importorskip("serial")
     table = {"kind": "serial", "port": "/dev/no-such-port", "fs": 100, "channels": {"x": "#1 [mm]"}}

@@ -116,6 +116,21 @@ def test_a_trigger_begins_it_and_what_was_before_is_kept(tmp_path: Path) -> None
         acquire(still, output=tmp_path / "other.h5", wanted=Wanted(trigger=Trigger("y", 1.0)))
 
 
+def test_less_before_a_trigger_than_was_wanted_is_told(tmp_path: Path) -> None:
+    moved = {"base": Tone(1e-3, 2.0)}
+    for before, notes in ((10.0, 1), (0.0, 0)):
+        wanted = Wanted(0.2, Trigger("x", 3e-4, before=before), moved)
+        done = acquire(Sim(fast=True), output=tmp_path / f"{before}.h5", wanted=wanted)
+        kept = -ss.read_record(done.paths[0]).start
+        assert len(done.notes) == notes
+        assert all(f"kept {kept:.3g} s before the trigger, not 10 s" in note for note in done.notes)
+
+
+def test_a_folder_that_is_not_there_is_refused_before_anything_is_measured(tmp_path: Path) -> None:
+    with pytest.raises(ss.errors.ModelError, match="no folder"):
+        acquire(Sim(fast=True), output=tmp_path / "nowhere" / "run.h5", wanted=Wanted(0.2))
+
+
 def test_two_devices_come_onto_one_clock(tmp_path: Path) -> None:
     """The second unit begins 40 ms later on its clock, which is 200 ppm fast; both see x."""
     drive = ss.drives.MultiTone([(6e-4, 2.3, 0.0), (4e-4, 3.1 * 2**0.5, 1.0)])

@@ -86,6 +86,15 @@ def test_a_run_list_is_read_back_and_acquired(tmp_path: Path) -> None:
         bench.read_runs(path)
 
 
+def test_an_amplitude_has_its_own_unit_and_a_wrong_one_names_its_line(tmp_path: Path) -> None:
+    path, run = tmp_path / "runs.toml", '[[run]]\nname = "{}"\nfrequency = "2.5 Hz"\namplitude = {}\non = "{}"\n'
+    path.write_text(run.format("a", '"1.5 mm"', "base") + run.format("b", '"20 mN"', "force"), "utf-8")
+    assert [each.amplitude for each in bench.read_runs(path).run] == pytest.approx([1.5e-3, 0.02])
+    path.write_text(run.format("a", 1e-3, "base") + run.format("b", '"1.5 mm"', "force"), "utf-8")
+    with pytest.raises(ss.errors.ModelError, match=r"runs.toml, line 9,.*1.5 mm"):
+        bench.read_runs(path)
+
+
 def test_a_run_list_is_refused_whole_before_its_first_run(tmp_path: Path) -> None:
     path, config, records = tmp_path / "runs.toml", tmp_path / "rig.toml", tmp_path / "records"
     config.write_text('[shaker]\nstroke = "1 mm"\n[devices.desk]\nkind = "sim"\nfast = true\nfs = 1000\n', "utf-8")

@@ -487,3 +487,16 @@ def test_all_is_removed_at_the_end(number: signal.Signals) -> None:
         code = lab.process.wait(600)
     assert not place.exists()
     assert number != signal.SIGINT or code == 0, "Ctrl-C is how the lab is ended, and no failure"
+
+
+def test_more_than_one_ctrl_c_ends_it_as_quietly() -> None:
+    program = [sys.executable, "-m", "stickslip", "lab", "--no-browser", "--port", "0"]
+    with subprocess.Popen(program, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True) as lab:
+        assert lab.stdout is not None
+        while "Ctrl-C" not in lab.stdout.readline():
+            assert lab.poll() is None
+        for _ in range(3):
+            lab.send_signal(signal.SIGINT)
+            time.sleep(0.05)
+        assert lab.stdout.read().strip() == "The lab has ended."
+    assert lab.returncode == 0

@@ -166,7 +166,9 @@ def checked(
         faults = error.errors(include_url=False, include_context=False)
         first = min(faults, key=lambda fault: fault["type"] != "extra_forbidden")  # a typo explains what is missing
         path = [str(part) for part in first["loc"] if not str(part).startswith("function-")]
-        within = [*table.split("."), *path] if table else path
+        numbered = [str(part + 1) if isinstance(part, int) else part for part in first["loc"]]  # headings count from 1
+        numbered = [part for part in numbered if not part.startswith("function-")]
+        within = [*table.split("."), *numbered] if table else numbered
         where = f"{source}{line_of(within, lines)}"
         inner = path[:1]
         for part in path[1:]:  # a key of a table is named with it; an item of a list is not

@@ -173,9 +173,8 @@ def acquire(
     if len(outcomes) < len(heads):
         raise RecordError("nothing was recorded", "the trigger begins a recording", "lower its level, or wait longer")
     paths = tuple(head.tape.finish() for head in heads if head.tape is not None)
-    if len(paths) == 1:
-        return Acquired(paths, outcomes, ended)
-    return _together(paths, output, Acquired(paths, outcomes, ended))
+    done = Acquired(paths, outcomes, ended, tuple(head.short for head in heads if head.short))
+    return done if len(paths) == 1 else _together(paths, output, done)
 
 
 def _beside(output: Path, name: str) -> Path:
@@ -296,6 +295,7 @@ class _Head:
         self.tape: Tape | None = None
         self.held: deque[Block] = deque()
         self.last, self.end = math.nan, math.inf
+        self.short = ""  # what is missing before the trigger, in words
         trigger = run.wanted.trigger
         names = [one.name for one in device.inputs]
         self.row = names.index(trigger.channel) if trigger is not None and trigger.channel in names else None
@@ -335,6 +335,9 @@ class _Head:
                 self.held.popleft()  # a second more: another device may have the trigger
             return
         begin = max(self.held[0].first, math.ceil(at - before * fs - 1e-6))
+        if before and begin > math.ceil(at - before * fs - 1e-6):
+            kept = max(0.0, (at - begin) / fs)
+            self.short = f"{self.device.name} kept {kept:.3g} s before the trigger, not {before:g} s: it came too early"
         self.end = math.ceil(at + run.wanted.seconds * fs - 1e-6) if run.wanted.seconds else math.inf
         self.tape = Tape(
             self.device, self.path, begin=begin, start=(begin - at) / fs, log=run.wanted.log, notes=_notes(run.wanted)

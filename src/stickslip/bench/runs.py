@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import AfterValidator, BaseModel, Field
+from pydantic import AfterValidator, BaseModel, BeforeValidator, Field, ValidationInfo
 
 from stickslip.drives.kinds import HarmonicBase
 from stickslip.errors import EstimateError, ModelError, StickslipError
@@ -28,6 +28,11 @@ CYCLES, READ, POINTS = 24, 4, 64  # of the drive that are run, those at the end 
 NUDGE = 0.01  # of a parameter, by which its effect is told
 APART = 0.15  # of a frequency, and of an amplitude, by which proposals are different
 GAIN_SD = 0.01  # by which a sensor's gain may be wrong: what it explains tells no law from another
+
+
+def _amplitude_of(value: object, info: ValidationInfo) -> object:
+    """A number, or text with its own unit, in the unit of what moves."""
+    return quantity("N" if info.data.get("on") == "force" else "m").func(value)  # type: ignore[call-arg]
 
 
 class Run(BaseModel):
@@ -51,9 +56,9 @@ class Run(BaseModel):
 
     name: Annotated[str, Field(pattern=r"^[A-Za-z0-9._-]+$")]
     frequency: Annotated[float, quantity("Hz"), Field(gt=0)]
-    amplitude: Annotated[float, Field(ge=0)]
+    on: Literal["base", "force"] = "base"  # before the amplitude, whose unit it tells
+    amplitude: Annotated[float, BeforeValidator(_amplitude_of), Field(ge=0)]
     seconds: Annotated[float, quantity("s"), Field(gt=0)] = 20.0
-    on: Literal["base", "force"] = "base"
     why: str = ""
 
 

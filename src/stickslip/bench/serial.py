@@ -13,12 +13,14 @@ import numpy as np
 from pydantic import BaseModel, Field
 
 from stickslip.bench.device import Block, Input, Listening, Output, Wires, columns, inputs, vendors
-from stickslip.errors import ModelError
-from stickslip.settings import STRICT, checked, quantity
+from stickslip.errors import ModelError, RecordError
+from stickslip.printing import printable
+from stickslip.settings import SHOWN, STRICT, checked, quantity
 
 NAME, NEEDS = "serial", "serial"
 SEPARATOR = re.compile(rb"[,;\s]+")
 LONGEST = 4096  # bytes of a line; what is longer is none
+UNREAD = 2.0  # s of lines of which none can be read: a cable that shakes spoils some, and not all
 LARGEST_GAP = 1 << 24  # samples: a counter that jumps further was not read rightly
 
 
@@ -89,6 +91,7 @@ class OpenPort(Listening):
         self.next = 0  # counter of the line that should come
         self.origin: int | None = None  # of the device's own counter
         self.waiting: list[tuple[int, list[float]]] = []  # lines with their counters, not yet handed on
+        self.damaged = 0  # lines in a row of which none could be read
 
     def __exit__(self, *raised: object) -> None:
         """Close the port."""
@@ -120,9 +123,13 @@ class OpenPort(Listening):
         try:
             values = [float(cells[column]) for column in self.columns]
             counted = int(cells[device.counter - 1]) if device.counter else None
-        except (ValueError, IndexError):
+        except (ValueError, IndexError) as error:
             self.next += 1
+            self.damaged += 1
+            if self.damaged > UNREAD * device.fs:
+                raise self._unread(line) from error
             return
+        self.damaged = 0
         if counted is not None:
             if self.origin is None:
                 self.origin = counted - at
@@ -130,6 +137,16 @@ class OpenPort(Listening):
             at += ahead if ahead < LARGEST_GAP else 0
         self.waiting.append((at, values))
         self.next = at + 1
+
+    def _unread(self, line: bytes) -> RecordError:
+        """What came, and what was expected."""
+        device, came = self.device, printable(line.strip()[:SHOWN].decode("utf-8", "replace"))
+        last = max(device.counter, *(column + 1 for column in self.columns))
+        return RecordError(
+            f"{device.name} sent {self.damaged} lines of which none could be read, the last one '{came}'",
+            f"a line holds {last} numbers or more, between commas, semicolons or blanks",
+            f"correct channels, counter and baud = {device.baud}",
+        )
 
 
 class _Settings(BaseModel):

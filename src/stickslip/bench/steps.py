@@ -347,7 +347,7 @@ class Known:
         }
         tap = self.of("tap", ImpactTest)
         for channel, name in STANDS_ON.items():
-            for resonance in tap.resonances if tap is not None else ():
+            for resonance in tap.resonances if tap is not None and tap.status == "ok" else ():
                 if resonance.name == name:
                     known[channel] = resonance
         return known

@@ -209,13 +209,17 @@ def require_writable(output: Path) -> None:
     Raises
     ------
     ModelError
-        The ending is of no format that is written.
+        The ending is of no format that is written, or the folder is not there.
     FormatError
         A record, or the journal of one, is there already.
     """
     if output.suffix.lower() not in WRITERS:
         raise ModelError(
             f"'{output.name}' ends in '{output.suffix}'", f"a record ends in {', '.join(WRITERS)}", "choose one"
+        )
+    if not output.parent.is_dir():
+        raise ModelError(
+            f"there is no folder '{output.parent}'", "a record goes into a folder that is there", "make it"
         )
     require_free(output)
     require_free(journal_of(output))

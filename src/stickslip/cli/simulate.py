@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import itertools
 import secrets
+import signal
 import webbrowser
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -383,7 +385,7 @@ def lab(port: int, config: Path | None, records: Path | None, no_browser: bool) 
             if not no_browser:
                 webbrowser.open(doorway(address).as_uri())
 
-        try:
+        with contextlib.suppress(KeyboardInterrupt):  # one before the server listens, or behind its end
             server.serve(door, token=token, opened=opened, rig=config, records=records)
-        except KeyboardInterrupt:  # the server has shut down by then, and hands the signal on
-            say("The lab has ended.")
+        signal.signal(signal.SIGINT, signal.SIG_IGN)  # one more has nothing left to end
+        say("The lab has ended.")

@@ -16,6 +16,7 @@ from collections.abc import AsyncIterator, Callable
 from contextlib import AsyncExitStack, asynccontextmanager
 from functools import partial
 from pathlib import Path
+from types import FrameType
 from typing import Any, ClassVar
 from urllib.parse import parse_qs
 
@@ -366,6 +367,11 @@ def serve(
             await super().startup(sockets)
             if self.started:
                 opened(partial(doorway, app.state.data.folder))
+
+        def handle_exit(self, sig: int, frame: FrameType | None) -> None:
+            if sig != signal.SIGINT:
+                super().handle_exit(sig, frame)
+            self.should_exit = True  # Ctrl-C is not handed on: a second would tear down what is being closed
 
     app = lab_app(token=token, port=door.getsockname()[1], place=live.place_of(rig, records))
     settings = uvicorn.Config(
