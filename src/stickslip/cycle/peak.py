@@ -61,7 +61,8 @@ def unseen(peak: Peak) -> tuple[float, float]:
     """How much less and more than a measured peak the contact may have borne [N], by samples and sensor.
 
     A cell that is let go swings on; a filter overshoots a jump by 9 % of the level, and cuts a peak as brief as the
-    jump before it, which may as well be its overshoot. Between two samples friction goes on as it rose, or fell.
+    jump before it, which may as well be its overshoot. It bore no less than its level. Between two samples friction
+    goes on as it rose, or fell.
     """
     excess, beyond = peak.height - peak.level, min(peak.before, peak.after)
     if excess < 0:  # still on its way to the level, or held back by what follows the speed
@@ -70,7 +71,7 @@ def unseen(peak: Peak) -> tuple[float, float]:
         return min(peak.swing, OVERSHOOT * peak.level), beyond
     if peak.fall >= peak.rise / ALIKE and peak.swing >= excess:
         return excess, max(peak.after, excess)
-    return peak.swing, beyond
+    return min(peak.swing, excess), beyond
 
 
 def _swing(force: Array, row: int, step: float) -> tuple[float, float]:
