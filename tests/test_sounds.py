@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from types import ModuleType
 
 import numpy as np
@@ -176,13 +177,17 @@ def test_white_noise_is_listened_to_at_any_rate(fs: float) -> None:
     assert {burst.kind for burst in ss.find_squeaks(ss.Record.of({"sound": noise}, fs=fs)).bursts} == {"noise"}
 
 
-@pytest.mark.parametrize("count", [1, 31])
-def test_clicks_are_counted_and_are_no_burst(count: int) -> None:
-    """It was said that nothing sounds, of 31 clicks 44 dB above the noise."""
+@pytest.mark.parametrize(
+    ("times", "count"),
+    [([2.0], 1), (np.linspace(0.05, 3.9, 31), 31), (np.random.default_rng(2).uniform(0.1, 3.9, 20), 19)],
+    ids=["one", "even", "random"],  # two of the random ones are 2 ms apart
+)
+def test_clicks_are_counted_and_are_no_burst(times: Sequence[float], count: int) -> None:
+    """It was said that nothing sounds, of 31 clicks 44 dB above the noise; of 20 random ones three broad bursts."""
     fs = 44100
     values = 0.003 * np.random.default_rng(1).standard_normal(4 * fs)
     t = np.arange(1323) / fs
-    for second in np.linspace(0.05, 3.9, count):
+    for second in times:
         values[round(second * fs) :][: t.size] += 0.5 * np.exp(-t / 0.0014) * np.sin(2 * np.pi * 2100 * t)
     findings = ss.analyze_squeaks(ss.Record.of({"sound": values}, fs=fs))
     assert not findings.squeaks.bursts

@@ -31,6 +31,7 @@ LEANS = 1e-6  # dB a frame
 AUDIBLE = 30.0  # dB below the loudest moment
 ABOVE = 6.0  # dB above the quiet level
 TOGETHER = 0.08  # s: broad bursts nearer are one
+SPARSE = 0.75  # share of the time that clicks are heard at most, soon after one another: a window holds each for 23 ms
 HARMONICS = 6
 PULSE, DEEP, APART = 2e-3, 6.0, 0.25  # s, dB, and the change of the logarithm of an interval
 PULSES, SLIM = 8, 0.5  # pulses at least, and their width against their interval
@@ -152,17 +153,20 @@ class Hearing:
         for part in tonal:
             covered[self._frame(part.first) : self._frame(part.last) + 1] = True
         broad, clicks = [], 0
-        for first, last in _joined(_runs(active), round(TOGETHER * self.fs / self.hop)):
+        runs = _runs(active)
+        for first, last in _joined(runs, round(TOGETHER * self.fs / self.hop)):
             rows = self._rows(first, last)
             rate, wander = pulse_train(self.values[rows[0] : rows[1]], self.fs)
             background = throughout and bool(covered.any())  # what stands out of it is told, and not the noise itself
             loud = self.power[:, first:last].sum(axis=0)
             if loud[self.lines[2][first:last]].sum() > TONAL * loud.sum():  # pulses of tones are beeps or notes
                 rate = wander = math.nan
-            pulses, long = not math.isnan(rate), last - first > OVERLAP
+            short = [end - begin <= OVERLAP for begin, end in runs if first <= begin < last]
+            apart = all(short) and active[first:last].mean() < SPARSE  # clicks that happen to come soon after another
+            pulses, long = not math.isnan(rate), last - first > OVERLAP and not apart
             if covered[first:last].mean() < TONAL and (pulses or (long and not background)):
                 broad.append(Span(*rows, False, rate=rate, wander=wander, throughout=bool(active.mean() > 0.97)))
-            clicks += not long and not pulses and not covered[first:last].any()
+            clicks += 0 if long or pulses or covered[first:last].any() else len(short)
         return (*(part for part in tonal if self._stands(part, broad)), *broad), clicks
 
     def _stands(self, part: Span, broad: list[Span]) -> bool:
