@@ -84,6 +84,18 @@ def test_a_sensor_that_is_late_is_named(channel: str, late: tuple[str, ...]) -> 
         assert abs(late_by - 3.0) <= min(doubt, 0.08), flaw.words
 
 
+@pytest.mark.parametrize("lag", [0.0, 3e-3, 0.03])
+def test_where_nothing_is_said_to_be_late_it_is_said_from_when_on_it_would_be(lag: float) -> None:
+    """Below 1.8 Hz the acceleration is small beside its noise: nothing was said to be wrong with an x 3 ms late."""
+    rig = ss.Rig.perfect().having("x", white=2e-6).having("a", white=0.05).having("x", lag=lag)
+    system = air_track().having(frequency=1.2, amplitude=2e-3)
+    _, cycles = watched(Sim(system, rig=rig, fs=1000, fast=True, seed=3), 6.0)
+    assert not [flaw for cycle in cycles for flaw in cycle.flaws if flaw.kind == "late" and not lag]
+    for cycle in cycles[2:]:
+        assert bool(cycle.flaws) == (lag > cycle.least_late)
+        assert 1e-3 < cycle.least_late < 0.03
+
+
 @pytest.mark.parametrize(("channel", "frequency", "amplitude"), [("load", 11.1, 5e-3), ("a", 1.5, 0.65e-3)])
 def test_a_sensor_that_the_spring_hides_is_named(channel: str, frequency: float, amplitude: float) -> None:
     """By the balance of forces a load was not where friction is below a fifth of the spring's, nor a by a slow x."""

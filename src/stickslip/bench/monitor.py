@@ -117,7 +117,8 @@ class Flaw(NamedTuple):
 
 
 class Cycle(NamedTuple):
-    """One cycle: counter of its first sample, its length [s], its loop, and what is wrong with the sensors."""
+    """One cycle: counter of its first sample, its length [s], its loop, what is wrong with the sensors, and by how much
+    [s] x or a would have to be late to be named; infinite where that can not be told."""
 
     first: int
     period: float
@@ -125,6 +126,7 @@ class Cycle(NamedTuple):
     v: Array
     friction: Array
     flaws: tuple[Flaw, ...]
+    least_late: float = math.inf
 
 
 class Monitor:
@@ -180,7 +182,7 @@ class Monitor:
         if rows is None or rows.shape[1] < SHORTEST:
             return []
         # half a cycle is too little to judge the others by: a mass that sticks there is not flat
-        flaws = tuple(flaw for flaw in self._flaws({}, rows, period / self.device.fs) if flaw.channel == name)
+        flaws = tuple(flaw for flaw in self._flaws({}, rows, period / self.device.fs)[0] if flaw.channel == name)
         return [Cycle(first, period / self.device.fs, NONE, NONE, NONE, flaws)]
 
     def _afresh(self) -> None:
@@ -255,11 +257,11 @@ class Monitor:
         last = self._rows(since, at)
         several = dict(zip(self.names, rows if last is None else last, strict=True))
         count = 1 if last is None else len(self.begins) - 1 - max(0, len(self.begins) - 1 - CYCLES)
-        flaws = self._flaws(several, rows, len(several[self.names[0]]) / count / fs)
-        return Cycle(first, (at - first) / fs, x, v, friction, tuple(flaws))
+        flaws, least_late = self._flaws(several, rows, len(several[self.names[0]]) / count / fs)
+        return Cycle(first, (at - first) / fs, x, v, friction, tuple(flaws), least_late)
 
-    def _flaws(self, channels: Mapping[str, Array], last: Array, period: float) -> list[Flaw]:
-        """What is wrong with each sensor in the last cycles."""
+    def _flaws(self, channels: Mapping[str, Array], last: Array, period: float) -> tuple[list[Flaw], float]:
+        """What is wrong with each sensor in the last cycles, and from which delay [s] on it would be."""
         flaws = []
         for one, cycle in zip(self.device.inputs, last, strict=True):
             noise = noise_of(cycle, _ringing(one, self.device.fs))
@@ -270,7 +272,8 @@ class Monitor:
             flaws += [flaw] if flaw else []
         broken = {flaw.channel for flaw in flaws}
         sound = {name: values for name, values in channels.items() if name not in broken}
-        return flaws + _late(sound, self.device.inputs, self.constants, (period, self.device.fs))
+        late, least = _late(sound, self.device.inputs, self.constants, (period, self.device.fs))
+        return flaws + late, least
 
 
 def noise_of(values: Array, ringing: Sequence[float] = (1.0,)) -> float:
@@ -321,29 +324,29 @@ def _count(values: Array) -> float:
 
 def _late(
     channels: Mapping[str, Array], inputs: Sequence[Input], constants: Mapping[str, float], times: tuple[float, float]
-) -> list[Flaw]:
+) -> tuple[list[Flaw], float]:
     """Which of displacement and acceleration comes after the other, and whether the load does after both.
 
-    By a = x'', and by the friction's jumps, of which load and acceleration speak alike. Delays that are stated are
-    expected.
+    And from which delay [s] of x or a on it would be told. By a = x'', and by the friction's jumps, of which load and
+    acceleration speak alike. Delays that are stated are expected.
     """
     period, fs = times
     if not {"x", "a"} <= set(channels) or len(channels["x"]) < LEAST_CYCLES * period * fs:
-        return []
+        return [], math.inf
     expected = {one.name: _expected(one) for one in inputs}
     lines = _Lines(channels, 2 * math.pi / period, fs)
     lag, error = lines.lag(lambda late: lines.of("x", 2, expected["x"] + late), lines.of("a", 0, expected["a"]))
     error = math.hypot(error, lines.doubt("x", 2), lines.doubt("a"))
-    flaws = _judged("x", lag, error, fs) or _judged("a", -lag, error, fs)
+    flaws, least = _judged("x", lag, error, fs) or _judged("a", -lag, error, fs), _least_late(error, fs)
     if not ("load" in channels and {"mass", "stiffness"} <= set(constants)):
-        return flaws
+        return flaws, least
     natural = math.sqrt(constants["stiffness"] / constants["mass"]) / math.tau
     frequency = np.asarray(np.fft.rfftfreq(len(channels["a"]), 1 / fs), dtype=np.float64)
     felt = {one.name: _felt(channels[one.name], one, frequency) for one in inputs if one.name in ("load", "a")}
     after, error = _apart(felt["load"], felt["a"], frequency, max(BEYOND / period, 2 * natural))
     if any(flaw.channel == "a" for flaw in flaws):
-        return [*flaws, *_judged("load", after - lag, error, fs)]
-    return [*flaws, *_judged("a", -after, error, fs), *_judged("load", after, error, fs)]
+        return [*flaws, *_judged("load", after - lag, error, fs)], least
+    return [*flaws, *_judged("a", -after, error, fs), *_judged("load", after, error, fs)], least
 
 
 def _felt(values: Array, one: Input, frequency: Array) -> NDArray[np.complex128]:
@@ -425,9 +428,14 @@ class _Lines(NamedTuple):
         return np.asarray(np.where((time >= 0) & (time * self.fs < count), kernels, 0.0))
 
 
+def _least_late(error: float, fs: float) -> float:
+    """The least delay [s] that is told."""
+    return max(LATE * error, LEAST_LATE / fs)
+
+
 def _judged(name: str, lag: float, error: float, fs: float) -> list[Flaw]:
     """Whether a channel is late by more than chance and a sample; told with twice its deviation."""
-    if lag <= LATE * error or lag <= LEAST_LATE / fs:
+    if lag <= _least_late(error, fs):
         return []
     return [Flaw(name, "late", f"{name} comes {1e3 * lag:.2f} ± {max(2e3 * error, 0.01):.2f} ms late")]
 

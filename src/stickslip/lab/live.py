@@ -289,7 +289,9 @@ class Session:
 def _cycle(cycle: bench.Cycle, fs: float) -> bytes:
     flaws = [flaw._asdict() for flaw in cycle.flaws]
     arrays = {name: getattr(cycle, name) for name in ("x", "v", "friction")}
-    return frame({"kind": "cycle", "start": cycle.first / fs, "period": cycle.period, "flaws": flaws}, arrays)
+    late = cycle.least_late if math.isfinite(cycle.least_late) else None
+    about = {"kind": "cycle", "start": cycle.first / fs, "period": cycle.period, "flaws": flaws, "late": late}
+    return frame(about, arrays)
 
 
 async def _watch(socket: WebSocket) -> None:

@@ -57,7 +57,7 @@ function form() {
     </div></div>`;
 }
 
-let recorded = null;
+let recorded = null, late = null;
 function heard(answer) {
   if (answer.kind === "error") lab.say(answer.error, true);
   else if (answer.kind === "state") begin(answer);
@@ -69,7 +69,7 @@ function heard(answer) {
 function begin(answer) {
   state = answer;
   traces = new Map((answer.inputs ?? []).map((one) => [one.name, { ...one, low: [], high: [] }]));
-  loops = []; flaws = new Map(); cycle = 0; recorded = null;
+  loops = []; flaws = new Map(); cycle = 0; recorded = late = null;
   const chosen = answer.open ?? $("live-device").value;
   $("live-device").replaceChildren(...answer.devices.map((name) => new Option(name, name, false, name === chosen)));
   $("live-device").disabled = Boolean(answer.open);
@@ -110,6 +110,7 @@ function block(answer) {
 
 function ended(answer) {
   cycle += 1;
+  late = answer.late;
   if (answer.arrays.friction.length) { loops.push(answer.arrays); loops.splice(0, loops.length - LOOPS); }
   turned = true;
   for (const flaw of answer.flaws) flaws.set(flaw.channel + flaw.kind, { ...flaw, cycle });
@@ -119,7 +120,8 @@ function ended(answer) {
 
 function checkup() {
   const words = [...flaws.values()].map((flaw) => flaw.words);
-  const none = !state.open ? "Open a device." : cycle ? "Nothing is wrong with the sensors." : "Waiting for a cycle.";
+  const seen = late === null ? "whether one comes late can not be told here" : `x or a would be named from ${(1e3 * late).toPrecision(2)} ms of delay on`;
+  const none = !state.open ? "Open a device." : cycle ? `Nothing is wrong with the sensors; ${seen}.` : "Waiting for a cycle.";
   $("live-flaws").replaceChildren(...(words.length ? words : [none]).map((text) => Object.assign(document.createElement("li"), { textContent: text, className: words.length ? "fault" : "" })));
 }
 
