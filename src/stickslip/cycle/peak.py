@@ -95,9 +95,9 @@ def _swing(force: Array, row: int, step: float) -> tuple[float, float]:
 
 
 def _since(force: Array, mark: float) -> float:
-    """Samples, with parts, until a force falls below a mark; infinite where it does not."""
+    """Samples, with parts, until a force falls below a mark; NaN where it does not."""
     below = np.flatnonzero(force < mark)
     if not len(below) or below[0] == 0:
-        return math.inf
+        return math.nan
     row = int(below[0])
     return row - 1 + float((force[row - 1] - mark) / (force[row - 1] - force[row]))
