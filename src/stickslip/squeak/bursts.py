@@ -299,23 +299,10 @@ def find_squeaks(
     bursts = _of_one_contact(sorted((listener.burst(part) for part in hearing.spans), key=lambda burst: burst.start))
     cautions = tuple(listener.cautions(unit))
     notes = (*cautions, *listener.notes(unit))
-    heard = (
-        math.nan
-        if listener.clipped
-        else 10 * math.log10(max(hearing.threshold, 1e-300) / REFERENCES.get(unit, 1.0) ** 2)
-    )
-    return Squeaks(
-        tuple(bursts),
-        name,
-        reference_of(unit),
-        motion.frequency,
-        record,
-        notes,
-        (low, high),
-        cautions,
-        heard,
-        hearing.clicks,
-    )
+    power = math.nan if listener.clipped else max(hearing.threshold, 1e-300)
+    heard = 10 * math.log10(power / REFERENCES.get(unit, 1.0) ** 2)
+    rest = ((low, high), cautions, heard, hearing.clicks)
+    return Squeaks(tuple(bursts), name, reference_of(unit), motion.frequency, record, notes, *rest)
 
 
 @dataclass(frozen=True, eq=False)
