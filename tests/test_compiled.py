@@ -113,7 +113,8 @@ s[0] = b - asinh(c)
 s[1] = power(y[1], q[0]) if y[1] < 2.0 else 0.1
 """
 FILLED = f"""
-from stickslip.compiled import compiled, straight
+from stickslip.compiled import compiled
+from stickslip.solve.straight import straight
 
 lines = straight('''{LINES}''')
 

@@ -43,7 +43,8 @@ CODE = types.void(ROW, types.int64, ROW, types.float64, ROW)  # what fills in co
 Number = tuple[int, ...]
 HEAD = '''"""Taylor coefficients of one kind of system; written by `stickslip.solve.taylor`."""
 
-from stickslip.compiled import pointer, straight
+from stickslip.compiled import pointer
+from stickslip.solve.straight import straight
 from stickslip.solve.taylor import CODE
 
 '''
