@@ -62,6 +62,20 @@ def test_friction_that_rises_or_stays_falls_nowhere() -> None:
             assert isinstance(joint_law(joint), LinearSlope)
 
 
+def test_strokes_of_even_speed_are_answered() -> None:
+    """A stroke of even speed sees no slow sliding: curves that fall below its speed are there nowhere."""
+    t = np.arange(6000) / 200
+    speed = np.where(t % 8 < 4, 1.0, 2.0) * np.where(t % 2 < 1, 1.0, -1.0)
+    chance = np.random.default_rng(0)
+    q = np.cumsum(speed) / 200
+    torque = 0.5 * np.sin(q) + 0.03 * speed + 0.06 * np.sign(speed) + chance.normal(0, 0.005, t.size)
+    channels = {"theta": q + chance.normal(0, 1e-5, t.size), "force": torque}
+    joint = regress_joint(ss.Record.of(channels, fs=200, units={"force": "N m"}), inertia=0.02)
+    assert joint.static is None
+    assert joint.level.includes(0.06)
+    assert joint.viscous.includes(0.03)
+
+
 @pytest.mark.parametrize(
     ("draws", "most"), [(8, 0), pytest.param(200, 2, marks=pytest.mark.soak)], ids=["short", "long"]
 )

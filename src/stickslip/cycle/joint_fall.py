@@ -25,6 +25,7 @@ ROUNDS = 2  # about the load part and gravity's torque that the likeliest curve 
 LIKELY = 8.0  # halves of chi squared above the least, within which curves are told apart finer
 NEGLIGIBLE = 1e-3  # of the likeliest curve's weight
 SAME = 1e-3  # of the largest: a singular value below it is one instrument counted twice
+NOWHERE = 1e-150  # size of a column, below which its square vanishes: a curve that falls where nothing slides
 SURELY = 3.5  # deviations of the excess at rest: of 95 joints without one, seeds 6000 to 8042, none came to 3
 METHOD = "likelihood over Stribeck curves"
 FINER = 3  # rounds of likely curves closer together: three make 12 speeds of one step of the first
@@ -147,7 +148,7 @@ class _Solved:
 
     def left(self, design: Array) -> tuple[Array, float]:
         """The coefficients, and the square of what they leave of that of the torque which the instruments tell."""
-        sizes = np.linalg.norm(design, axis=0)
+        sizes = np.maximum(np.linalg.norm(design, axis=0), NOWHERE)
         told = self.basis.T @ self.torque
         columns = self.basis.T @ (design / sizes)
         solution, *_ = np.linalg.lstsq(columns, told, rcond=None)
@@ -179,7 +180,7 @@ def speed_of(log: Log, *, steered: bool = False) -> tuple[Array, float]:
 def _basis(base: Array, shapes: Array, same: float) -> Array:
     """An orthonormal basis of columns, and of what others have beside them."""
     first, _ = np.linalg.qr(base / np.linalg.norm(base, axis=0))
-    others = shapes / np.maximum(np.linalg.norm(shapes, axis=0), 1e-300)
+    others = shapes / np.maximum(np.linalg.norm(shapes, axis=0), NOWHERE)
     beside, sizes, _ = np.linalg.svd(others - first @ (first.T @ others), full_matrices=False)
     return np.column_stack([first, beside[:, sizes > same * sizes[0]]])
 
