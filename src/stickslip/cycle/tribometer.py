@@ -45,6 +45,8 @@ DEFINITIONS = {  # of the coefficient, beside what each is of a cycle
     "by_cycle": "mean magnitude over all samples of a cycle",
     "by_energy": "energy of a cycle over load and way",
 }
+ALIKE, DIPS = 0.3, 0.5  # of the mean magnitude: an offset that leaves less than ALIKE keeps the force above 1 - ALIKE
+LIFTED = 0.05  # of the load: what friction a contact pressed by less has, its ratio does not tell
 STATIC, NAME = "the static coefficient", "coefficient of friction, static"
 AUDIBLE = 5.0  # deviations of its noise, by which a peak's fall is seen
 NEAR = 0.5  # of the sliding friction: the static one's peak is looked for from here on
@@ -129,7 +131,7 @@ def friction_coefficients(
 ) -> Coefficients:
     r"""How large is the coefficient of friction, by which definition, and how does it wear in?
 
-    Of each cycle, with the load N of that cycle:
+    Of each cycle, with the load N of that cycle (of the plateau that of each sample, where it was measured):
 
     * plateau: the median of f while the contact slides, every sample weighed by its way, over N (where friction turns
       round over a tenth of the stroke, it lies .14 standard deviations of the noise below the level);
@@ -186,7 +188,13 @@ def friction_coefficients(
     label = cycles.labels(len(record))
     load, loads = _load(record, normal, label)
     friction = record["friction"]
-    of_cycles = {name: values / loads for name, values in _forces(friction, motion, cycles, label).items()}
+    forces = _forces(friction, motion, cycles, label)
+    _refuse_magnitudes(friction, forces, label)
+    even = friction
+    if load.method != "stated":
+        even = _under_mean_load(friction, record["normal"], loads, label, _levels(friction, motion, cycles, label))
+        forces["plateau"] = np.asarray(sum(_levels(even, motion, cycles, label)) / 2)
+    of_cycles = {name: values / loads for name, values in forces.items()}
     wear_in = fit_wear_in(of_cycles["plateau"])
     steady = _steady(wear_in, len(loads))
     status = Status(*_doubts(wear_in, steady, len(loads)), *([cycles.status] if cycles.status != "ok" else []))
@@ -197,7 +205,7 @@ def friction_coefficients(
         name: _beside(mean_of_cycles(_called(name), of_cycles[name][steady:], unit="1", method=how), relative, status)
         for name, how in DEFINITIONS.items()
     }
-    position, cycle, forward, back = _map(friction, motion, label, loads)
+    position, cycle, forward, back = _map(even, motion, label, loads)
     return Coefficients(
         **coefficients,
         load=load,
@@ -245,8 +253,6 @@ def _load(record: Record, normal: Constant | None, label: NDArray[np.intp]) -> t
 def _forces(friction: Array, motion: Motion, cycles: Cycles, label: NDArray[np.intp]) -> dict[str, Array]:
     """The friction of every cycle by each definition [N]."""
     count = len(cycles.edges) - 1
-    slides = sliding_parts(motion, cycles) & (label >= 0)
-    forward, back = (levels_of(sign, friction, motion, slides, label, count) for sign in (1.0, -1.0))
     means = []
     for sign in (1.0, -1.0):
         stroke = (label >= 0) & (sign * motion.velocity > 0)
@@ -257,11 +263,42 @@ def _forces(friction: Array, motion: Motion, cycles: Cycles, label: NDArray[np.i
     at = np.arange(len(work))
     per_cycle = [np.diff(np.interp(cycles.edges, at, values)) for values in (work, length)]
     return {
-        "plateau": (forward + back) / 2,
+        "plateau": np.asarray(sum(_levels(friction, motion, cycles, label)) / 2),
         "by_stroke": (means[0] - means[1]) / 2,
         "by_cycle": np.bincount(label[whole], np.abs(friction[whole]), count) / np.bincount(label[whole]),
         "by_energy": per_cycle[0] / per_cycle[1],
     }
+
+
+def _levels(friction: Array, motion: Motion, cycles: Cycles, label: NDArray[np.intp]) -> tuple[Array, Array]:
+    """The median of the friction of every cycle while it slides, forward and back [N]."""
+    slides, count = sliding_parts(motion, cycles) & (label >= 0), len(cycles.edges) - 1
+    forward, back = (levels_of(sign, friction, motion, slides, label, count) for sign in (1.0, -1.0))
+    return forward, back
+
+
+def _under_mean_load(
+    friction: Array, normal: Array, loads: Array, label: NDArray[np.intp], levels: tuple[Array, Array]
+) -> Array:
+    """The friction as under the mean load of its cycle, wherever along the stroke it is pressed; its zero as it is."""
+    zero = np.nan_to_num((levels[0] - levels[1]) / 2)[label]
+    mean = loads[label]
+    moved = zero + (friction - zero) * mean / np.maximum(np.abs(normal), LIFTED * mean)
+    return np.where(label >= 0, moved, friction)
+
+
+def _refuse_magnitudes(friction: Array, forces: Mapping[str, Array], label: NDArray[np.intp]) -> None:
+    """Refuse a force without its sign: alike both ways, and near none at every turn, as an offset never lets it be."""
+    size = float(np.nanmedian(forces["by_cycle"]))
+    side = 1.0 if np.median(friction) >= 0 else -1.0
+    least = np.full(len(forces["by_cycle"]), np.inf)
+    np.minimum.at(least, label[label >= 0], side * friction[label >= 0])
+    if np.nanmean(forces["plateau"]) < ALIKE * size and -DIPS * size < float(np.median(least)) < DIPS * size:
+        raise EstimateError(
+            f"the force has the same sign both ways, {size:.3g} N in the mean",
+            "friction turns round with the motion",
+            "it was logged as a magnitude: give the force with its sign",
+        )
 
 
 def _beside(coefficient: Estimate, relative: float, status: str) -> Estimate:
