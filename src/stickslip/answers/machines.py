@@ -58,6 +58,11 @@ WANTED = {
     "goal", "target", "desired", "command", "commands", "commanded", "cmd", "reference", "action", "output",
 }  # fmt: skip  # of a torque: not measured
 SOURCES = {"state", "states", "feedback"}  # who says it, not of which axis
+SAID = {
+    "rad": ("rad", "rad"), "deg": ("deg", "rad"), "Nm": ("N m", "N m"), "mNm": ("mN m", "N m"), "A": ("A", "A"),
+    "mA": ("mA", "A"),
+}  # fmt: skip  # at a title's end ("torque_Nm"): the unit, and that of SI
+NEARLY = 0.25  # of a turn: an encoder that wraps jumps by one within so much, and by no more from sample to sample else
 TURNING = {"theta": "rad", "reference": "rad", "motor": "rad", "force": "N m", "current": "A", "temperature": "K"}
 
 
@@ -271,11 +276,12 @@ def _with_friction(record: Record, joint: JointFriction) -> Record:
 
 @dataclass(frozen=True)
 class _Column:
-    """A channel of a log: what it holds, and of which axis."""
+    """A channel of a log: what it holds, of which axis, and the unit that its title ends in."""
 
     channel: str
     kind: str
     axis: str
+    unit: str = ""
 
 
 def axis_record(record: Record, *, axis: str | None = None) -> Record:
@@ -312,7 +318,7 @@ def axis_record(record: Record, *, axis: str | None = None) -> Record:
     """
     if axis is None and ("theta" in record or "x" in record):
         require_angle(record)
-        return record
+        return _unwrapped(record)
     columns = list(_columns(record))
     if all(column.kind != "theta" for column in columns):  # the motor's encoder is the only one
         columns = [replace(one, kind="theta") if one.kind == "motor" else one for one in columns]
@@ -334,12 +340,33 @@ def axis_record(record: Record, *, axis: str | None = None) -> Record:
         )
     log = _renamed(record, [column for column in columns if column.axis == chosen[0]], chosen[0])
     require_angle(log)
-    return log
+    return _unwrapped(log)
+
+
+def _unwrapped(record: Record) -> Record:
+    """Angles that jump by a turn, as of an encoder that counts one alone, counted on beyond it."""
+    samples, jumps = dict(record.samples), dict[str, int]()
+    for name in ("theta", "reference"):
+        turns = np.diff(samples[name]) / (2 * np.pi) if name in samples else np.zeros(0)
+        jumped = np.abs(turns) > 0.5
+        if np.any(jumped) and np.all(np.abs(np.abs(turns) - jumped) < NEARLY):
+            samples[name], jumps[name] = np.unwrap(samples[name]), int(jumped.sum())
+    if not jumps:
+        return record
+    if "theta" in samples and "reference" in samples:  # within half a turn of each other
+        ahead = np.median(samples["reference"] - samples["theta"]) / (2 * np.pi)
+        samples["reference"] = samples["reference"] - 2 * np.pi * np.rint(ahead)
+    step = Step("axis_record", {"jumps of a turn": jumps}, "angles counted on beyond a turn")
+    return replace(record, samples=samples, history=(*record.history, step))
 
 
 def _columns(record: Record) -> Iterator[_Column]:
+    lettered = any(called(record, name).endswith("_B") for name in record)  # then "_A" is an axis
     for name in record:
-        parts = re.findall(r"[a-z]+|\d+", re.sub(r"[\[(][^\[(]*[\])]\s*$", "", called(record, name).lower()))
+        title = re.sub(r"[\[(][^\[(]*[\])]\s*$", "", called(record, name))
+        bare, _, unit = title.rpartition("_")
+        title, unit = (bare, unit) if unit in SAID and not (lettered and unit == "A") else (title, "")
+        parts = re.findall(r"[a-z]+|\d+", title.lower())
         if OTHERS & set(parts):
             continue
         kinds = [
@@ -356,7 +383,7 @@ def _columns(record: Record) -> Iterator[_Column]:
             continue
         if kind == "theta" and WANTED & set(parts):
             kind, others = "reference", [word for word in others if word not in WANTED]
-        yield _Column(name, kind, "_".join(word for word in others if word not in SOURCES))
+        yield _Column(name, kind, "_".join(word for word in others if word not in SOURCES), unit)
 
 
 def _fits(name: str, axis: str) -> bool:
@@ -389,6 +416,9 @@ def _renamed(record: Record, columns: list[_Column], axis: str) -> Record:
                 channels[name] = replace(known, name=name, unit="K", quantity=VOCABULARY[name].words)
                 continue
             samples[name], titles[name] = record[column.channel], called(record, column.channel)
+            said, measured = SAID.get(column.unit, ("", ""))
+            if unstated and measured == usual:
+                samples[name], unstated = samples[name] * parse_unit(said, expect=usual).scale, False
             quantity = VOCABULARY[name].words
             channels[name] = replace(known, name=name, unit=unit, quantity=quantity, assumed=unstated)
     step = Step("axis_record", titles, f"axis {axis}" if axis else "one axis")

@@ -386,6 +386,7 @@ def _refuse_still(slides: Sliding, record: Record) -> None:
 def fitted(data: JointData) -> tuple[LeastSquares, tuple[str, ...], tuple[float, float], tuple[str, ...]]:
     """The regression, with viscous friction of each direction where these differ surely."""
     fit, terms, pull, left_out = _separable(data)
+    _refuse_driving(data, fit, terms)
     try:
         richer = (*terms, "uneven")
         fit_both, pull_both = about_load(data, richer)
@@ -394,6 +395,20 @@ def fitted(data: JointData) -> tuple[LeastSquares, tuple[str, ...], tuple[float,
     uneven = fit_both.combined(np.eye(len(richer))[-1], "", "", "")
     sure = abs(uneven.value) > SURELY * uneven.sd
     return (fit_both, richer, pull_both, left_out) if sure else (fit, terms, pull, left_out)
+
+
+def _refuse_driving(data: JointData, fit: LeastSquares, terms: tuple[str, ...]) -> None:
+    """Refuse friction that surely goes with the motion: it is that of another sign."""
+    speed = float(np.mean([np.abs(log.sliding.at(log.turned, 1)).mean() for log in data.logs]))
+    row = np.array([{"forward": 0.5, "back": 0.5, "viscous": speed}.get(term, 0.0) for term in terms])
+    friction = fit.combined(row, "", "", "")
+    if friction.value < -SURELY * friction.sd:
+        share = friction.value / float(np.sqrt(np.mean(data.torque**2)))
+        raise EstimateError(
+            f"friction at the mean speed is {share:.2g} of the torque: it drives the motion",
+            "friction opposes the motion",
+            'if torque and position count the other way round, give one with a minus: --channels "force=-COLUMN [N m]"',
+        )
 
 
 def _separable(data: JointData) -> tuple[LeastSquares, tuple[str, ...], tuple[float, float], tuple[str, ...]]:

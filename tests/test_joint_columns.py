@@ -1,0 +1,68 @@
+"""What a joint's columns are: units at the end of a title, angles that wrap, and signs the wrong way round."""
+
+import numpy as np
+import pytest
+
+import stickslip as ss
+from stickslip.answers import analyze_joint, axis_record
+from stickslip.cycle import regress_joint
+from stickslip.errors import EstimateError
+
+T = np.arange(6000) / 200
+Q = 0.3 + 2.4 * np.sin(2 * np.pi * 0.2 * T) + 0.8 * np.sin(2 * np.pi * 0.7 * T)
+V, A = np.gradient(Q, T), np.gradient(np.gradient(Q, T), T)
+TORQUE = 0.02 * A + 0.03 * V + np.sign(V) * (0.06 + 0.15 * np.abs(0.5 * np.sin(Q))) + 0.5 * np.sin(Q)
+TORQUE = TORQUE + np.random.default_rng(0).normal(0, 0.01, T.size)
+
+
+@pytest.mark.parametrize("places", [{"position_rad": Q}, {"position_deg": np.degrees(Q)}])
+@pytest.mark.parametrize(
+    ("torques", "constant"),
+    [({"torque_Nm": TORQUE}, None), ({"current_mA": 1e3 * TORQUE}, 1.0), ({"current_A": TORQUE}, 1.0)],
+)
+def test_a_unit_at_the_end_of_a_title_is_one(places, torques, constant) -> None:
+    """They were taken for axes, one of which had a position and the other a torque."""
+    joint = analyze_joint(ss.Record.of({**places, **torques}, fs=200), torque_constant=constant).joint
+    assert joint.forward.includes(0.06)
+    assert joint.status == "ok"
+
+
+def test_letters_that_tell_axes_are_no_units() -> None:
+    for others in ({"position_B": 0 * Q, "current_B": 0 * Q}, {"position_B": 0 * Q}, {}):
+        channels = {"position_A": Q / 2, "current_A": TORQUE, **others}
+        axis = axis_record(ss.Record.of(channels, fs=200), axis="A" if others else None)
+        assert list(axis) == ["theta", "current"]
+        assert axis["current"] == pytest.approx(TORQUE)
+
+
+@pytest.mark.parametrize("names", [("theta", "reference", "force"), ("position", "goal_position", "effort")])
+def test_an_angle_that_wraps_is_counted_on(names) -> None:
+    """It was told to be stuck for 80 % of the time, with no scatter, and its controller to pull by whole turns."""
+    told = Q + TORQUE / 18
+    whole, wrapped = (
+        ss.Record.of(
+            dict(zip(names, channels, strict=True)), fs=200, units=dict(zip(names, ("rad", "rad", "N m"), strict=True))
+        )
+        for channels in ((Q, told, TORQUE), (Q % (2 * np.pi), (told + np.pi) % (2 * np.pi) - np.pi, TORQUE))
+    )
+    log, counted = axis_record(whole), axis_record(wrapped)
+    turns = (counted["theta"] - log["theta"]) / (2 * np.pi)
+    assert np.ptp(turns) < 1e-9
+    assert turns[0] == pytest.approx(round(turns[0]))
+    assert counted["reference"] - counted["theta"] == pytest.approx(log["reference"] - log["theta"])
+    assert "counted on" in counted.history[-1].outcome
+    assert analyze_joint(wrapped).sticks.share.value == pytest.approx(analyze_joint(whole).sticks.share.value, abs=0.02)
+
+
+def test_an_angle_that_jumps_otherwise_is_left_alone() -> None:
+    jumps = Q + 4.0 * (T > 10)
+    assert axis_record(ss.Record.of({"theta": jumps, "force": TORQUE}, fs=200))["theta"] == pytest.approx(jumps)
+
+
+@pytest.mark.parametrize("gravity", [True, False])
+def test_a_torque_of_the_other_sign_is_refused(gravity: bool) -> None:
+    """Told was that no dry friction was felt: "more than unknown would be"."""
+    torque = TORQUE if gravity else TORQUE - 0.5 * np.sin(Q)
+    log = ss.Record.of({"theta": Q, "force": -torque}, fs=200, units={"force": "N m"})
+    with pytest.raises(EstimateError, match=r"it drives the motion; friction opposes the motion; .*force=-COLUMN"):
+        regress_joint(log, gravity=gravity)
