@@ -134,3 +134,13 @@ def test_a_band_brake_rings(dataset: Callable[[str], Path], tmp_path: Path) -> N
         forward, back = (values[f"damping ratio of that ringing, {side}"] for side in ("forward", "back"))
         assert forward - back > damping  # forward it dies away, back it goes on
         assert "After slip begins" in (tmp_path / "report.html").read_text()
+
+
+def test_a_friction_that_is_its_level_to_rounding_does_not_ring() -> None:
+    """The search for a mode in what rounding leaves tried one that grows beyond all numbers."""
+    angle = 2 * np.pi * np.arange(8000) / 1000
+    noise = np.random.default_rng(1).normal(0, 1e-7, angle.size)
+    channels = {"x": 0.02 * np.sin(angle) + noise, "v": 0.04 * np.pi * np.cos(angle)}
+    record = ss.Record.of({**channels, "friction": 1.5 * np.sign(channels["v"])}, fs=1000.0)
+    with pytest.raises(EstimateError, match="no ringing"):
+        ss.cycle.slip_ringing(record)

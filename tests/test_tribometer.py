@@ -181,7 +181,7 @@ def cell(fs=1000.0, static=0.25, kinetic=0.18, stiffness=2e4, period=0.5, freque
     damping, speed = 0.3 * np.sqrt(stiffness * mass), 2 * STROKE / period
     every, count = round(1 / fs / step), round(rounds * period / step)
     away, rate, holds, side, bears = 0.0, 0.0, True, 1.0, static
-    force = np.empty(count // every + 1)
+    force = np.empty(-(-count // every))
     for row in range(count):
         stage = speed if (row * step / period) % 1 < 0.5 else -speed
         if row % every == 0:

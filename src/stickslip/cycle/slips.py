@@ -288,8 +288,9 @@ def _strongest(swings: Sequence[Array], fs: float) -> float | None:
 
 
 def _waves(parameters: Array, count: int, fs: float, degree: int = SLOW) -> Array:
-    """Cosine and sine of a decaying mode, less what a polynomial takes of them."""
-    wave = np.exp(complex(*parameters) * np.arange(count) / fs)
+    """Cosine and sine of a decaying mode, 1 at their largest, less what a polynomial takes of them."""
+    end = count - 1 if parameters[0] > 0 else 0  # where a trial of the search that grows is 1, so that none overflows
+    wave = np.exp(complex(*parameters) * (np.arange(count) - end) / fs)
     columns, slow = np.column_stack([wave.real, wave.imag]), _slow(count, degree)
     return np.asarray(columns - slow @ (slow.T @ columns))
 
@@ -308,7 +309,9 @@ def _mode(swings: Sequence[Array], start: Array, fs: float, degree: int = SLOW) 
 
 
 def _amplitude(swings: Array, parameters: Array, fs: float) -> float:
-    return float(np.linalg.norm(np.linalg.lstsq(_waves(parameters, len(swings), fs), swings, rcond=None)[0]))
+    """Of the mode where the slip begins."""
+    largest = np.linalg.norm(np.linalg.lstsq(_waves(parameters, len(swings), fs), swings, rcond=None)[0])
+    return float(largest * math.exp(-max(parameters[0], 0.0) * (len(swings) - 1) / fs))
 
 
 @dataclass(frozen=True, eq=False)
