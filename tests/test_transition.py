@@ -362,3 +362,9 @@ def test_a_record_too_short_for_sticks_is_mapped_where_its_wavelets_fit() -> Non
     assert maps.ridges == ()
     assert maps.mechanism is None
     assert maps.notes == ("30 samples are mapped, and too few to ask about spikes and sticks: give 256.",)
+
+
+def test_a_channel_that_never_changes_is_refused() -> None:
+    """A silent sound had a page without any answer."""
+    with pytest.raises(RecordError, match="channel sound is constant at 0; only what changes"):
+        ss.answers.time_frequency(ss.Record.of({"sound": np.zeros(4000)}, fs=8000.0))

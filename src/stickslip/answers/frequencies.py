@@ -150,7 +150,7 @@ def time_frequency(
     Raises
     ------
     RecordError
-        As :func:`wavelet_map`; or no part at all, or no channel that moves to and fro.
+        As :func:`wavelet_map`; or no part at all, or a channel that does not move to and fro.
     EstimateError
         A mass that is not positive, a negative spring.
 
@@ -174,6 +174,12 @@ def time_frequency(
         "wavelet_frequency": wavelet_frequency,
         "normalisation": normalisation,
     }
+    if second is None and np.ptp(first[name]) == 0:
+        raise RecordError(
+            f"channel {name} is constant at {first[name][0]:g}",
+            "only what changes has a frequency",
+            "look at its cable, range and column, or name another channel=",
+        )
     if second is None and len(first) <= LONG:
         begin, long = first, []
         wavelets = wavelet_map(first, name, **options)
