@@ -7,6 +7,7 @@ import stickslip as ss
 from stickslip.answers import analyze_joint, axis_record
 from stickslip.cycle import regress_joint
 from stickslip.errors import EstimateError
+from stickslip.estimate import stands
 
 T = np.arange(6000) / 200
 Q = 0.3 + 2.4 * np.sin(2 * np.pi * 0.2 * T) + 0.8 * np.sin(2 * np.pi * 0.7 * T)
@@ -66,3 +67,15 @@ def test_a_torque_of_the_other_sign_is_refused(gravity: bool) -> None:
     log = ss.Record.of({"theta": Q, "force": -torque}, fs=200, units={"force": "N m"})
     with pytest.raises(EstimateError, match=r"it drives the motion; friction opposes the motion; .*force=-COLUMN"):
         regress_joint(log, gravity=gravity)
+
+
+def test_what_a_zero_of_the_torque_would_show_is_said_of_either_direction() -> None:
+    """An axis that stands upright was told to rub against 396 N forward, without a doubt, of 128 N either way."""
+    for zero in (0.0, 0.03, 0.3):
+        log = ss.Record.of({"theta": Q, "force": TORQUE + zero}, fs=200, units={"force": "N m"})
+        joint = regress_joint(log)
+        assert joint.level.includes(0.06 + 0.15 * joint.carried)
+        assert joint.level.status == "ok"
+        for one in (joint.forward, joint.back):
+            assert ("zero of the torque" in one.status) == (zero > 0)
+            assert stands(one.status) or not one.known

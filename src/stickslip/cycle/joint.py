@@ -39,7 +39,7 @@ OFTEN, USUAL = 0.25, 0.02  # odds that a torque is late, chosen, and s by which 
 STRAYS = 1.6  # times its chance that a delay strays: so it did on 60 joints of 15 ms, seeds 70100 to 70225
 NEARER, NEAR = 8, 1e-3  # steps towards the delay, and the last one's size in samples
 WAYS = ((1.0, "forward"), (-1.0, "back"))
-NOISY, LOADED, CONFOUNDED = "noisy", "loaded", "confounded"  # kinds of doubt
+NOISY, LOADED, CONFOUNDED, SHIFTED = "noisy", "loaded", "confounded", "shifted"  # kinds of doubt
 BARELY = 0.5  # of a value: an interval that is wider on either side hardly tells it
 RICHER = {"load", "uneven", *WARM}  # what Coulomb and viscous friction of both directions alike do not have
 
@@ -312,7 +312,7 @@ def _answer(
     known = {term: tell.one(term) for term in terms if term not in ("uneven", *FALL)}
     if "load" in known:
         known["load"] = known["load"].within(0.0)
-    forward, back = known["forward"].within(0.0), known["back"].within(0.0)
+    forward, back = tell.ways()
     level = _level(tell, pull, known.get("load"))
     ways: list[Estimate | None] = [None, None]
     if "uneven" in terms:
@@ -449,6 +449,19 @@ class Telling:
         partner = self._partner(self.terms.index(term))
         doubt = Doubt(f"hardly told from the {WORDS[partner]}: {ADVICE[term]}", CONFOUNDED, lesser=True)
         return replace(estimate, status=Status(self.status, doubt))
+
+    def ways(self) -> tuple[Estimate, Estimate]:
+        """Coulomb friction forward and back, with a doubt where these differ: so does what a zero makes of them."""
+        shift = self.sum({"forward": 0.5, "back": -0.5}, "")
+        doubts = []
+        if abs(shift.value) > SURELY * shift.sd:
+            read = "torque" if self.turning else "force"
+            what = f"a zero of the {read} that is off by {abs(shift.value):.3g} {shift.unit}"
+            doubts = [Doubt(f"{what}, or a constant load, would look the same", SHIFTED, lesser=True)]
+        forward, back = (self.one(way).within(0.0) for way in ("forward", "back"))
+        return replace(forward, status=Status(forward.status, *doubts)), replace(
+            back, status=Status(back.status, *doubts)
+        )
 
     def sum(self, weights: dict[str, float], name: str) -> Estimate:
         """A sum of coefficients."""

@@ -141,8 +141,7 @@ def regress_joint_logs(
         for place, (log, record) in enumerate(zip(data, records, strict=True))
     ]
     return JointLogs(
-        known["forward"].within(0.0),
-        known["back"].within(0.0),
+        *tell.ways(),
         known["viscous"],
         load=known.get("load"),
         inertia=known.get("inertia"),

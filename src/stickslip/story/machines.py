@@ -224,10 +224,7 @@ def _directions(joint: JointFriction) -> Iterator[str]:
         return
     apart = abs(forward.value - back.value)
     if apart > APART * joint.level.value and apart > 2 * (forward.sd + back.sd):
-        yield (
-            f"The two directions differ: {value_of(forward)} forward and {value_of(back)} back without load; a torque "
-            "sensor's zero offset looks the same."
-        )
+        yield f"The two directions differ: {value_of(forward)} forward and {value_of(back)} back without load."
 
 
 def _fall(joint: JointFriction) -> Iterator[str]:
