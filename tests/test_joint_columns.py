@@ -79,3 +79,9 @@ def test_what_a_zero_of_the_torque_would_show_is_said_of_either_direction() -> N
         for one in (joint.forward, joint.back):
             assert ("zero of the torque" in one.status) == (zero > 0)
             assert stands(one.status) or not one.known
+
+
+def test_an_axis_that_moves_straight_is_refused_in_its_own_unit() -> None:
+    log = ss.Record.of({"x": 1e-3 * T, "force": TORQUE}, fs=200)
+    with pytest.raises(EstimateError, match=r"faster than \S+ m/s at"):
+        regress_joint(log)

@@ -112,6 +112,14 @@ def test_a_load_that_is_none_is_refused(normal, error, words) -> None:
         friction_coefficients(strokes(), normal=normal)
 
 
+def test_a_measured_load_of_none_is_the_records() -> None:
+    """On the command line that is exit code 1 and not wrong use."""
+    record = strokes()
+    pressed = record.with_channel("normal", np.zeros(len(record)), unit="N")
+    with pytest.raises(RecordError, match="a normal load of 0 N; the load presses"):
+        friction_coefficients(pressed)
+
+
 def test_wear_in_is_told_and_left_behind() -> None:
     cycle = np.arange(120)
     coefficients = friction_coefficients(strokes(120, 0.3 + 0.1 * np.exp(-cycle / 12)), normal=LOAD)

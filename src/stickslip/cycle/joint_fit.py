@@ -376,8 +376,9 @@ def _refuse_still(slides: Sliding, record: Record) -> None:
     ways = [int(np.sum(slides.side[slides.rows] == side)) for side in (1, -1)]
     if min(ways) >= ROWS // 2 and sum(ways) >= ROWS:
         return
+    unit = "rad/s" if turning(record) else "m/s"
     raise EstimateError(
-        f"it slides steadily faster than {slides.slowest:.2g} rad/s at {ways[0]} instants forward and {ways[1]} back",
+        f"it slides steadily faster than {slides.slowest:.2g} {unit} at {ways[0]} instants forward and {ways[1]} back",
         f"friction is told from gravity by strokes both ways, {ROWS // 2} instants each at least",
         "swing it back and forth, farther or faster, through the same places",
     )

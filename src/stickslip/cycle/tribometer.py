@@ -162,9 +162,9 @@ def friction_coefficients(
     Raises
     ------
     RecordError
-        A channel is missing or broken, or there is no load.
+        A channel is missing or broken, or there is no load, or none that is positive.
     ModelError
-        A load that is not positive.
+        A stated load that is not positive.
     EstimateError
         No motion to and fro, or no cycle that slides both ways.
 
@@ -246,7 +246,8 @@ def _load(record: Record, normal: Constant | None, label: NDArray[np.intp]) -> t
             "name its column (normal=), or state it: --normal '10 N'",
         )
     if not load.value > 0:
-        raise ModelError(f"a normal load of {load.value:g} N", "the load presses: it is positive", "check normal")
+        wrong = ModelError if load.method == "stated" else RecordError
+        raise wrong(f"a normal load of {load.value:g} N", "the load presses: it is positive", "check normal")
     return load, loads
 
 
