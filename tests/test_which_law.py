@@ -23,7 +23,7 @@ from stickslip.law.law import REMAINDER, _end
 from stickslip.law.search import Knob, Problem
 from stickslip.law.start import Shown, nuisance_knobs
 from stickslip.law.stretch import channels_of
-from stickslip.law.trials import Seen, like
+from stickslip.law.trials import Seen, Trial, like
 from stickslip.law.verdict import Remainder
 from stickslip.laws.guessing import _by_units, _natural, asked_for, hypotheses
 from stickslip.record.record import Step
@@ -175,6 +175,22 @@ def test_no_law_ends_above_one_that_it_contains(kind: str, seed: int) -> None:
     if kind != "Stribeck":  # there a contact at the stiffest that is searched leaves up to 1.7 times as much
         assert misfits["compliant"] < 1.1 * misfits["Coulomb"]
     assert misfits["Stribeck"] < 1.05 * misfits["static"]
+
+
+def test_bristles_begin_at_a_contact_however_stiff() -> None:
+    """Where they ended above one that gives way by 0.3 % of the stroke they began at the Stribeck curve alone, ended at
+    17 times what they leave from the truth, and were left out at 98.9 % on their own rig."""
+    contact = ss.laws.CompliantContact(0.33, stiffness=136000.0, damping=139.0)
+    system = slider().having(law=contact)
+    told = record("compliant")
+    stretch = Shown.of(told, channels_of(told, None), system).stretch(0, (0, len(told) - 1))
+    problem = Problem.of(system, [stretch], [])
+    trial = Trial("compliant", problem, problem.begin(np.zeros(0)))
+    assert trial.stiff
+    bristles = hypotheses()["LuGre"]
+    begun = bristles.next_to({"compliant": trial})
+    assert {law.stiffness for law in begun} >= {contact.stiffness}
+    assert not bristles.continued({"compliant": trial})
 
 
 def test_no_law_ends_above_one_that_it_is_a_case_of() -> None:

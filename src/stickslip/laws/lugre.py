@@ -136,18 +136,24 @@ def _guesses(seen: Observed) -> list[LuGre]:
 def _from_compliant(simpler: Mapping[str, Searched]) -> list[LuGre]:
     """The contact with a steep curve, where it gives way."""
     contact = simpler.get("compliant")
-    if contact is None or contact.stiff:
-        return []
+    return [] if contact is None or contact.stiff else [_steep(contact)]
+
+
+def _steep(contact: Searched) -> LuGre:
+    """A contact with a curve that is hardly felt."""
     bristle, speed = contact.law, FALLS[-1] * float(contact.scales[:, 1].max())
     static = (1 + LITTLE) * bristle.kinetic
-    return [LuGre(bristle.kinetic, static, speed=speed, stiffness=bristle.stiffness, damping=bristle.damping)]
+    return LuGre(bristle.kinetic, static, speed=speed, stiffness=bristle.stiffness, damping=bristle.damping)
 
 
 def _next_to(simpler: Mapping[str, Searched]) -> list[LuGre]:
-    """As from a contact; of the Stribeck curve with bristles next to rigid: softer ones left 40 times as much."""
+    """A contact, however stiff, with a steep curve; or the Stribeck curve with bristles next to rigid.
+
+    Softer ones left 40 times as much as the curve.
+    """
     curve = simpler.get("Stribeck")
     if curve is None:
-        return _from_compliant(simpler)
+        return [_steep(simpler["compliant"])] if "compliant" in simpler else []
     law = curve.law
     stiffness = law.kinetic / (STIFFEST * float(curve.scales[:, 0].min()))
     damping = 0.2 * math.sqrt(stiffness * curve.mass)
