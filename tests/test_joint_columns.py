@@ -85,3 +85,16 @@ def test_an_axis_that_moves_straight_is_refused_in_its_own_unit() -> None:
     log = ss.Record.of({"x": 1e-3 * T, "force": TORQUE}, fs=200)
     with pytest.raises(EstimateError, match=r"faster than \S+ m/s at"):
         regress_joint(log)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_noise_of_an_even_torque_tells_no_delay(seed: int) -> None:
+    """Told were -42 to 23 ms, surely, of torques in time."""
+    chance = np.random.default_rng(seed)
+    speed = chance.choice([0.3, 0.6, 1.0, 2.0], 4)[T.astype(int) // 8] * np.where(T % 2 < 1, 1.0, -1.0)
+    torque = 0.03 * speed + 0.06 * np.sign(speed) + chance.normal(0, 0.005, T.size)
+    channels = {"theta": np.cumsum(speed) / 200 + chance.normal(0, 1e-5, T.size), "force": torque}
+    log = ss.Record.of(channels, fs=200, units={"force": "N m"})
+    joint = regress_joint(log, gravity=False, inertia=0.02)
+    assert joint.delay is None
+    assert "delay of the torque" in " ".join(joint.left_out)

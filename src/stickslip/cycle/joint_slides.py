@@ -71,12 +71,11 @@ class Window:
         within[: self.half + REACH] = within[len(side) - self.half - REACH :] = False
         return within
 
-    @cached_property
-    def noise_of_acceleration(self) -> float:
-        """Standard deviation of a second derivative for white noise of unit standard deviation."""
+    def noise_of_derivative(self, order: int) -> float:
+        """Standard deviation of a derivative for white noise of unit standard deviation."""
         impulse = np.zeros(len(self.weights) + 8)
         impulse[len(impulse) // 2] = 1.0
-        return float(np.linalg.norm(self.apply(impulse, 2)))
+        return float(np.linalg.norm(self.apply(impulse, order)))
 
 
 @dataclass(frozen=True)
