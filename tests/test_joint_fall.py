@@ -12,7 +12,7 @@ from stickslip.answers import analyze_joint, joint_law
 from stickslip.cli.program import main
 from stickslip.cycle import regress_joint
 from stickslip.errors import EstimateError
-from stickslip.estimate import stands
+from stickslip.estimate import kinds, stands
 from stickslip.figures.law import plot_joint
 from stickslip.laws import LinearSlope, Stribeck
 from stickslip.statistics import mixture
@@ -60,6 +60,20 @@ def test_friction_that_rises_or_stays_falls_nowhere() -> None:
             joint = regress_joint(log(static=static, seed=seed))
             assert joint.static is None
             assert isinstance(joint_law(joint), LinearSlope)
+
+
+@pytest.mark.parametrize("static", [0.03, 0.12])
+def test_friction_that_bends_over_the_speed_is_doubted(static: float) -> None:
+    """Of the nearest line stood a level that was off by up to 60 %, as sure as noise alone leaves it."""
+    joint = regress_joint(log(static=static, speed=2.0))
+    assert joint.static is None
+    for name in ("level", "forward", "back", "viscous"):
+        assert "bent" in kinds(getattr(joint, name).status), name
+    assert "bent" not in kinds(joint.inertia.status)
+
+
+def test_friction_along_a_line_is_not_said_to_bend() -> None:
+    assert not any("bent" in kinds(regress_joint(log(static=0.06, seed=seed)).level.status) for seed in range(6))
 
 
 def test_strokes_of_even_speed_are_answered() -> None:
