@@ -41,6 +41,7 @@ HEARD = (
     1.5  # times the power of noise in the torque's rate: noise alone had 0.9 to 1.2 on 10 logs, 41 others 1.4 at least
 )
 BENDS = 3.0  # deviations of a part with the speed's square: 165 joints without one had 2.7 at most, seeds 881000 on
+ROUNDING = 1e-5  # of the torque: of a log without noise derivatives leave some 1e-9
 STRAYS = 1.6  # times its chance that a delay strays: so it did on 60 joints of 15 ms, seeds 70100 to 70225
 NEARER, NEAR = 8, 1e-3  # steps towards the delay, and the last one's size in samples
 WAYS = ((1.0, "forward"), (-1.0, "back"))
@@ -448,7 +449,11 @@ def _worries(data: JointData, fit: LeastSquares, terms: tuple[str, ...], record:
 
 def _bends(data: JointData, terms: tuple[str, ...]) -> list[Doubt]:
     """A doubt where friction is surely no line over the speed, by a part that goes with its square."""
-    if any(term in FALL for term in terms) or with_term(data, terms, "bend", BENDS) is None:
+    bent = None if any(term in FALL for term in terms) else with_term(data, terms, "bend", BENDS)
+    if bent is None:
+        return []
+    part = coefficient(bent[0], (*terms, "bend"), "bend") * data.columns(("bend",), 0.0, (0.0, 0.0))
+    if np.linalg.norm(part) < ROUNDING * np.linalg.norm(data.torque):
         return []
     return [Doubt("friction bends with the speed: this is of the line nearest to it, as its interval is", BENT)]
 
