@@ -37,9 +37,8 @@ Array = NDArray[np.float64]
 BIASED = 0.01  # share of noise in the power of the acceleration above which the inertia is visibly low
 LATEST = 0.1  # s that a torque may be late
 OFTEN, USUAL = 0.25, 0.02  # odds that a torque is late, chosen, and s by which it then usually is, chosen
-HEARD = (
-    1.5  # times the power of noise in the torque's rate: noise alone had 0.9 to 1.2 on 10 logs, 41 others 1.4 at least
-)
+# Times the power of noise in the torque's rate: noise alone had 0.9 to 1.2 on 10 logs, 41 others 1.4 at least.
+HEARD = 1.5
 BENDS = 3.0  # deviations of a part with the speed's square: 165 joints without one had 2.7 at most, seeds 881000 on
 ROUNDING = 1e-5  # of the torque: of a log without noise derivatives leave some 1e-9
 STRAYS = 1.6  # times its chance that a delay strays: so it did on 60 joints of 15 ms, seeds 70100 to 70225
