@@ -10,7 +10,7 @@ import joints
 import stickslip as ss
 from stickslip.answers import analyze_joint, joint_law
 from stickslip.cli.program import main
-from stickslip.cycle import regress_joint
+from stickslip.cycle import regress_joint, regress_joint_logs
 from stickslip.errors import EstimateError
 from stickslip.estimate import kinds, stands
 from stickslip.figures.law import plot_joint
@@ -65,11 +65,13 @@ def test_friction_that_rises_or_stays_falls_nowhere() -> None:
 @pytest.mark.parametrize("static", [0.03, 0.12])
 def test_friction_that_bends_over_the_speed_is_doubted(static: float) -> None:
     """Of the nearest line stood a level that was off by up to 60 %, as sure as noise alone leaves it."""
-    joint = regress_joint(log(static=static, speed=2.0))
+    joint = regress_joint(log(static=static, speed=2.0, noise=0.005))
     assert joint.static is None
     for name in ("level", "forward", "back", "viscous"):
         assert "bent" in kinds(getattr(joint, name).status), name
     assert "bent" not in kinds(joint.inertia.status)
+    together = regress_joint_logs([log(static=static, speed=2.0, noise=0.005, seed=seed) for seed in (1, 2)])
+    assert {"bent"} <= kinds(together.forward.status) & kinds(together.viscous.status) - kinds(together.inertia.status)
 
 
 def test_friction_along_a_line_is_not_said_to_bend() -> None:

@@ -58,7 +58,7 @@ WANTED = {
     "goal", "target", "desired", "command", "commands", "commanded", "cmd", "reference", "action", "output",
 }  # fmt: skip  # of a torque: not measured
 SOURCES = {"state", "states", "feedback"}  # who says it, not of which axis
-SAID = {
+TITLE_UNITS = {
     "rad": ("rad", "rad"), "deg": ("deg", "rad"), "Nm": ("N m", "N m"), "mNm": ("mN m", "N m"), "A": ("A", "A"),
     "mA": ("mA", "A"),
 }  # fmt: skip  # at a title's end ("torque_Nm"): the unit, and that of SI
@@ -365,7 +365,7 @@ def _columns(record: Record) -> Iterator[_Column]:
     for name in record:
         title = re.sub(r"[\[(][^\[(]*[\])]\s*$", "", called(record, name))
         bare, _, unit = title.rpartition("_")
-        title, unit = (bare, unit) if unit in SAID and not (lettered and unit == "A") else (title, "")
+        title, unit = (bare, unit) if unit in TITLE_UNITS and not (lettered and unit == "A") else (title, "")
         parts = re.findall(r"[a-z]+|\d+", title.lower())
         if OTHERS & set(parts):
             continue
@@ -416,9 +416,9 @@ def _renamed(record: Record, columns: list[_Column], axis: str) -> Record:
                 channels[name] = replace(known, name=name, unit="K", quantity=VOCABULARY[name].words)
                 continue
             samples[name], titles[name] = record[column.channel], called(record, column.channel)
-            said, measured = SAID.get(column.unit, ("", ""))
-            if unstated and measured == usual:
-                samples[name], unstated = samples[name] * parse_unit(said, expect=usual).scale, False
+            written, meant = TITLE_UNITS.get(column.unit, ("", ""))
+            if unstated and meant == usual:
+                samples[name], unstated = samples[name] * parse_unit(written, expect=usual).scale, False
             quantity = VOCABULARY[name].words
             channels[name] = replace(known, name=name, unit=unit, quantity=quantity, assumed=unstated)
     step = Step("axis_record", titles, f"axis {axis}" if axis else "one axis")

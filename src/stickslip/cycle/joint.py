@@ -328,7 +328,7 @@ def _answer(
         fit, terms, pull = fall.fits[fall.best], fall.terms, fall.pull
     status = Status(*_worries(data, fit, terms, record))
     tell = Telling(data, fit, terms, turning(record), status)
-    rubs = replace(tell, status=Status(status, *_bends(data, terms)))
+    rubs = replace(tell, status=Status(status, *bends(data, terms)))
     if fall is not None:
         tell = rubs = Averaged(data, fit, terms, turning(record), status, fall)
     known = {term: (rubs if term in RUBS else tell).one(term) for term in terms if term not in ("uneven", *FALL)}
@@ -446,7 +446,7 @@ def _worries(data: JointData, fit: LeastSquares, terms: tuple[str, ...], record:
     return worries
 
 
-def _bends(data: JointData, terms: tuple[str, ...]) -> list[Doubt]:
+def bends(data: JointData, terms: tuple[str, ...]) -> list[Doubt]:
     """A doubt where friction is surely no line over the speed, by a part that goes with its square."""
     bent = None if any(term in FALL for term in terms) else with_term(data, terms, "bend", BENDS)
     if bent is None:

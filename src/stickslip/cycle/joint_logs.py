@@ -8,10 +8,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from stickslip.cycle.joint import RICHER, Telling, delay_of, punctual
+from stickslip.cycle.joint import RICHER, RUBS, Telling, bends, delay_of, punctual
 from stickslip.cycle.joint_fit import JointData, about_load, fitted, joint_data, pooled, turning, warmed
 from stickslip.errors import EstimateError, RecordError
-from stickslip.estimate import Constant, Estimate, Result
+from stickslip.estimate import Constant, Estimate, Result, Status
 from stickslip.record.record import Record
 
 Array = NDArray[np.float64]
@@ -135,13 +135,14 @@ def regress_joint_logs(
     data = [punctual(one, delay) for one in data]
     fit, terms, _, left_out = fitted(pooled(data))
     tell = Telling(pooled(data), fit, terms, turning(records[0]), "ok")
-    known = {term: tell.one(term) for term in terms if term != "uneven"}
+    rubs = replace(tell, status=Status(*bends(pooled(data), terms)))
+    known = {term: (rubs if term in RUBS else tell).one(term) for term in terms if term != "uneven"}
     predictions = [
         _predicted(log, pooled(data[:place] + data[place + 1 :]), record)
         for place, (log, record) in enumerate(zip(data, records, strict=True))
     ]
     return JointLogs(
-        *tell.ways(),
+        *rubs.ways(),
         known["viscous"],
         load=known.get("load"),
         inertia=known.get("inertia"),
