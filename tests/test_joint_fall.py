@@ -62,15 +62,15 @@ def test_friction_that_rises_or_stays_falls_nowhere() -> None:
             assert isinstance(joint_law(joint), LinearSlope)
 
 
-@pytest.mark.parametrize("static", [0.03, 0.12])
-def test_friction_that_bends_over_the_speed_is_doubted(static: float) -> None:
-    """Of the nearest line stood a level that was off by up to 60 %, as sure as noise alone leaves it."""
-    joint = regress_joint(log(static=static, speed=2.0, noise=0.005))
+@pytest.mark.parametrize(("static", "speed"), [(0.03, 2.0), (0.12, 2.0), (0.03, 0.4)])
+def test_friction_that_bends_over_the_speed_is_doubted(static: float, speed: float) -> None:
+    """Of the nearest line stood a level that was off by up to 90 %, as sure as noise alone leaves it."""
+    joint = regress_joint(log(static=static, speed=speed, noise=0.005))
     assert joint.static is None
     for name in ("level", "forward", "back", "viscous"):
         assert "bent" in kinds(getattr(joint, name).status), name
     assert "bent" not in kinds(joint.inertia.status)
-    together = regress_joint_logs([log(static=static, speed=2.0, noise=0.005, seed=seed) for seed in (1, 2)])
+    together = regress_joint_logs([log(static=static, speed=speed, noise=0.005, seed=seed) for seed in (1, 2)])
     assert {"bent"} <= kinds(together.forward.status) & kinds(together.viscous.status) - kinds(together.inertia.status)
 
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from stickslip.cycle.joint_fall import FALL, Fall, falling
+from stickslip.cycle.joint_fall import FALL, Fall, bends, falling
 from stickslip.cycle.joint_fit import (
     ADVICE,
     SURELY,
@@ -23,7 +23,6 @@ from stickslip.cycle.joint_fit import (
     joint_data,
     turning,
     warmed,
-    with_term,
 )
 from stickslip.cycle.regression import TURNING, UNITS
 from stickslip.errors import EstimateError
@@ -39,8 +38,6 @@ LATEST = 0.1  # s that a torque may be late
 OFTEN, USUAL = 0.25, 0.02  # odds that a torque is late, chosen, and s by which it then usually is, chosen
 # Times the power of noise in the torque's rate: noise alone had 0.9 to 1.2 on 10 logs, 41 others 1.4 at least.
 HEARD = 1.5
-BENDS = 3.0  # deviations of a part with the speed's square: 165 joints without one had 2.7 at most, seeds 881000 on
-ROUNDING = 1e-5  # of the torque: of a log without noise derivatives leave some 1e-9
 STRAYS = 1.6  # times its chance that a delay strays: so it did on 60 joints of 15 ms, seeds 70100 to 70225
 NEARER, NEAR = 8, 1e-3  # steps towards the delay, and the last one's size in samples
 WAYS = ((1.0, "forward"), (-1.0, "back"))
@@ -238,7 +235,8 @@ def regress_joint(
     data = slow if fall else data
     if delay is None and data.source != "reference":
         left_out = (*left_out, f"{WORDS['late']}: {ADVICE['late']}")
-    return replace(_answer(record, data, fit, terms, pull, left_out, fall), delay=delay)
+    bent = fall is None and bends(slow, fit, terms, pull)
+    return replace(_answer(record, data, fit, terms, pull, left_out, fall, bent), delay=delay)
 
 
 def delay_of(data: JointData) -> Estimate | None:
@@ -323,12 +321,13 @@ def _answer(
     pull: tuple[float, float],
     left_out: tuple[str, ...],
     fall: Fall | None,
+    bent: bool,
 ) -> JointFriction:
     if fall is not None:
         fit, terms, pull = fall.fits[fall.best], fall.terms, fall.pull
     status = Status(*_worries(data, fit, terms, record))
     tell = Telling(data, fit, terms, turning(record), status)
-    rubs = replace(tell, status=Status(status, *bends(data, terms)))
+    rubs = tell.doubted(bent)
     if fall is not None:
         tell = rubs = Averaged(data, fit, terms, turning(record), status, fall)
     known = {term: (rubs if term in RUBS else tell).one(term) for term in terms if term not in ("uneven", *FALL)}
@@ -446,17 +445,6 @@ def _worries(data: JointData, fit: LeastSquares, terms: tuple[str, ...], record:
     return worries
 
 
-def bends(data: JointData, terms: tuple[str, ...]) -> list[Doubt]:
-    """A doubt where friction is surely no line over the speed, by a part that goes with its square."""
-    bent = None if any(term in FALL for term in terms) else with_term(data, terms, "bend", BENDS)
-    if bent is None:
-        return []
-    part = coefficient(bent[0], (*terms, "bend"), "bend") * data.columns(("bend",), 0.0, (0.0, 0.0))
-    if np.linalg.norm(part) < ROUNDING * np.linalg.norm(data.torque):
-        return []
-    return [Doubt("friction bends with the speed: this is of the line nearest to it, as its interval is", BENT)]
-
-
 @dataclass(frozen=True)
 class Telling:
     """Coefficients and their sums as Estimates."""
@@ -473,6 +461,11 @@ class Telling:
         stated = self.data.stated.get("inertia")
         inertia = stated.value if stated else coefficient(self.fit, self.terms, "inertia")
         return *self.data.unsure, *self.data.unshared(inertia, coefficient(self.fit, self.terms, "viscous"))
+
+    def doubted(self, bent: bool) -> Telling:
+        """The same, with a doubt where friction is no line over the speed."""
+        doubt = Doubt("friction bends with the speed: this is of the line nearest to it, as its interval is", BENT)
+        return replace(self, status=Status(self.status, doubt)) if bent else self
 
     def one(self, term: str) -> Estimate:
         """A coefficient, with a doubt where its interval hardly tells it."""

@@ -26,7 +26,10 @@ LIKELY = 8.0  # halves of chi squared above the least, within which curves are t
 NEGLIGIBLE = 1e-3  # of the likeliest curve's weight
 SAME = 1e-3  # of the largest: a singular value below it is one instrument counted twice
 NOWHERE = 1e-150  # size of a column, below which its square vanishes: a curve that falls where nothing slides
-SURELY = 3.5  # deviations of the excess at rest: of 95 joints without one, seeds 6000 to 8042, none came to 3
+ROUNDING = 1e-5  # of the torque: of a log without noise derivatives leave some 1e-9
+# Deviations of the excess at rest, above none for a fall and either way for a bend: of 95 joints without one, seeds
+# 6000 to 8042, no fall came to 3; of 230 others, which did not set it, 4 bends came to more.
+SURELY = 3.5
 METHOD = "likelihood over Stribeck curves"
 FINER = 3  # rounds of likely curves closer together: three make 12 speeds of one step of the first
 FALL = ("fall", "fall of load")  # the excess at rest under the mean load, and what each N m of load adds to it
@@ -194,6 +197,29 @@ def falling(data: JointData, fit: LeastSquares, terms: tuple[str, ...], pull: tu
     curve leaves of the torque, as far as the instruments tell it, makes its weight: a log that hardly tells speed and
     exponent is answered by all curves that it allows.
     """
+    try:
+        return _allowed(_balance(data, fit, terms, pull))
+    except EstimateError:  # the motion tells no curve from the other terms
+        return None
+
+
+def bends(data: JointData, fit: LeastSquares, terms: tuple[str, ...], pull: tuple[float, float]) -> bool:
+    """Whether friction is surely no line over the speed: a curve beside it, that falls or rises, is surely there."""
+    balance = _balance(data, fit, terms, pull)
+    solved, place = balance.solved(balance.seen), len(terms)
+    for number in np.argsort([solved.left(design)[1] for design in solved.designs]):
+        try:
+            curved = solved.fit(int(number))
+        except EstimateError:  # the motion does not tell this curve from the other terms
+            continue
+        part = solved.designs[number][:, place:] @ curved.coefficients[place:]
+        seen = np.linalg.norm(part) > ROUNDING * np.linalg.norm(solved.torque)
+        return bool(seen and abs(_sureness(curved, place)[0]) > SURELY)
+    return False
+
+
+def _balance(data: JointData, fit: LeastSquares, terms: tuple[str, ...], pull: tuple[float, float]) -> _Balance:
+    """The balance about a regression, and the curves that may be seen beside it."""
     moved = [speed_of(log) for log in data.logs]
     steered = [
         speed_of(log, steered=True)[0] if data.followed else speed
@@ -201,14 +227,12 @@ def falling(data: JointData, fit: LeastSquares, terms: tuple[str, ...], pull: tu
     ]
     speeds = tuple((speed, along) for (speed, _), along in zip(moved, steered, strict=True))
     curves = _visible([(*one, log.sliding) for one, log in zip(moved, data.logs, strict=True)])
-    try:
-        return _allowed(_Balance(data, terms, coefficient(fit, terms, "load"), pull, speeds, curves), curves)
-    except EstimateError:  # the motion tells no curve from the other terms
-        return None
+    return _Balance(data, terms, coefficient(fit, terms, "load"), pull, speeds, curves)
 
 
-def _allowed(balance: _Balance, curves: Array) -> Fall | None:
+def _allowed(balance: _Balance) -> Fall | None:
     """The curves that the log allows, where one surely falls and is no bend."""
+    curves = balance.seen
     place, fastest = len(balance.terms), curves.max(axis=0)[0]
     for finer in (False,) * ROUNDS + (True,) * FINER:
         solved = balance.solved(curves)

@@ -115,7 +115,7 @@ class Log:
         Parameters
         ----------
         terms : tuple of str
-            Of inertia, viscous, uneven, bend (with the speed's square), forward, back, coulomb (both alike), sine,
+            Of inertia, viscous, uneven, forward, back, coulomb (both alike), sine,
             cosine, load, damping, warming and thinning (Coulomb and viscous friction per kelvin), and late (by how much
             the torque is).
         load : float
@@ -136,7 +136,6 @@ class Log:
             "inertia": lambda: at(turned, 2),
             "viscous": lambda: at(turned, 1),
             "uneven": lambda: at(side * five_point_difference(turned, 1) * fs),
-            "bend": lambda: at(side * (five_point_difference(turned, 1) * fs) ** 2),
             "forward": lambda: at(np.maximum(side, 0.0)),
             "back": lambda: at(np.minimum(side, 0.0)),
             "coulomb": lambda: at(side),
@@ -390,21 +389,13 @@ def fitted(data: JointData) -> tuple[LeastSquares, tuple[str, ...], tuple[float,
     """The regression, with viscous friction of each direction where these differ surely."""
     fit, terms, pull, left_out = _separable(data)
     _refuse_driving(data, fit, terms)
-    both = with_term(data, terms, "uneven", SURELY)
-    return (fit, terms, pull, left_out) if both is None else (both[0], (*terms, "uneven"), both[1], left_out)
-
-
-def with_term(
-    data: JointData, terms: tuple[str, ...], term: str, deviations: float
-) -> tuple[LeastSquares, tuple[float, float]] | None:
-    """The regression with one more term, where that is told and by so many deviations none that chance makes."""
-    richer = (*terms, term)
+    richer = (*terms, "uneven")
     try:
-        fit, pull = about_load(data, richer)
+        both, shifted = about_load(data, richer)
     except EstimateError:
-        return None
-    more = fit.combined(np.eye(len(richer))[-1], "", "", "")
-    return (fit, pull) if abs(more.value) > deviations * more.sd else None
+        return fit, terms, pull, left_out
+    differ = both.combined(np.eye(len(richer))[-1], "", "", "")
+    return (both, richer, shifted, left_out) if abs(differ.value) > SURELY * differ.sd else (fit, terms, pull, left_out)
 
 
 def _refuse_driving(data: JointData, fit: LeastSquares, terms: tuple[str, ...]) -> None:

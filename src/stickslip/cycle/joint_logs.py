@@ -8,10 +8,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from stickslip.cycle.joint import RICHER, RUBS, Telling, bends, delay_of, punctual
+from stickslip.cycle.joint import RICHER, RUBS, Telling, delay_of, punctual
+from stickslip.cycle.joint_fall import bends
 from stickslip.cycle.joint_fit import JointData, about_load, fitted, joint_data, pooled, turning, warmed
 from stickslip.errors import EstimateError, RecordError
-from stickslip.estimate import Constant, Estimate, Result, Status
+from stickslip.estimate import Constant, Estimate, Result
 from stickslip.record.record import Record
 
 Array = NDArray[np.float64]
@@ -124,7 +125,9 @@ def regress_joint_logs(
     >>> [bool(one.error < one.plain) for one in together.predictions]
     [True, True, True]
     """
-    data = warmed([joint_data(record, gravity, **constants)[1] for record in records])
+    data, slow = (
+        warmed([joint_data(record, gravity, slowly, **constants)[1] for record in records]) for slowly in (False, True)
+    )
     if len(data) < 2 or len({(one.source, one.terms) for one in data}) > 1:
         raise RecordError(
             f"{len(data)} log{'s' * (len(data) != 1)}, with torque by {', '.join(one.source for one in data)}",
@@ -132,10 +135,10 @@ def regress_joint_logs(
             "give two logs or more, of one robot and one kind",
         )
     delay = delay_of(pooled(data))
-    data = [punctual(one, delay) for one in data]
-    fit, terms, _, left_out = fitted(pooled(data))
+    data, slow = [punctual(one, delay) for one in data], [punctual(one, delay) for one in slow]
+    fit, terms, pull, left_out = fitted(pooled(data))
     tell = Telling(pooled(data), fit, terms, turning(records[0]), "ok")
-    rubs = replace(tell, status=Status(*bends(pooled(data), terms)))
+    rubs = tell.doubted(bends(pooled(slow), fit, terms, pull))
     known = {term: (rubs if term in RUBS else tell).one(term) for term in terms if term != "uneven"}
     predictions = [
         _predicted(log, pooled(data[:place] + data[place + 1 :]), record)
