@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import random
 import shutil
@@ -16,8 +17,9 @@ import pytest
 from click.testing import CliRunner
 
 import stickslip as ss
-from bench_devices import Counter, counts
+from bench_devices import Counter, Counting, counts
 from stickslip.bench import Block, Fault, Sim, Tape, Tone, Trigger, Wanted, acquire
+from stickslip.bench.trigger import Awaited
 from stickslip.cli.program import main
 from stickslip.files import journal
 
@@ -114,6 +116,54 @@ def test_a_trigger_begins_it_and_what_was_before_is_kept(tmp_path: Path) -> None
     assert np.all(record["x"][:row] < 3e-4)
     with pytest.raises(ss.errors.ModelError, match="the inputs are x, z, a, load"):
         acquire(still, output=tmp_path / "other.h5", wanted=Wanted(trigger=Trigger("y", 1.0)))
+
+
+def test_a_trigger_that_does_not_come_is_waited_for_so_long_and_no_longer(tmp_path: Path) -> None:
+    """The counter reads -15 mm and rises by 3 um a sample, from 50 000 samples a second."""
+    told: list[tuple[str, float]] = []
+    wanted = Wanted(1.0, Trigger("c0", 14.9e-3, timeout=0.1))
+    said = r"c0 read -0.015 to -3e-06 m in 0.1 s; .* c0 rising through 0.0149 m; .*nothing was written"
+    with pytest.raises(ss.errors.RecordError, match=said):
+        acquire(
+            Counter(),
+            output=tmp_path / "run.h5",
+            wanted=wanted,
+            progress=lambda words, share: told.append((words, share)),
+        )
+    assert not [*tmp_path.iterdir()]
+    assert told[1] == ("waiting for c0 rising through 0.0149: -0.015 to -0.009003 m so far", pytest.approx(0.4))
+    with pytest.raises(ss.errors.RecordError, match=r"c0 read -0.015 to -0.009003 m in 0.04 s"):
+        acquire(Counter(last=2000), output=tmp_path / "run.h5", wanted=wanted)
+    wanted = Wanted(0.1, Trigger("c0", -0.012, timeout=0.1))
+    done = acquire(Counter(), output=tmp_path / "run.h5", wanted=wanted, progress=lambda *stage: told.append(stage))
+    assert (len(ss.read_record(done.paths[0])), told[-1]) == (5000, ("recording, 0.1 s", 1.0))
+    with pytest.raises(ss.errors.ModelError, match=r"a trigger at 0.02 m; c0 reads 0.015 m at most"):
+        acquire(Counter(), output=tmp_path / "other.h5", wanted=Wanted(trigger=Trigger("c0", 0.02)))
+
+
+class Broken(Counting):
+    """Interrupted at its third block."""
+
+    def read(self, timeout: float = 1.0) -> Block | None:
+        if self.sent >= 2 * self.device.size:
+            raise KeyboardInterrupt
+        return super().read(timeout)
+
+
+def test_an_interruption_ends_the_wait_for_a_trigger(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Counter, "open", lambda device: Broken(device))
+    with pytest.raises(KeyboardInterrupt):
+        acquire(Counter(), output=tmp_path / "run.h5", wanted=Wanted(trigger=Trigger("c0", 0.0)))
+    assert not [*tmp_path.iterdir()]
+
+
+def test_a_reading_that_is_not_there_hides_no_trigger() -> None:
+    """Neither within a block, nor as the last of one, nor before the first that is there."""
+    awaited = Awaited(Trigger("x", 1.0), Sim(fast=True))
+    nan = math.nan
+    rows = [[nan, 2.0, 0.5, nan], [1.5, 0.5, 0.5, nan], [nan, nan, 1.0, 2.0]]
+    blocks = [Block(4 * at, 0.0, np.array([row] * 4)) for at, row in enumerate(rows)]
+    assert [awaited.look(block) for block in blocks] == [None, 4, 10]
 
 
 def test_less_before_a_trigger_than_was_wanted_is_told(tmp_path: Path) -> None:
@@ -241,5 +291,11 @@ def test_the_command_records(tmp_path: Path) -> None:
     assert len(record) == 1000
     assert record.log is not None
     assert record.log.entries()["surface"] == "ground steel"
+    asked = ["acquire", "--device", "rig", "--config", str(config), "--trigger", "x>1", "--timeout", "0.5"]
+    late = CliRunner().invoke(main, [*asked, "--output", str(tmp_path / "late.h5")])
+    assert (late.exit_code, late.output.count("\n")) == (1, 1)
+    assert "in 0.5 s; the recording begins with x rising through 1 m" in late.output
+    alone = CliRunner().invoke(main, [*asked[:-4], *asked[-2:], "--output", str(tmp_path / "late.h5")])
+    assert (alone.exit_code, "--timeout: it is of a trigger" in alone.output) == (2, True)
     listed = CliRunner().invoke(main, ["devices", "--config", str(config)])
     assert "rig      virtual rig: Oscillator" in listed.output

@@ -12,11 +12,9 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 from stickslip.bench.device import Block, Device, Signal, Stream
 from stickslip.bench.tape import Tape, journal_of, require_writable
+from stickslip.bench.trigger import Awaited, Trigger
 from stickslip.errors import EstimateError, ModelError, RecordError, StickslipError
 from stickslip.files.read import read_record
 from stickslip.files.write import write_record
@@ -27,44 +25,7 @@ from stickslip.signals.interpolate import clock_rate, synchronise
 SILENCE = 10.0  # s without a sample after which a device is given up
 
 Watch = Callable[[Device, Block], object]
-
-
-@dataclass(frozen=True)
-class Trigger:
-    """What begins a recording.
-
-    Attributes
-    ----------
-    channel : str
-        The input that is watched.
-    level : float
-        Reading [SI] that it passes.
-    rising : bool
-        Whether upwards.
-    before : float
-        Time [s] before it that is kept.
-
-    Raises
-    ------
-    ModelError
-        A time before it that is negative.
-    """
-
-    channel: str
-    level: float
-    rising: bool = True
-    before: float = 0.0
-
-    def __post_init__(self) -> None:
-        if not 0 <= self.before < math.inf:
-            raise ModelError(f"before = {self.before} s", "what is kept before a trigger is a time", "correct it")
-
-    def row(self, values: NDArray[np.float64], last: float) -> int | None:
-        """The first row at which the level is passed, `last` being the reading before."""
-        side = 1.0 if self.rising else -1.0
-        above = side * np.append(last, values) >= side * self.level
-        passed = np.flatnonzero(above[1:] & ~above[:-1])
-        return int(passed[0]) if len(passed) and not math.isnan(last) else None
+Progress = Callable[[str, float], object]
 
 
 @dataclass(frozen=True)
@@ -117,6 +78,7 @@ def acquire(
     output: str | Path,
     wanted: Wanted | None = None,
     watch: Watch | None = None,
+    progress: Progress | None = None,
     stop: threading.Event | None = None,
 ) -> Acquired:
     """Record from one device or several into a file.
@@ -136,6 +98,9 @@ def acquire(
         How long, from which trigger on, and what moves meanwhile; until `stop` where left out.
     watch : callable, optional
         Called with the device and each block as it comes.
+    progress : callable, optional
+        Called after every block with words, the trigger's readings while it is waited for, and with the part that is
+        over; 0 where nothing says how long.
     stop : threading.Event, optional
         Ends it when it is set.
 
@@ -148,7 +113,9 @@ def acquire(
     ModelError, FormatError
         What is asked can not be, told before anything is measured.
     RecordError
-        A device sends nothing.
+        A device sends nothing, or the trigger does not come.
+    KeyboardInterrupt
+        Interrupted before anything was recorded.
 
     Examples
     --------
@@ -166,12 +133,12 @@ def acquire(
     outputs = [output] if len(every) == 1 else [_beside(output, one.name) for one in every]
     for path in {output, *outputs}:
         require_writable(path)
-    run = _Run(wanted, watch, stop or threading.Event())
+    run = _Run(wanted, watch, progress, stop or threading.Event())
     heads = [_Head(one, path, run) for one, path in zip(every, outputs, strict=True)]
     ended = run.all(heads)
-    outcomes = {head.device.name: head.tape.close() for head in heads if head.tape is not None}
-    if len(outcomes) < len(heads):
-        raise RecordError("nothing was recorded", "the trigger begins a recording", "lower its level, or wait longer")
+    if not any(head.tape for head in heads):
+        raise run.nothing(heads)
+    outcomes = {head.device.name: head.tape.close() if head.tape else "no samples" for head in heads}
     paths = tuple(head.tape.finish() for head in heads if head.tape is not None)
     done = Acquired(paths, outcomes, ended, tuple(head.short for head in heads if head.short))
     return done if len(paths) == 1 else _together(paths, output, done)
@@ -187,9 +154,8 @@ def _require(devices: Sequence[Device], wanted: Wanted) -> None:
         raise ModelError(f"{len(devices)} devices", "each has a name of its own", "name them in [devices.NAME]")
     if wanted.seconds is not None and not 0 < wanted.seconds < math.inf:
         raise ModelError(f"seconds = {wanted.seconds}", "a recording lasts some time", "give more")
-    names = [one.name for device in devices for one in device.inputs]
-    if wanted.trigger is not None and wanted.trigger.channel not in names:
-        raise ModelError(f"a trigger on '{wanted.trigger.channel}'", f"the inputs are {', '.join(names)}", "name one")
+    if wanted.trigger is not None:
+        wanted.trigger.require({one.name: one for device in devices for one in device.inputs})
     known = {output.name: output for device in devices for output in device.outputs}
     for name, signal in wanted.drive.items():
         if name not in known:
@@ -200,8 +166,8 @@ def _require(devices: Sequence[Device], wanted: Wanted) -> None:
 class _Run:
     """What the devices of one recording share: when it begins and why it ended."""
 
-    def __init__(self, wanted: Wanted, watch: Watch | None, stop: threading.Event) -> None:
-        self.wanted, self.watch, self.stop = wanted, watch, stop
+    def __init__(self, wanted: Wanted, watch: Watch | None, progress: Progress | None, stop: threading.Event) -> None:
+        self.wanted, self.watch, self.progress, self.stop = wanted, watch, progress, stop
         self.began: float | None = None  # by this computer's clock [s], of the trigger or the first sample
         self.ended = "complete"
         self.failure: StickslipError | OSError | None = None
@@ -229,6 +195,15 @@ class _Run:
             raise self.failure
         return self.ended
 
+    def nothing(self, heads: Sequence[_Head]) -> KeyboardInterrupt | RecordError:
+        """Why there is no sample of any head."""
+        if self.ended == "interrupted":
+            return KeyboardInterrupt()
+        awaited = next((head.awaited for head in heads if head.awaited), None)
+        if awaited is not None:
+            return awaited.refusal()
+        return RecordError(f"{self.ended} before a sample came", "a record has samples", "check the device")
+
     def _wait(self, threads: Sequence[threading.Thread]) -> None:
         try:
             for thread in threads:
@@ -251,12 +226,16 @@ class _Run:
                 block = stream.read(0.2)
                 if block is None:
                     self.ended = "the device ended"
+                    if head.tape is None:  # nothing begins with it any more, nor with those that wait for it
+                        self.stop.set()
                     return
                 if block.samples.shape[1]:
                     heard = time.monotonic()
                     if self.watch:
                         self.watch(head.device, block)
                     self._keep(head, block)
+                    if self.progress and (stage := head.stage(block.after)):
+                        self.progress(*stage)
                 elif time.monotonic() - heard > SILENCE:
                     raise RecordError(
                         f"{head.device.name} sent nothing for {SILENCE:g} s",
@@ -294,16 +273,23 @@ class _Head:
         self.device, self.path, self.run = device, path, run
         self.tape: Tape | None = None
         self.held: deque[Block] = deque()
-        self.last, self.end = math.nan, math.inf
+        self.end = math.inf
         self.short = ""  # what is missing before the trigger, in words
-        trigger = run.wanted.trigger
-        names = [one.name for one in device.inputs]
-        self.row = names.index(trigger.channel) if trigger is not None and trigger.channel in names else None
+        trigger, names = run.wanted.trigger, [one.name for one in device.inputs]
+        self.awaited = Awaited(trigger, device) if trigger is not None and trigger.channel in names else None
 
     @property
     def done(self) -> bool:
         """Whether it has all that is wanted."""
         return self.tape is not None and (self.tape.seen.after or 0) >= self.end
+
+    def stage(self, after: int) -> tuple[str, float] | None:
+        """What it does in words, and which part is over as its counter comes to `after`; None where others say so."""
+        if self.tape is None:
+            return self.awaited.stage() if self.awaited else None
+        passed = after - self.tape.begin
+        share = 1.0 if self.done else passed / (self.end - self.tape.begin)
+        return f"recording, {passed / self.device.fs:.1f} s", share
 
     def take(self, block: Block) -> None:
         """A block: held, or kept."""
@@ -320,14 +306,11 @@ class _Head:
         if trigger is None:
             if run.began is None:
                 run.began, at = block.clock - (block.after - block.first) / fs, block.first
-        elif self.row is not None:
-            values = block.samples[self.row] * self.device.inputs[self.row].scale
-            row = trigger.row(values, self.last)
-            self.last = float(values[-1])
-            if row is not None:
-                at = block.first + row
+        elif self.awaited is not None:
+            at = self.awaited.look(block)
+            if at is not None:
                 run.began = block.clock - (block.after - at) / fs
-        if at is None and run.began is not None and self.row is None:
+        if at is None and run.began is not None and self.awaited is None:
             at = block.after - (block.clock - run.began) * fs  # as good as the time at which blocks come
         before = trigger.before if trigger else 0.0
         if at is None:
@@ -359,8 +342,7 @@ class _Head:
 def _notes(wanted: Wanted) -> dict[str, Any]:
     notes: dict[str, Any] = {}
     if (trigger := wanted.trigger) is not None:
-        way = "rising" if trigger.rising else "falling"
-        notes["trigger"] = f"{trigger.channel} {way} through {trigger.level:g}, {trigger.before:g} s before it kept"
+        notes["trigger"] = f"{trigger}, {trigger.before:g} s before it kept"
     for name, signal in wanted.drive.items():
         notes[f"drive {name}"] = (
             str(signal) if isinstance(signal, tuple) else f"{0 if signal is None else len(signal)} samples"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import importlib.util
+import math
 import os
 import re
 import time
@@ -217,12 +218,15 @@ TRIGGER = re.compile(r"\s*(\w+)\s*([<>])\s*(\S+)\s*")
 @click.option(
     "--trigger", metavar='"CHANNEL>LEVEL"', help='Begin where a reading passes a level, in SI: "load>0.5", "x<-1e-3".'
 )
+@click.option("--before", type=click.FloatRange(min=0), metavar="S", help="Time before the trigger that is kept.")
 @click.option(
-    "--before", type=click.FloatRange(min=0), default=0.0, metavar="S", help="Time before the trigger that is kept."
+    "--timeout",
+    type=click.FloatRange(min=0, min_open=True),
+    metavar="S",
+    help="How long the trigger is waited for; until Ctrl-C unless given.",
 )
 @click.option(
     "--drive",
-    "drives",
     multiple=True,
     metavar='"OUTPUT=AMPLITUDE@HZ"',
     help='Move an output by a tone meanwhile, in SI: "base=0.65e-3@2.5". Repeatable.',
@@ -258,17 +262,16 @@ def acquire(names: tuple[str, ...], config: Path | None, output: Path, as_json: 
     log = settings.log if settings else None
     shaker = ss.rig.Shaker.of(settings.shaker) if settings and settings.shaker else None
     if options["runs"]:
-        if options["seconds"] or options["trigger"] or options["drives"]:
-            raise click.UsageError(
-                "--runs says seconds and drive of each run; leave out --seconds, --drive and --trigger"
-            )
+        if given := [name for name in ("seconds", "trigger", "before", "timeout", "drive") if options[name]]:
+            raise click.UsageError(f"--runs says what each run is; leave out --{', --'.join(given)}")
         _run_all(chosen, bench.read_runs(options["runs"]), output, log, shaker, as_json=as_json)
         return
-    drive = dict(_driven(text) for text in options["drives"])
-    wanted = bench.Wanted(options["seconds"], _trigger(options["trigger"], options["before"]), drive, log)
+    drive = dict(_driven(text) for text in options["drive"])
+    trigger = _trigger(options["trigger"], options["before"], options["timeout"])
+    wanted = bench.Wanted(options["seconds"], trigger, drive, log)
     _require_moved(chosen, wanted, shaker)
     with progress(100) as tell:
-        done = bench.acquire(chosen, output=output, wanted=wanted, watch=_watch(tell, options["seconds"]))
+        done = bench.acquire(chosen, output=output, wanted=wanted, progress=_paced(tell))
     _recorded(done, as_json=as_json)
     if done.ended == "interrupted" and options["seconds"]:
         raise SystemExit(INTERRUPTED)
@@ -299,36 +302,37 @@ def _run_all(devices: Any, runs: bench.RunList, folder: Path, log: Any, shaker: 
             say(f"{path} is there already: left out", err=True)
             continue
         with progress(100) as tell:
-            done = bench.acquire(devices, output=path, wanted=wanted, watch=_watch(tell, wanted.seconds))
+            done = bench.acquire(devices, output=path, wanted=wanted, progress=_paced(tell))
         _recorded(done, as_json=as_json)
         if done.ended == "interrupted":
             raise SystemExit(INTERRUPTED)
 
 
-def _watch(tell: Any, seconds: float | None) -> Any:
-    """What shows how far it is, some ten times a second."""
+def _paced(tell: Callable[[str, float], None]) -> Callable[[str, float], None]:
+    """What shows how far a recording is, some ten times a second."""
     due = 0.0
 
-    def watch(device: bench.Device, block: bench.Block) -> None:
+    def show(words: str, share: float) -> None:
         nonlocal due
         if time.monotonic() >= due:
-            passed = block.after / device.fs
-            tell(f"recording, {passed:.1f} s", 100 * min(1.0, passed / seconds) if seconds else 0)
+            tell(words, 100 * share)
             due = time.monotonic() + 0.1
 
-    return watch
+    return show
 
 
-def _trigger(text: str | None, before: float) -> bench.Trigger | None:
+def _trigger(text: str | None, before: float | None, timeout: float | None) -> bench.Trigger | None:
     if text is None:
-        if before:
-            raise click.BadParameter("what is kept before a trigger needs one", param_hint="--before")
+        for option, value in (("--before", before), ("--timeout", timeout)):
+            if value:
+                raise click.BadParameter("it is of a trigger; name one with --trigger", param_hint=option)
         return None
     match = TRIGGER.fullmatch(text)
     try:
-        return bench.Trigger(match[1], float(match[3]), match[2] == ">", before)  # type: ignore[index]
+        level = float(match[3])  # type: ignore[index]
     except (TypeError, ValueError):
         raise click.BadParameter(f"'{text}' is not CHANNEL>LEVEL or CHANNEL<LEVEL", param_hint="--trigger") from None
+    return bench.Trigger(match[1], level, match[2] == ">", before or 0.0, timeout or math.inf)  # type: ignore[index]
 
 
 def _driven(text: str) -> tuple[str, bench.Tone]:
