@@ -72,6 +72,31 @@ def test_a_contact_that_does_not_give_way_refuses_two_steps_only() -> None:
     assert "rest" in walked.results
 
 
+def test_a_tap_that_is_not_to_be_trusted_is_said_to_be_and_writes_no_mount() -> None:
+    """A slip of 20 ms after it, which is no decaying oscillation."""
+    tap = bench.SimulatedBench(fs=4000).record("tap")
+    slips = tap.with_channel("a", tap["a"] + np.where(abs(tap.time - 0.14) < 0.01, 1.5, 0.0), unit="m/s^2")
+    sound, doubted = (bench.commission(lambda step, one=one: one, steps=some("tap")) for one in (tap, slips))
+    assert sound.known.mounts.keys() == {"a", "load"}
+    assert doubted.known.mounts == {}
+    assert "mount" not in doubted.known.toml()
+    story = ss.summary(doubted)
+    assert [caution.reason for caution in story.notices] == [doubted.results["tap"].status]
+    assert all(story.marks(line) == "1" for line in story.lines)
+    assert "not to be trusted: frequency" in story.tables[0].rows[0][2]
+    assert not ss.summary(sound).notices
+
+
+def test_a_record_without_a_tap_is_refused_by_the_command(tmp_path: Path) -> None:
+    file = ss.write_record(BENCH.record("sweep"), tmp_path / "sweep.csv")
+    told = CliRunner().invoke(main, ["commission", f"tap={file}"])
+    text = " ".join(told.output.split())
+    assert told.exit_code == 1
+    assert "0 steps answered, 1 refused" in text
+    assert "Which mounts ring? a moves before it rings, by" in text
+    assert "Hz" not in text
+
+
 def test_the_story_says_the_constants_first_and_the_truth_beside(done: bench.Commissioned) -> None:
     story = ss.summary(done)
     assert story.headline[0].startswith("The rig is a mass of 2.4")

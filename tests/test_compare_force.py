@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from functools import cache
 
 import numpy as np
@@ -11,6 +12,7 @@ from scipy.signal import lsim, lti
 import stickslip as ss
 from rigs import CASES, RIG, measured, told
 from stickslip.errors import EstimateError, RecordError
+from stickslip.estimate import kinds
 from stickslip.signals.response import resonance
 
 
@@ -216,9 +218,34 @@ def test_without_a_tap_or_a_second_sensor_it_says_so() -> None:
     assert "can not tell" in alone.resonances[0].evidence
 
 
+def test_what_moved_before_it_rang_is_no_tap() -> None:
+    """A hum, a mass driven or let go as the record begins, and a tap of which the record keeps no rest."""
+    time, noise = np.arange(4000) / 2000, np.random.default_rng(3).standard_normal((2, 4000))
+    for frequency, decay in ((50.0, 0.0), (7.3, 0.0), (5.1, 0.3), (11.0, 4.0)):
+        ring = np.exp(-decay * time) * np.cos(math.tau * frequency * time)
+        record = ss.Record.of({"a": 5 * ring + 0.02 * noise[0], "load": -0.3 * ring + 2e-3 * noise[1]}, fs=2000)
+        with pytest.raises(EstimateError, match=r"moves before it rings|rings begins|nothing that oscillates"):
+            ss.balance.impact_test(record)
+    with pytest.raises(EstimateError, match=r"begins 0\.00.* after the record.*rest before the tap"):
+        ss.balance.impact_test(tap().between(0.1, 0.5))
+
+
+def test_a_mass_that_was_let_go_is_told_from_one_that_was_tapped() -> None:
+    """Held 8 mm out for a second; x goes on about 0, and a and load ring as after a tap."""
+    time, noise = np.arange(6000) / 1000 - 1, np.random.default_rng(3).standard_normal((3, 6000))
+    out = np.where(time > 0, np.exp(-0.1 * time) * np.cos(math.tau * 5.0 * time), 0.0)
+    x = 8e-3 * np.where(time > 0, out, 1.0)
+    readings = {"x": x + 1e-6 * noise[0], "a": -7.9 * out + 0.03 * noise[1], "load": -0.4 * out + 2e-3 * noise[2]}
+    let_go = ss.balance.impact_test(ss.Record.of(readings, fs=1000))
+    assert "no tap" in kinds(let_go.status)
+    assert {one.status for one in let_go.estimates} == {let_go.status}
+    assert ss.balance.impact_test(tap().with_channel("x", 1e-6 * noise[0][:2000], unit="m")).status == "ok"
+
+
 def test_a_contact_that_slips_after_the_tap_is_told() -> None:
     record = tap()
     t = record.time
     slipping = record["a"] + np.where((t > 0.13) & (t < 0.145), 1.5, 0.0)
     mount = ss.balance.impact_test(ss.Record.of({"a": slipping, "load": record["load"]}, fs=4000))
     assert "no sum of decaying oscillations" in mount.status
+    assert {one.status for one in mount.estimates} == {mount.status}

@@ -94,6 +94,8 @@ def commission(
     deliver(done, folder and folder / "report", as_json=as_json, everything=everything)
     if folder and not as_json:
         say(f"Settings: {folder / 'rig.toml'}")
+    if done.refused and not done.results:  # the data can not answer
+        raise SystemExit(1)
 
 
 def _seen_from(folder: Path, rig: RigSettings, config: Path) -> RigSettings:

@@ -24,7 +24,7 @@ from stickslip.record.record import Record
 from stickslip.story.findings import of_comparison, of_findings, plain
 from stickslip.story.fit import of_laws
 from stickslip.story.story import Line, Story, Table, logged
-from stickslip.story.words import Caution, interval_of, value_of
+from stickslip.story.words import Caution, doubts, interval_of, value_of
 
 CAPTION = "Root-mean-square error against the sampling rate, for each choice of sensors."
 # What leads: of which step, and which of its numbers; the rest stands in the tables.
@@ -88,17 +88,11 @@ def _enough(plan: ExperimentPlan, question: str, error: str) -> str:
 
 def of_commissioned(done: Commissioned) -> Story:
     """The constants first; a table of the steps, and one of every number."""
-    known, results = done.known, done.results
+    known = done.known
     constants = known.constants
     own = [*(constants.estimates if constants else ()), *([known.damping] if known.damping else [])]
     lines = [Line.of(estimate, done.true_value(estimate.name)) for estimate in own]
     lines += [Line.of(estimate, done.true_value(estimate.name, step)) for step, estimate in _leading(done)]
-    cautions = [Caution(f"{_title(name)} {why}") for name, why in done.refused.items()]
-    cautions += [
-        Caution(f"{_title(name)} {status}.")
-        for name, result in results.items()
-        if not stands(status := str(getattr(result, "status", "ok")))
-    ]
 
     def write(folder: Path) -> None:
         (folder / "rig.toml").write_text(known.toml(), encoding="utf-8")
@@ -106,7 +100,7 @@ def of_commissioned(done: Commissioned) -> Story:
     return Story(
         "Commissioning",
         [_headline(done)],
-        cautions,
+        _cautions(done),
         lines,
         tables=_tables(done),
         settings=_settings(done),
@@ -114,6 +108,19 @@ def of_commissioned(done: Commissioned) -> Story:
         data=lambda: dict(plain(done.to_dict())),
         write=write,
     )
+
+
+def _cautions(done: Commissioned) -> list[Caution]:
+    """Why steps were refused, and what speaks against their numbers, at those that lead where it is theirs."""
+    told = [Caution(f"{_title(name)} {why}") for name, why in done.refused.items()]
+    leading = list(_leading(done))
+    for name, result in done.results.items():
+        flagged = [one for step, one in leading if step == name and not stands(one.status)]
+        if flagged:
+            told += doubts(flagged)
+        elif not stands(status := str(getattr(result, "status", "ok"))):
+            told.append(Caution(f"{_title(name)} {status}."))
+    return told
 
 
 def _headline(done: Commissioned) -> str:
@@ -174,7 +181,9 @@ def _short(done: Commissioned, step: BenchStep) -> str:
     """The first numbers of a step, in a cell."""
     if step.name in done.refused:
         return f"refused: {done.refused[step.name]}"
-    return "; ".join(f"{estimate.name} {value_of(estimate)}" for estimate in _first(done.results[step.name]))
+    result = done.results[step.name]
+    numbers = "; ".join(f"{estimate.name} {value_of(estimate)}" for estimate in _first(result))
+    return numbers if stands(str(getattr(result, "status", "ok"))) else f"not to be trusted: {numbers}"
 
 
 def _first(result: Result) -> tuple[Estimate, ...]:

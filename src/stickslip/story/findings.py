@@ -26,7 +26,7 @@ from stickslip.files.write import require_form, write_record
 from stickslip.record.record import Record
 from stickslip.story.scope import of_findings as scope_of
 from stickslip.story.story import Line, Story, Table, logged
-from stickslip.story.words import Caution, constant, interval_of, leading, value_of
+from stickslip.story.words import Caution, constant, flags, interval_of, leading, value_of
 from stickslip.whole import whole_file
 
 # Which functions, of one record and of several, tell findings that hold a result of this name; others are friction's.
@@ -160,7 +160,7 @@ def of_tap(test: ImpactTest, *, record: Record | None = None) -> Story:
     rows = [(resonance.name, ", ".join(resonance.channels), resonance.evidence) for resonance in test.resonances]
     content: dict[str, Any] = {
         "headline": [f"{many}: {'; '.join(named)}."], "lines": lines, "data": test.to_dict,
-        "cautions": [] if test.status == "ok" else [test.status],
+        "cautions": flags((line.name, test.status) for line in lines),
         "tables": [Table("Why each is called so", ("resonance", "seen by", "evidence"), rows, folded=True)],
     }  # fmt: skip
     return Story("Tap", **content) if record is None else Story.of_record(record_name(record), record, **content)
