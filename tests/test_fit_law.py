@@ -11,6 +11,10 @@ import pytest
 
 import servo
 import stickslip as ss
+from stickslip.law.law import _held
+from stickslip.law.search import Problem
+from stickslip.law.start import knob
+from stickslip.law.stretch import Tones, measured_drive
 from stickslip.record.record import Step
 
 RIG = {"mass": 2.42, "stiffness": 2310.0, "damping": 0.1196}
@@ -234,32 +238,89 @@ def test_levels_that_a_free_zero_hides_from_each_other_are_not_told() -> None:
         assert "can not be told" in fit.parameters[name].status
 
 
-def servo_record(chance: np.random.Generator) -> tuple[dict[str, float], ss.Record]:
-    """A rigid slider on a base that moves by sines, from an integrator of the tests; x and z have 0.2 % of noise."""
+def servo_record(
+    chance: np.random.Generator,
+    moved: str = "sines",
+    noise: tuple[float, float] = (2e-3, 2e-3),
+    *,
+    excess: float = 0.0,
+    fall: float = 0.0,
+) -> tuple[dict[str, float], ss.Record]:
+    """A rigid slider on a base that moves by sines, or by "harmonics", from an integrator of the tests.
+
+    The shares of noise are those of x and z; its friction falls by an excess within a share of the fastest speed.
+    """
     mass, natural = chance.uniform(0.5, 5.0), chance.uniform(2.0, 6.0)
     stiffness = mass * (2 * np.pi * natural) ** 2
     damping, size = 2 * chance.uniform(0.005, 0.03) * np.sqrt(stiffness * mass), 1e-3
     kinetic, fs = stiffness * size * chance.uniform(0.15, 0.3), 300 * natural
     fine = np.arange(12 * 300 * 2 * servo.STEPS + 1) / (2 * fs * servo.STEPS)
-    z = servo.base("sines", fine, natural, size, chance)
-    p = np.array([mass, stiffness, damping, kinetic, kinetic, 0.0])
+    if moved == "harmonics":
+        sizes, turned = chance.uniform(0.02, 0.08, 2), chance.uniform(0, 2 * np.pi, 3)
+        tones = [np.sin((k + 1) * 2 * np.pi * 0.6 * natural * fine + turned[k]) for k in range(3)]
+        z = size * 2**0.5 * (tones[0] + sizes[0] * tones[1] + sizes[1] * tones[2])
+    else:
+        z = servo.base(moved, fine, natural, size, chance)
+    static = (1 + excess) * kinetic
+    p = np.array([mass, stiffness, damping, kinetic, static, fall * 2 * np.pi * natural * size])
     x = servo._rigid(p, z, 1 / (fs * servo.STEPS), np.zeros((0, 3)))[:: servo.STEPS]
     read = {"x": x, "z": z[:: 2 * servo.STEPS][: len(x)]}
-    noisy = {name: values + 2e-3 * np.std(values) * chance.standard_normal(len(x)) for name, values in read.items()}
-    return {"mass": mass, "stiffness": stiffness, "damping": damping, "kinetic": kinetic}, ss.Record.of(noisy, fs=fs)
+    noisy = {
+        name: values + share * np.std(values) * chance.standard_normal(len(x))
+        for share, (name, values) in zip(noise, read.items(), strict=True)
+    }
+    true = {"mass": mass, "stiffness": stiffness, "damping": damping, "kinetic": kinetic, "static": static}
+    return true, ss.Record.of(noisy, fs=fs)
 
 
-def test_noise_of_a_base_that_moves_by_no_tone_is_in_the_intervals() -> None:
-    """The mass follows it: of eight rigs the friction and the damper strayed by 2.4 deviations without it."""
+@pytest.mark.parametrize(("moved", "noise"), [("sines", (2e-3, 2e-3)), ("harmonics", (2e-4, 5e-3))])
+def test_noise_of_a_base_that_is_no_pure_tone_is_in_the_intervals(moved: str, noise: tuple[float, float]) -> None:
+    """The mass follows it: of eight rigs friction and damper strayed by 2.4 deviations without it, under harmonics by
+    2.8."""
     strays = []
     for seed in range(8):
-        true, record = servo_record(np.random.default_rng([2024, seed]))
+        true, record = servo_record(np.random.default_rng([2024, seed]), moved, noise)
         rig = {name: true[name] for name in ("mass", "stiffness", "damping")}
-        fit = ss.fit_law(record, ss.Oscillator(law=ss.laws.Coulomb(0.9 * true["kinetic"]), **rig))
+        start = ss.Oscillator(law=ss.laws.Coulomb(0.9 * true["kinetic"]), **rig)
+        fit = ss.fit_law(record, start, nuisance=["damping", "stiffness", "x.gain", "x.delay"])
         strays += [
             (fit.parameters[name].value - true[name]) / fit.parameters[name].sd for name in ("kinetic", "damping")
         ]
     assert np.sqrt(np.mean(np.square(strays))) < 1.5
+
+
+def test_a_harmonic_below_the_noise_drives_as_well() -> None:
+    """It was left out where the tones before it left no more than 1.15 times the noise."""
+    time, chance = np.arange(8000) / 1000, np.random.default_rng(6)
+    z = np.sin(2 * np.pi * 3 * time) + 5e-3 * np.sin(2 * np.pi * 9 * time + 1) + 1e-2 * chance.standard_normal(8000)
+    drive = measured_drive(ss.Record.of({"z": 1e-3 * z}, fs=1000), ss.drives.Release())
+    assert isinstance(drive, Tones)
+    assert [round(1e6 * size) for size, _, _ in drive.tones][::2] == [1000, 5]
+    alone = ss.Record.of({"z": 1e-3 * (z - 5e-3 * np.sin(2 * np.pi * 9 * time + 1))}, fs=1000)
+    assert len(measured_drive(alone, ss.drives.Release()).tones) == 1  # type: ignore[attr-defined]
+
+
+def test_static_friction_is_held_over_the_sliding_friction_that_was_found() -> None:
+    """Over that of the search's start, 7 % lower, it was told within 1.5 % where 40 % more did as well."""
+    slider = ss.Oscillator(law=ss.laws.Stribeck(1.0, 1.0, speed=0.01), **RIG)
+    problem = Problem(slider, (), (knob(slider, "kinetic"), knob(slider, "static")), (), ())
+    held = _held(problem, np.array([math.log(1.07), 0.0]), 1, 2.0)
+    assert [turned.name for turned in held.knobs] == ["kinetic"]
+    assert held.oscillator.law.static == pytest.approx(1.2 * 1.07)  # type: ignore[union-attr]
+
+
+def test_no_number_is_surer_than_base_and_mass_are_calibrated() -> None:
+    """All motion scales with the base's, all forces with the mass; where nuisances are named, both are as stated."""
+    told = measured(ss.laws.Coulomb(1.0), 8.7)
+    moved = ss.Record.of({name: told[name] for name in "xz"}, fs=told.fs)
+    slider = ss.Oscillator(law=ss.laws.Coulomb(1.0), **RIG)
+    usual = ss.fit_law(moved, slider).parameters
+    stated = ss.fit_law(moved, slider, nuisance=["damping", "stiffness", "x.gain"]).parameters
+    for name, share in (("kinetic", 0.005 * 2**0.5), ("damping", 0.005), ("stiffness", 0.005)):
+        more = share * abs(usual[name].value)
+        assert usual[name].sd == pytest.approx(math.hypot(stated[name].sd, more), rel=1e-3)
+    felt = ss.fit_law(told, slider).parameters["kinetic"]  # a load cell makes forces without the mass
+    assert 0.005 <= felt.sd / felt.value < 0.006
 
 
 def shaken(seed: int, friction: float = 1.5, noise: float = 5e-6) -> ss.Record:
@@ -288,7 +349,7 @@ def shaken(seed: int, friction: float = 1.5, noise: float = 5e-6) -> ss.Record:
 
 def test_a_force_of_no_period_drives_the_simulation_as_it_was_recorded() -> None:
     mass = ss.Oscillator(mass=2.0, stiffness=2000.0, damping=1.0, law=ss.laws.Coulomb(1.0), drive=ss.drives.Release())
-    fit = ss.fit_law(shaken(1), mass)
+    fit = ss.fit_law(shaken(1), mass, nuisance=["damping", "stiffness", "x.gain"])  # the force's gain as stated
     kinetic = fit.parameters["kinetic"]
     assert kinetic.value == pytest.approx(1.5, rel=3e-3)
     assert abs(kinetic.value - 1.5) < 4 * kinetic.sd

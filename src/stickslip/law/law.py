@@ -30,7 +30,7 @@ from stickslip.law.start import (
     too_few,
     value_of,
 )
-from stickslip.law.stretch import Sampled, Sensor
+from stickslip.law.stretch import Sampled, Sensor, Tones
 from stickslip.laws.base import Law
 from stickslip.laws.curved import CurvedLaw
 from stickslip.oscillator import Oscillator
@@ -386,15 +386,17 @@ def _sandwich(
 
 
 def _of_drives(problem: Problem, point: Point, influences: Sequence[Array]) -> Array:
-    """The parameters' variance by the noise of a base's motion of any shape, which the mass follows.
+    """The parameters' variance by the noise of a base's motion of any shape, or of its harmonics: the mass follows it.
 
     It is slow, and too small to be seen in how the residuals are correlated: without it 71 of 126 intervals of kinetic
     friction and damping held where x and z had 0.2 % of noise, on rigs of another integrator.
     """
     chance, totals = np.random.default_rng(0), []
-    for _ in range(STRAYED if any(isinstance(stretch.drive, Sampled) for stretch in problem.stretches) else 0):
+    drives = [stretch.drive for stretch in problem.stretches]
+    follow = any(isinstance(one, Sampled) or (isinstance(one, Tones) and len(one.tones) > 1) for one in drives)
+    for _ in range(STRAYED if follow else 0):
         stretches = tuple(
-            replace(one, drive=one.drive.strayed(chance)) if isinstance(one.drive, Sampled) else one
+            replace(one, drive=one.drive.strayed(chance)) if isinstance(one.drive, Sampled | Tones) else one
             for one in problem.stretches
         )
         strayed = replace(problem, stretches=stretches).at(point.u, point.starts)
@@ -430,7 +432,7 @@ def _end(problem: Problem, point: Point, k: int, side: float, allowed: float, te
     def holds(u: float) -> bool:
         tell()
         try:
-            fixed = _held(problem, k, u)
+            fixed = _held(problem, point.u, k, u)
         except ModelError:  # a kinetic friction above a static one that is held, where the releases tell it
             return False
         ceiling = point.chi2 + allowed
@@ -457,11 +459,8 @@ def _end(problem: Problem, point: Point, k: int, side: float, allowed: float, te
     return (inside + outside) / 2
 
 
-def _held(problem: Problem, k: int, u: float) -> Problem:
-    """The problem with one knob held at a coordinate."""
-    every = np.zeros(len(problem.knobs))
-    every[k] = u
-    only: Sequence[Knob] = (problem.knobs[k],)
-    fixed = replace(problem, knobs=tuple(only))
+def _held(problem: Problem, end: Array, k: int, u: float) -> Problem:
+    """The problem with one knob held at a coordinate: of an "above" at that over the sliding friction of the `end`."""
+    values = np.where(np.arange(len(end)) == k, u, end)
     others = tuple(knob for j, knob in enumerate(problem.knobs) if j != k)
-    return replace(problem, oscillator=fixed.system(np.array([u])), knobs=others)
+    return replace(problem, oscillator=replace(problem, profile=None).system(values), knobs=others)

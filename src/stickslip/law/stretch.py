@@ -4,6 +4,7 @@ The drive is the base's measured motion, or an applied force's, as one that the 
 
 from __future__ import annotations
 
+import cmath
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -77,6 +78,15 @@ class Tones:
             size, frequency, phase = moved[0]
             return HarmonicBase(size, frequency=frequency, phase=phase, contact=self.contact)
         return MultiTone(moved, on=self.on, contact=self.contact)
+
+    def strayed(self, chance: np.random.Generator) -> Tones:
+        """The motion as its harmonics would seem under other noise of the same size; of the first it is fitted."""
+        first, *others = self.tones
+        moved = [first]
+        for size, frequency, phase in others:
+            wave = cmath.rect(size, phase) + self.unsure[0] * first[0] * complex(*chance.standard_normal(2))
+            moved.append((abs(wave), frequency, cmath.phase(wave)))
+        return replace(self, tones=tuple(moved))
 
 
 class Smoothed(NamedTuple):
@@ -201,7 +211,8 @@ def _tones(values: Array, time: Array, noise: float) -> tuple[tuple[float, float
     coarse = float(np.argmax(spectrum)) / (4 * size) * size / span
     if coarse * span < 1.0:
         return None
-    allowed = max(AS_GOOD * noise, 1e-6 * float(np.ptp(values)))
+    least = 1e-6 * float(np.ptp(values))
+    allowed, found, worth = max(AS_GOOD * noise, least), None, math.inf
     for count in range(1, HARMONICS + 1):
 
         def left(frequency: float, count: int = count) -> float:
@@ -213,12 +224,15 @@ def _tones(values: Array, time: Array, noise: float) -> tuple[tuple[float, float
         solution, rest = _fitted(values, time, float(best.x), count)
         cosines, sines = solution[1:-1:2], solution[2:-1:2]
         sizes, angles = np.hypot(cosines, sines), np.arctan2(-sines, cosines)
-        if rest <= allowed and abs(solution[-1]) <= DRIFT * sizes[0]:
-            return tuple(
+        # a harmonic below the noise moves the mass all the same: Schwarz's criterion tells it from noise
+        criterion = 2 * size * math.log(max(rest, least)) + 2 * count * math.log(size)
+        if rest <= allowed and abs(solution[-1]) <= DRIFT * sizes[0] and criterion < worth:
+            worth = criterion
+            found = tuple(
                 (float(a), (j + 1) * float(best.x), float(p))
                 for j, (a, p) in enumerate(zip(sizes, angles, strict=True))
             )
-    return None
+    return found
 
 
 def _fitted(values: Array, time: Array, frequency: float, count: int) -> tuple[Array, float]:

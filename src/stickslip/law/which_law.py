@@ -120,7 +120,9 @@ def fit_law(
         What else is not known well: "mass", "stiffness", "damping", a sensor's "x.gain" or "x.delay", its
         mount's "a.frequency" or "a.damping". Where left out: the damper, which may be anything from zero on, the spring
         and all gains, which are trusted to 0.5 %, the delays of x and z, to 50 us, and the mounts that are stated, to
-        1 % of their frequency and 10 % of their damping ratio; with nothing free, nothing. Empty: all is as stated.
+        1 % of their frequency and 10 % of their damping ratio; with nothing free, nothing. The intervals then are no
+        narrower than 0.5 % of the base's gain or the applied force's leave them, and, where no sensor feels the force,
+        of the mass. Empty: all is as stated.
     channels : sequence of str, optional
         Channels to explain; all that were measured where left out.
     law : str, type or law, optional
@@ -169,6 +171,7 @@ def fit_law(
     rough = law is RoughSurface
     begun = _begun(None if rough else law, oscillator, records)
     names = free_names(begun[0], free)
+    stated = nuisance is not None or not intervals
     if nuisance is None:
         nuisance = usual_nuisance(begun[0], names, shown) if names else ()
     require_apart(begun[0], names, nuisance, shown)
@@ -190,7 +193,8 @@ def fit_law(
     if progress:
         progress(1.0)
     fit = answered(problem, point, sure, shown)
-    return fit.doubted(*remainders(fit.status))
+    fit = fit.doubted(*remainders(fit.status))
+    return fit if stated else _calibrated(fit, records, CALIBRATION)
 
 
 def _begun(law: Any, oscillator: Oscillator, records: Sequence[Record]) -> list[Oscillator]:
@@ -389,7 +393,7 @@ def compare_laws(
     rigid = _excess(fit) if best.name == "Stribeck" and fit.parameters["speed"].interval[0] > 0 else rests.fall
     if not doubt:
         fit = _whichever(fit, [trials[one.name] for one in ranking[1:] if one.kept])
-    fit = _calibrated(fit, records, calibration)
+    fit = _widened(_calibrated(fit, records, calibration), records)
     if progress:
         progress(1.0)
     candidates = tuple(_candidate(one, trials[one.name], fit, first=one is ranking[0]) for one in ranking)
@@ -512,19 +516,31 @@ def _calibrated(fit: LawFit, records: Sequence[Record], calibration: float) -> L
     """The fit no surer than the measured base is calibrated, by which all motion scales, and than the mass is weighed.
 
     What of a parameter is a length goes with the motion, and what is a mass with what slides, as its unit has them.
-    Without a sensor of force it is the mass that makes forces of motions. Intervals are as wide besides as they had to
-    be where the truth was known: what is left over is mostly no noise.
+    Without a sensor of force it is the mass that makes forces of motions.
     """
-    driven = any(name in record for record in records for name in ("z", "force"))
-    felt = any(name in record for record in records for name in ("load", "friction"))
-    with_force = 1.0 if explained(fit.misfit.values()) else ROUGHER
+    driven, felt = _measured(records, "z", "force"), _measured(records, "load", "friction")
     parameters = dict(fit.parameters)
     for key, one in fit.parameters.items():
         moved, weighed = (part in dimensions(one.unit) for part in ("length", "mass"))
-        if moved or weighed:
-            unsure = math.hypot(driven and moved, not felt and weighed)
-            parameters[key] = one.widened(unsure * calibration, with_force if felt else STRAYS.get(one.unit, STRAY))
+        if unsure := math.hypot(driven and moved, not felt and weighed):
+            parameters[key] = one.widened(unsure * calibration)
     return replace(fit, parameters=parameters)
+
+
+def _widened(fit: LawFit, records: Sequence[Record]) -> LawFit:
+    """The fit with intervals as wide as they had to be where the truth was known: what is left is mostly no noise."""
+    felt = _measured(records, "load", "friction")
+    with_force = 1.0 if explained(fit.misfit.values()) else ROUGHER
+    parameters = dict(fit.parameters)
+    for key, one in fit.parameters.items():
+        if {"length", "mass"} & set(dimensions(one.unit)):
+            parameters[key] = one.widened(0.0, with_force if felt else STRAYS.get(one.unit, STRAY))
+    return replace(fit, parameters=parameters)
+
+
+def _measured(records: Sequence[Record], *channels: str) -> bool:
+    """Whether a record has one of some channels."""
+    return any(name in record for record in records for name in channels)
 
 
 def _kinds(laws: Sequence[Any] | None) -> list[tuple[Hypothesis, list[Any]]]:
