@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from stickslip.cycle.joint_fall import FALL, Fall, bends, falling
+from stickslip.cycle.joint_fall import FALL, ROUNDING, Fall, bends, falling
 from stickslip.cycle.joint_fit import (
     ADVICE,
     SURELY,
@@ -32,6 +32,7 @@ from stickslip.signals.noise import noise_level
 from stickslip.statistics import FEW_INDEPENDENT, LeastSquares, mixture
 
 Array = NDArray[np.float64]
+Misfits = tuple[tuple[tuple[str, ...], Doubt], ...]  # the terms that each doubt is about
 
 BIASED = 0.01  # share of noise in the power of the acceleration above which the inertia is visibly low
 LATEST = 0.1  # s that a torque may be late
@@ -41,8 +42,9 @@ HEARD = 1.5
 STRAYS = 1.6  # times its chance that a delay strays: so it did on 60 joints of 15 ms, seeds 70100 to 70225
 NEARER, NEAR = 8, 1e-3  # steps towards the delay, and the last one's size in samples
 WAYS = ((1.0, "forward"), (-1.0, "back"))
-NOISY, LOADED, CONFOUNDED, SHIFTED, BENT = "noisy", "loaded", "confounded", "shifted", "bent"  # kinds of doubt
+NOISY, LOADED, CONFOUNDED, SHIFTED, BENT, PLACE = "noisy", "loaded", "confounded", "shifted", "bent", "placed"
 RUBS = ("forward", "back", "viscous")  # terms by which friction is a line over the speed
+PLACED = ("forward", "back", "load", "sine", "cosine")  # terms that friction or torque of the place passes for
 BARELY = 0.5  # of a value: an interval that is wider on either side hardly tells it
 RICHER = {"load", "uneven", *WARM}  # what Coulomb and viscous friction of both directions alike do not have
 
@@ -267,7 +269,7 @@ def delay_of(data: JointData) -> Estimate | None:
         return None
     if not _heard(data.earlier(late), fit, terms):
         return None
-    sd = STRAYS * Telling(data, fit, terms, True, "ok").sum({"late": 1.0}, WORDS["late"]).sd
+    sd = STRAYS * Telling(data, fit, terms, True, "ok", ()).sum({"late": 1.0}, WORDS["late"]).sd
     late, sd = (late, sd) if abs(late) <= LATEST else (0.0, LATEST)  # beyond that it is some other fault's
     return Estimate.normal(WORDS["late"], late, sd=sd, unit="s", method="the balance of torque, read later")
 
@@ -326,18 +328,18 @@ def _answer(
     if fall is not None:
         fit, terms, pull = fall.fits[fall.best], fall.terms, fall.pull
     status = Status(*_worries(data, fit, terms, record))
-    tell = Telling(data, fit, terms, turning(record), status)
-    rubs = tell.doubted(bent)
+    doubts = misfits(data, fit, bent, turning(record))
+    tell = Telling(data, fit, terms, turning(record), status, doubts)
     if fall is not None:
-        tell = rubs = Averaged(data, fit, terms, turning(record), status, fall)
-    known = {term: (rubs if term in RUBS else tell).one(term) for term in terms if term not in ("uneven", *FALL)}
+        tell = Averaged(data, fit, terms, turning(record), status, doubts, fall)
+    known = {term: tell.one(term) for term in terms if term not in ("uneven", *FALL)}
     if "load" in known:
         known["load"] = known["load"].within(0.0)
-    forward, back = rubs.ways()
-    level = _level(rubs, pull, known.get("load"))
+    forward, back = tell.ways()
+    level = _level(tell, pull, known.get("load"))
     ways: list[Estimate | None] = [None, None]
     if "uneven" in terms:
-        ways = [rubs.sum({"viscous": 1, "uneven": by}, f"viscous friction {way}") for by, way in WAYS]
+        ways = [tell.sum({"viscous": 1, "uneven": by}, f"viscous friction {way}") for by, way in WAYS]
     inertia = replace(data.stated["inertia"], name="inertia") if "inertia" in data.stated else known["inertia"]
     damped = known["damping"].value * _error_rate(data) if "damping" in known else np.zeros(len(data.raw))
     return JointFriction(
@@ -445,6 +447,20 @@ def _worries(data: JointData, fit: LeastSquares, terms: tuple[str, ...], record:
     return worries
 
 
+def misfits(data: JointData, fit: LeastSquares, bent: bool, turning: bool) -> Misfits:
+    """What of the friction the terms do not follow, and which of them it makes doubtful."""
+    doubts: list[tuple[tuple[str, ...], Doubt]] = []
+    if bent:
+        line = Doubt("friction bends with the speed: this is of the line nearest to it, as its interval is", BENT)
+        doubts.append((RUBS, line))
+    torque, friction = data.repeating(fit.residual)
+    if max(torque, friction) > ROUNDING * float(np.sqrt(np.mean(data.torque**2))):
+        what = "friction" if friction > torque else "torque"
+        size = f"{max(torque, friction):.2g} {(TURNING if turning else UNITS)['coulomb']} r.m.s."
+        doubts.append((PLACED, Doubt(f"{what} changes along the way, by {size} beside this mean over it", PLACE)))
+    return tuple(doubts)
+
+
 @dataclass(frozen=True)
 class Telling:
     """Coefficients and their sums as Estimates."""
@@ -454,6 +470,7 @@ class Telling:
     terms: tuple[str, ...]
     turning: bool
     status: str
+    doubts: Misfits
 
     @cached_property
     def unsure(self) -> tuple[Array, ...]:
@@ -462,11 +479,6 @@ class Telling:
         inertia = stated.value if stated else coefficient(self.fit, self.terms, "inertia")
         return *self.data.unsure, *self.data.unshared(inertia, coefficient(self.fit, self.terms, "viscous"))
 
-    def doubted(self, bent: bool) -> Telling:
-        """The same, with a doubt where friction is no line over the speed."""
-        doubt = Doubt("friction bends with the speed: this is of the line nearest to it, as its interval is", BENT)
-        return replace(self, status=Status(self.status, doubt)) if bent else self
-
     def one(self, term: str) -> Estimate:
         """A coefficient, with a doubt where its interval hardly tells it."""
         estimate = self.sum({term: 1.0}, WORDS[term])
@@ -474,7 +486,7 @@ class Telling:
             return estimate
         partner = self._partner(self.terms.index(term))
         doubt = Doubt(f"hardly told from the {WORDS[partner]}: {ADVICE[term]}", CONFOUNDED, lesser=True)
-        return replace(estimate, status=Status(self.status, doubt))
+        return replace(estimate, status=Status(estimate.status, doubt))
 
     def ways(self) -> tuple[Estimate, Estimate]:
         """Coulomb friction forward and back, with a doubt where these differ: so does what a zero makes of them."""
@@ -501,13 +513,14 @@ class Telling:
         units = {**(TURNING if self.turning else UNITS), "load": "1", "late": "s", **heat}
         kind = {"forward": "coulomb", "back": "coulomb", "sine": "coulomb", "cosine": "coulomb", "damping": "viscous"}
         unit = units[kind.get(next(iter(weights)), next(iter(weights)))]
+        status = Status(self.status, *(doubt for over, doubt in self.doubts if set(over) & set(weights)))
         how = "instruments of the reference" if self.data.followed else "least squares"
         checks = (
             f"condition number {self.fit.condition:.3g}",
             f"residuals are worth {self.fit.independent:.0f} independent samples",
         )
         return self.fit.combined(
-            row, name, unit, f"{how}, windows within strokes", beside=beside, status=self.status, checks=checks
+            row, name, unit, f"{how}, windows within strokes", beside=beside, status=status, checks=checks
         )
 
     def _partner(self, index: int) -> str:
@@ -527,7 +540,7 @@ class Averaged(Telling):
     @cached_property
     def parts(self) -> list[Telling]:
         """What each of them tells."""
-        return [Telling(self.data, fit, self.terms, self.turning, self.status) for fit in self.fall.fits]
+        return [Telling(self.data, fit, self.terms, self.turning, self.status, self.doubts) for fit in self.fall.fits]
 
     def sum(self, weights: dict[str, float], name: str) -> Estimate:
         """A sum of coefficients: that of every curve by its weight."""

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stickslip.balance.motion import require_fit
-from stickslip.cycle.joint_slides import Sliding, sliding
+from stickslip.cycle.joint_slides import Sliding, repeating, sliding
 from stickslip.errors import EstimateError, ModelError, RecordError
 from stickslip.estimate import Constant, Estimate
 from stickslip.record.record import Record, Step, require_record
@@ -231,6 +231,14 @@ class JointData:
         smoothed = [log.sliding.at(np.asarray(log.torque)) for log in logs]
         raw = np.concatenate([np.asarray(log.torque) for log in logs])
         return replace(self, logs=tuple(logs), torque=np.concatenate(smoothed), raw=raw)
+
+    def repeating(self, residual: Array) -> tuple[float, float]:
+        """What of the residual repeats along the way: as a torque, and as friction, which changes with the side."""
+        slides = [log.sliding for log in self.logs]
+        left = residual / np.concatenate([one.weights for one in slides])
+        place = np.concatenate([log.position[log.sliding.rows] for log in self.logs])
+        side = np.concatenate([one.side[one.rows] for one in slides])
+        return repeating(place, left), repeating(place, left * side)
 
     def unshared(self, inertia: float, viscous: float) -> tuple[Array, Array]:
         """As :meth:`Log.unshared`, of all logs."""

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from stickslip.cycle.joint import RICHER, RUBS, Telling, delay_of, punctual
+from stickslip.cycle.joint import RICHER, Telling, delay_of, misfits, punctual
 from stickslip.cycle.joint_fall import bends
 from stickslip.cycle.joint_fit import JointData, about_load, fitted, joint_data, pooled, turning, warmed
 from stickslip.errors import EstimateError, RecordError
@@ -137,15 +137,15 @@ def regress_joint_logs(
     delay = delay_of(pooled(data))
     data, slow = [punctual(one, delay) for one in data], [punctual(one, delay) for one in slow]
     fit, terms, pull, left_out = fitted(pooled(data))
-    tell = Telling(pooled(data), fit, terms, turning(records[0]), "ok")
-    rubs = tell.doubted(bends(pooled(slow), fit, terms, pull))
-    known = {term: (rubs if term in RUBS else tell).one(term) for term in terms if term != "uneven"}
+    doubts = misfits(pooled(data), fit, bends(pooled(slow), fit, terms, pull), turning(records[0]))
+    tell = Telling(pooled(data), fit, terms, turning(records[0]), "ok", doubts)
+    known = {term: tell.one(term) for term in terms if term != "uneven"}
     predictions = [
         _predicted(log, pooled(data[:place] + data[place + 1 :]), record)
         for place, (log, record) in enumerate(zip(data, records, strict=True))
     ]
     return JointLogs(
-        *rubs.ways(),
+        *tell.ways(),
         known["viscous"],
         load=known.get("load"),
         inertia=known.get("inertia"),

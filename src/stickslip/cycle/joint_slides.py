@@ -25,6 +25,9 @@ SLOW = 0.05  # of its fast speed (90 %): slower, static friction that falls with
 SLOWER = 0.02  # where that fall is asked for
 NARROW = 0.3  # of the window, near the ends of strokes
 APART = 4  # rows in the window's half: nearer ones tell the same
+PLACES, FEWEST = 16, 6.0  # along the way, and of how many, as they weigh, a correlation is told
+REPEATS = 3.0  # deviations of Fisher's z: once in 700 without an effect
+ALIKE = 0.999  # a correlation, beyond which Fisher's z grows without bound
 
 
 @dataclass(frozen=True)
@@ -154,3 +157,28 @@ def sliding(position: Array, fs: float, *, slowly: bool = False) -> Sliding:
 def _apart(within: NDArray[np.bool_], window: Window) -> NDArray[np.intp]:
     """Rows that tell something of their own."""
     return np.flatnonzero(within)[:: max(1, window.half // APART)]
+
+
+def repeating(place: Array, values: Array) -> float:
+    """Root mean square of that part of values which repeats with the place; 0 where none surely does.
+
+    Means over places are compared between the earlier half and the later one: noise of one half knows nothing of the
+    other's, so that their covariance is the variance of what repeats, and their correlation says how surely it does
+    (the transform of Fisher 1921).
+    """
+    reach = float(np.ptp(place))
+    number = np.minimum((place - place.min()) * (PLACES / reach if reach else 0.0), PLACES - 1).astype(int)
+    early = np.arange(len(place)) < len(place) // 2
+    counts = np.array([np.bincount(number[half], minlength=PLACES) for half in (early, ~early)])
+    sums = np.array([np.bincount(number[half], values[half], minlength=PLACES) for half in (early, ~early)])
+    weights = np.sqrt(counts[0] * counts[1])
+    total = float(weights.sum())
+    if not total or total**2 < FEWEST * float(weights @ weights):
+        return 0.0
+    means = sums / np.maximum(counts, 1)
+    means -= (means @ weights / total)[:, None]
+    common, spread = float(weights @ (means[0] * means[1])), math.sqrt(math.prod(means**2 @ weights))
+    if common <= 0:
+        return 0.0
+    sure = math.atanh(min(common / spread, ALIKE)) * math.sqrt(total**2 / float(weights @ weights) - 3)
+    return math.sqrt(common / total) if sure > REPEATS else 0.0
