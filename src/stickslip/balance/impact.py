@@ -68,7 +68,7 @@ class ImpactTest(Result, Plain):
         return tuple(number for resonance in self.resonances for number in (resonance.frequency, resonance.damping))
 
 
-def impact_test(record: Record, *, mass: Constant | None = None) -> ImpactTest:
+def impact_test(record: Record, *, mass: Constant | None = None, tapped: bool = True) -> ImpactTest:
     r"""Which resonances does a hammer tap excite, and which sensor shows them?
 
     The thesis's section 2.5: the base held, the contact engaged, a tap on the mass. After it every channel is a sum
@@ -87,6 +87,8 @@ def impact_test(record: Record, *, mass: Constant | None = None) -> ImpactTest:
     mass : float, str, tuple or Estimate, optional
         Moving mass [kg]; as :func:`~stickslip.friction_force` was told, if it was. Without it, the lowest mode that
         both show is taken for the contact's.
+    tapped : bool
+        Whether the record is one of a tap; else it is taken apart from its loudest reading on, whatever came before.
 
     Returns
     -------
@@ -118,7 +120,7 @@ def impact_test(record: Record, *, mass: Constant | None = None) -> ImpactTest:
     known = known_constants(record, mass=mass).get("mass")
     ringing = _ringing(record, channels)
     modes, residual = _modes(ringing)
-    doubts = _blow(record, ringing, math.ceil(record.fs / modes[0].frequency))
+    doubts = _blow(record, ringing, math.ceil(record.fs / modes[0].frequency)) if tapped else []
     slips = f"what rings is no sum of decaying oscillations: {residual:.2g} times the noise is left over (slips?)"
     status = Status(*doubts, *[Doubt(slips, "slips")] * (residual > MISFIT))
     named = _named(modes, channels, known, status)

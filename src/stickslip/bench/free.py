@@ -445,7 +445,7 @@ def _rung(record: Record, mass: Estimate, stop: int) -> tuple[ImpactTest, float]
     step = max(1, round(LATER * record.fs / 45.0))  # the thesis's contact rings at 45 Hz
     for _ in range(TRIES):
         try:
-            test = impact_test(record.rows(begin), mass=mass)
+            test = impact_test(record.rows(begin), mass=mass, tapped=False)
             step = max(1, round(LATER * record.fs / test.resonances[0].frequency.value))
             if best is None or _disorder(test) < _disorder(best):
                 best = test
