@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from stickslip.errors import EstimateError, ModelError
 from stickslip.estimate import Doubt, Estimate, Result, Status
 from stickslip.record.record import Record
-from stickslip.statistics import mean_uncertainty, student
+from stickslip.statistics import correlation_time, mean_uncertainty, student
 
 Array = NDArray[np.float64]
 
@@ -40,7 +40,7 @@ class Calibration(Result):
     linearity : Estimate
         Largest deviation from the straight line, as a part of the range.
     reference, levels : ndarray (n,)
-        The known values and what was read [unit of the channel]; of a leaking sensor their steps.
+        The known values and what was read [unit of the channel]; of a leaking sensor with the leak put back.
     status : str
         "ok", or in words what to beware of.
     """
@@ -62,13 +62,15 @@ class Calibration(Result):
 def calibrate(
     record: Record, *, channel: str, reference: Sequence[float], reference_sd: float = 0.0, leaks: bool = False
 ) -> Calibration:
-    """By which factor, and from which zero, does a sensor read what is put on it?
+    r"""By which factor, and from which zero, does a sensor read what is put on it?
 
     The record stands on one level after another: weights on a load cell, gauge blocks before a displacement sensor, an
     accelerometer turned over in gravity. The levels are found in it (:func:`find_holds`); a straight
     line through them against the known values gives gain and zero, its scatter how sure they are, with
-    Student's quantile for few levels. Of a sensor that leaks, the steps are read instead, each side drawn on to the
-    instant between, so that what leaks away while a level is held does not count.
+    Student's quantile for few levels; scatter that grows with the level counts as HC3 (MacKinnon and White 1985).
+
+    A charge that leaks away with the time constant T, :math:`\dot y = \dot u - y / T`, is put back,
+    :math:`u = y + \frac{1}{T} \int y\, dt`, with the 1/T under which the levels are flat, and a drift beside it.
 
     Parameters
     ----------
@@ -106,40 +108,36 @@ def calibrate(
     values = np.asarray(reference, dtype=float)
     _require_reference(values, reference_sd)
     holds = find_holds(record, channel, len(values), question=QUESTION)
-    unit = record.channels[channel].unit
+    unit, shared = record.channels[channel].unit, np.zeros((len(values), 0))
     if leaks:
-        known, read = np.diff(values), jumps(holds)
-        design = known[:, None]
-        weight_sd = np.array([math.hypot(a.sd, b.sd) for a, b in itertools.pairwise(holds)])
-    else:
-        known, read = values, np.array([hold.level for hold in holds])
-        design = np.column_stack([known, np.ones(len(known))])
-        weight_sd = np.array([hold.sd for hold in holds])
-    fit, sd, residual, quantile = _line(design, read, weight_sd)
+        record, shared = _without_leak(record, channel, holds)
+        holds = find_holds(record, channel, len(values), question=QUESTION)
+    read, level_sd = np.array([hold.level for hold in holds]), np.array([hold.sd for hold in holds])
+    fit, sd, residual, quantile = _line(values, read, level_sd, shared)
     gain_sd = math.hypot(sd[0], reference_sd * fit[0])
     if not abs(fit[0]) > 3 * sd[0]:
         raise EstimateError(
-            f"{channel} changes by {np.ptp(read):.3g} {unit} over levels that differ by {np.ptp(known):.3g}",
+            f"{channel} changes by {np.ptp(read):.3g} {unit} over levels that differ by {np.ptp(values):.3g}",
             f"{QUESTION} needs readings that follow what is put on it",
             "check the cable, the channel and the list of levels",
         )
-    method = f"{len(read)} {'steps between levels' if leaks else 'levels'} against known values"
+    method = f"{len(read)} levels against known values{', what leaked away put back' if leaks else ''}"
     gain = Estimate.normal(f"gain of {channel}", fit[0], sd=gain_sd, unit="1", method=method, quantile=quantile)
     zero = (
         None
         if leaks
         else Estimate.normal(f"zero of {channel}", fit[1], sd=sd[1], unit=unit, method=method, quantile=quantile)
     )
-    largest = float(np.abs(residual).max() / np.ptp(fit[0] * known))
+    largest = float(np.abs(residual).max() / np.ptp(fit[0] * values))
     linearity = Estimate.normal(
         f"deviation of {channel} from a straight line",
         largest,
-        sd=float(weight_sd.max() / np.ptp(fit[0] * known)),
+        sd=float(level_sd.max() / np.ptp(fit[0] * values)),
         unit="1",
         method=method,
     ).within(0.0)
     bent = [Doubt(f"{channel} is off a straight line by {100 * largest:.2g} % of the range", "bent")]
-    return Calibration(channel, gain, zero, linearity, known, read, Status(*bent * (largest > BENT)))
+    return Calibration(channel, gain, zero, linearity, values, read, Status(*bent * (largest > BENT)))
 
 
 def _require_reference(values: Array, sd: float) -> None:
@@ -151,16 +149,36 @@ def _require_reference(values: Array, sd: float) -> None:
         raise ModelError(f"reference_sd = {sd}", "it is a part of the known values, from 0 to 1", "0.001 is 0.1 %")
 
 
-def _line(design: Array, read: Array, read_sd: Array) -> tuple[Array, Array, Array, float]:
-    """Coefficients, their deviations, what is left, and Student's quantile; levels count alike.
-
-    The scatter may by chance be less than what noise alone leaves of a level: then that counts.
-    """
+def _without_leak(record: Record, channel: str, holds: Sequence[Hold]) -> tuple[Record, Array]:
+    """The record with what leaked away put back; and by how much a deviation of leak and drift moves each level."""
+    values, time = record[channel], record.time - record.start
+    passed = np.concatenate([[0.0], np.cumsum((values[1:] + values[:-1]) / 2)]) / record.fs
+    columns, rows = np.column_stack([passed, time]), [hold.rows(record) for hold in holds]
+    design, read = (np.concatenate([part[row] - part[row].mean(axis=0) for row in rows]) for part in (columns, values))
     fit = np.linalg.lstsq(design, read)[0]
     residual = read - design @ fit
-    freedom = max(1, len(read) - design.shape[1])
+    variance = float(residual @ residual) / len(residual) * max(1.0, correlation_time(residual))
+    spread, axes = np.linalg.eigh(variance * np.linalg.pinv(design.T @ design))
+    flat = record.with_channel(channel, values - columns @ fit, unit=record.channels[channel].unit)
+    return flat, np.array([columns[row].mean(axis=0) for row in rows]) @ (axes * np.sqrt(np.maximum(spread, 0.0)))
+
+
+def _line(known: Array, read: Array, read_sd: Array, shared: Array) -> tuple[Array, Array, Array, float]:
+    """Slope and zero, their deviations, what is left, and Student's quantile; levels count alike.
+
+    The scatter may by chance be less than what noise alone leaves of a level: then that counts. A block or a weight
+    may be wrong by a part of itself: then the highest level, which the line follows most, says least of it (HC3).
+    """
+    design = np.column_stack([known, np.ones(len(known))])
+    inverse = np.linalg.inv(design.T @ design)
+    weights = design @ inverse
+    fit = read @ weights
+    residual = read - design @ fit
+    freedom = max(1, len(read) - 2)
     scatter, chance = math.sqrt(float(residual @ residual) / freedom), math.sqrt(float(np.mean(read_sd**2)))
-    sd = max(scatter, chance) * np.sqrt(np.diag(np.linalg.inv(design.T @ design)))
+    free = np.maximum(1 - np.sum(weights * design, axis=1), 1e-9)  # of each level, that the line does not follow
+    sd = np.maximum(max(scatter, chance) * np.sqrt(np.diag(inverse)), np.sqrt((residual / free) ** 2 @ weights**2))
+    sd = np.sqrt(sd**2 + np.sum((weights.T @ shared) ** 2, axis=1))
     return np.asarray(fit, dtype=float), sd, residual, student(float(freedom))
 
 
@@ -252,28 +270,19 @@ class Hold:
         Instants [s] between which it is read, the margins left out.
     level : float
         Its mean [unit of the channel].
-    slope : float
-        How fast it changes [unit / s].
     sd : float
         Standard deviation of the mean.
-    middle : float
-        Instant [s] at which a straight line through it has its mean.
     """
 
     first: float
     last: float
     level: float
-    slope: float
     sd: float
 
-    @property
-    def middle(self) -> float:
-        """Instant [s] at which a straight line through it has its mean."""
-        return (self.first + self.last) / 2
-
-    def at(self, time: float) -> float:
-        """The straight line through it, at another instant [s]."""
-        return self.level + self.slope * (time - self.middle)
+    def rows(self, record: Record) -> slice:
+        """Where it lies in its record."""
+        first, last = (round((time - record.start) * record.fs) for time in (self.first, self.last))
+        return slice(first, last + 1)
 
 
 def find_holds(record: Record, channel: str, count: int, *, question: str) -> tuple[Hold, ...]:
@@ -368,16 +377,4 @@ def _hold(record: Record, values: Array, first: int, last: int) -> Hold:
     slope = float(time @ part / (time @ time))
     sd = mean_uncertainty(part - part.mean() - slope * time)[0]
     start = record.start + (first + margin) / record.fs
-    return Hold(start, start + (len(part) - 1) / record.fs, float(part.mean()), slope, sd)
-
-
-def jumps(holds: Sequence[Hold]) -> Array:
-    """How far each level lies above the one before, both drawn on to the instant between them."""
-    pairs = itertools.pairwise(holds)
-    return np.array(
-        [
-            after.at(middle) - before.at(middle)
-            for before, after in pairs
-            for middle in [(before.last + after.first) / 2]
-        ]
-    )
+    return Hold(start, start + (len(part) - 1) / record.fs, float(part.mean()), sd)
