@@ -227,6 +227,12 @@ def test_a_title_that_is_not_what_it_seems_is_in_the_history(
     assert record.history[0].outcome == f"20 samples at 100 Hz; {note}"
 
 
+@pytest.mark.parametrize("title", ["Stroke (mm)", "Stroke(mm)", "Stroke", "2 * `Stroke (mm)` - Stroke"])
+def test_a_column_is_found_by_its_title_as_it_stands_in_the_file(csv: Callable[..., Path], title: str) -> None:
+    record = ss.read_record(csv("t (s),Stroke (mm)\n0,1\n0.1,2\n0.2,4\n"), channels={"x": title})
+    assert record["x"] == pytest.approx([1e-3, 2e-3, 4e-3])
+
+
 def test_a_unit_nobody_states_is_taken_as_si_and_said(csv: Callable[..., Path]) -> None:
     record = ss.read_record(csv("t,x\n0,1\n1,2\n"))
     assert record["x"][0] == 1

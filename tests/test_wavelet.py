@@ -13,7 +13,7 @@ from scipy.fft import fft, ifft, next_fast_len
 from scipy.special import wofz
 
 import stickslip as ss
-from stickslip.errors import RecordError
+from stickslip.errors import ModelError, RecordError, StickslipError
 from stickslip.signals.morlet import normalised_gain, transform
 
 CENTRE = 4.5
@@ -337,7 +337,7 @@ def test_the_short_time_transform_reads_a_tone() -> None:
 )
 def test_what_can_not_be_mapped_is_refused(change: dict, words: str) -> None:
     count = 500_000 if change.get("voices") == 512 else 4000
-    with pytest.raises(RecordError, match=words):
+    with pytest.raises(StickslipError, match=words):
         ss.wavelet_map(of(np.sin(0.3 * np.arange(count))), "a", **change)
 
 
@@ -377,7 +377,7 @@ def test_it_can_be_drawn() -> None:
 
 def test_no_frequency_is_refused_and_a_single_one_is_drawn() -> None:
     record = ss.Record.of({"a": np.sin(0.3 * np.arange(1000))}, fs=1000)
-    with pytest.raises(RecordError, match="positive and rise"):
+    with pytest.raises(ModelError, match="positive and rise"):
         ss.wavelet_map(record, "a", frequencies=[])
     single = ss.wavelet_map(record, "a", frequencies=[45.0])
     assert len(ss.figures.plot_wavelet(single, record=record).axes) == 3

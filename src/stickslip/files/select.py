@@ -192,7 +192,8 @@ class Columns:
                 self._admit(qualified + [(f"{source.path.name}:{name}", key) for name, key in numbered])
         last = [(last_part(name), key) for key, name in self._fields.items()]
         self._admit(last)
-        self._admit([(f"{name} [{self.columns[key].unit}]", key) for name, key in exact])
+        for title in ("{} [{}]", "{} ({})", "{}({})"):  # as the file may have it
+            self._admit([(title.format(name, self.columns[key].unit), key) for name, key in exact])
         self._admit([(_word_of(name), key) for name, key in last])  # as a check-up shows it
         self._stated = {key: unit for name, unit in self.units.items() for key in self._called(name, set(channels))}
         self.constants = {name: value for source in sources for name, value in source.table.constants.items()}

@@ -60,8 +60,10 @@ def write_record(record: Record, path: str | Path, *, overwrite: bool = False) -
 
     Raises
     ------
+    ModelError
+        The suffix names no format that can be written.
     FormatError
-        The suffix names no format that can be written, the file is there already, or the folder can not be written to.
+        The file is there already, or the folder can not be written to.
 
     Examples
     --------
@@ -76,7 +78,7 @@ def write_record(record: Record, path: str | Path, *, overwrite: bool = False) -
     path = Path(path)
     writer = WRITERS.get(path.suffix.lower())
     if writer is None:
-        raise FormatError(
+        raise ModelError(
             f"'{path.name}' ends in '{path.suffix}'",
             f"a record is written as {', '.join(WRITERS)}",
             "choose one of these endings",

@@ -282,7 +282,8 @@ class Record:
         missing = [name for name in names if name not in self.samples]
         if missing:
             raise RecordError(
-                f"channel {', '.join(missing)} is missing (the record has {', '.join(self.samples)})",
+                f"{'channels' if missing[1:] else 'channel'} {', '.join(missing)} {'are' if missing[1:] else 'is'} missing "
+                f"(the record has {', '.join(self.samples)})",
                 f"{question} needs {', '.join(names)}",
                 f'name the column when reading: channels={{"{missing[0]}": "COLUMN [unit]"}}',
             )

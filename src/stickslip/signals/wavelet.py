@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from stickslip.errors import RecordError
+from stickslip.errors import ModelError, RecordError
 from stickslip.record.metadata import labelled_arrays
 from stickslip.record.record import Record, require_record
 from stickslip.signals.morlet import REACH, normalised_gain, ridge_centre, transform
@@ -93,7 +93,7 @@ def _require_frequencies(wanted: Array, lowest: float, fs: float, duration: floa
         or (wanted <= 0).any()
         or (np.diff(wanted) <= 0).any()
     ):
-        raise RecordError(
+        raise ModelError(
             f"frequencies = {np.array2string(wanted, threshold=6, precision=4)}",
             "they are positive and rise",
             "give the lowest and the highest in Hz",
@@ -218,6 +218,8 @@ def wavelet_map(
     RecordError
         A channel that is missing or not finite, a broken clock, frequencies above half the rate or too low for the
         record's length, a map that would not fit into memory.
+    ModelError
+        Frequencies that are not positive, or do not rise.
 
     Examples
     --------
