@@ -6,7 +6,7 @@ import pytest
 import stickslip as ss
 from stickslip.answers import analyze_joint, axis_record
 from stickslip.cycle import regress_joint
-from stickslip.errors import EstimateError
+from stickslip.errors import EstimateError, ModelError
 from stickslip.estimate import stands
 
 T = np.arange(6000) / 200
@@ -98,3 +98,11 @@ def test_noise_of_an_even_torque_tells_no_delay(seed: int) -> None:
     joint = regress_joint(log, gravity=False, inertia=0.02)
     assert joint.delay is None
     assert "delay of the torque" in " ".join(joint.left_out)
+
+
+def test_gravity_is_no_sine_of_a_displacement() -> None:
+    """An axis was told to turn farther."""
+    straight = ss.Record.of({"x": Q, "force": TORQUE}, fs=200)
+    with pytest.raises(ModelError, match="half of what Coulomb friction forward and back differ by"):
+        regress_joint(straight, gravity=True)
+    assert regress_joint(straight, gravity=False).sine is None

@@ -210,7 +210,7 @@ def regress_joint(
     RecordError
         A channel is missing, broken or too short, or the units of torque and motion do not belong together.
     ModelError
-        A constant without meaning.
+        A constant without meaning, or gravity of an axis that moves straight.
     EstimateError
         No sliding both ways, or columns that the motion does not tell apart: the sentence says which motion would.
 

@@ -288,6 +288,12 @@ def joint_data(
 ) -> tuple[Record, JointData]:
     """The record with its torque, and what is asked of it under what is stated; of slow sliding too, where asked."""
     require_record(record)
+    if gravity and not turning(record):
+        raise ModelError(
+            "gravity of an axis that moves straight",
+            "it is a constant force there, half of what Coulomb friction forward and back differ by",
+            "leave it out",
+        )
     constants = _constants(record, **given)
     record = _torqued(record, constants)
     return record, _data_of(record, constants, turning(record) if gravity is None else gravity, slowly)

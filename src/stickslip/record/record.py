@@ -281,9 +281,9 @@ class Record:
         """Refuse, in one sentence, if a channel is missing."""
         missing = [name for name in names if name not in self.samples]
         if missing:
+            plural, verb = ("s", "are") if len(missing) > 1 else ("", "is")
             raise RecordError(
-                f"{'channels' if missing[1:] else 'channel'} {', '.join(missing)} {'are' if missing[1:] else 'is'} missing "
-                f"(the record has {', '.join(self.samples)})",
+                f"channel{plural} {', '.join(missing)} {verb} missing (the record has {', '.join(self.samples)})",
                 f"{question} needs {', '.join(names)}",
                 f'name the column when reading: channels={{"{missing[0]}": "COLUMN [unit]"}}',
             )
