@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
+import threading
 import types
 from pathlib import Path
 from typing import Any, ClassVar
@@ -55,9 +56,41 @@ def test_lines_with_too_few_columns_are_told(tmp_path: Path) -> None:
     table = {"kind": "serial", "port": os.ttyname(port), "fs": 20, "channels": {"x": "#1 [mm]", "load": "#3 [N]"}}
     with find_device("board", {"board": table}).open() as stream:
         os.write(board, b"".join(b"%d;7.5\r\n" % k for k in range(60)))
-        with pytest.raises(ss.errors.RecordError, match=r"'41;7.5'.*3 numbers") as refused:
+        with pytest.raises(ss.errors.RecordError, match=r"59 lines.*'59;7.5'.*3 numbers") as refused:
             stream.read(2.0)
     assert "baud = 115200" in refused.value.next_step
+    os.close(board)
+    os.close(port)
+
+
+@pytest.mark.skipif(not hasattr(os, "openpty"), reason="no pseudo terminals here")
+@pytest.mark.parametrize(
+    ("sent", "said"),
+    [
+        (b"Booting\r\nsensor found\r\n" * 8 + b"3\r\n4\r\n", ""),  # a board that greets
+        (b"1.0\r" * 100, "no end of a line after '1.0"),
+        (b"\x8e\xf1\n" * 3, "2 lines of which none could be read, the last one"),
+        (bytes(range(128, 256)) * 60, "lines of which none could be read"),  # longer than any line
+    ],
+)
+def test_what_is_no_line_of_numbers_is_told_before_it_passes_for_silence(
+    sent: bytes, said: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip("serial")
+    tty = pytest.importorskip("tty")
+    monkeypatch.setattr("stickslip.bench.serial.PATIENCE", 0.3)
+    board, port = os.openpty()
+    tty.setraw(port)
+    table = {"kind": "serial", "port": os.ttyname(port), "fs": 200, "channels": {"x": "#1 [mm]"}}
+    with find_device("board", {"board": table}).open() as stream:
+        threading.Thread(target=os.write, args=(board, sent)).start()
+        if said:
+            with pytest.raises(ss.errors.RecordError, match=said):
+                stream.read(3.0)
+        else:
+            block = stream.read(3.0)
+            assert block is not None
+            np.testing.assert_array_equal(block.samples, [[3.0, 4.0]])
     os.close(board)
     os.close(port)
 

@@ -174,6 +174,8 @@ def test_less_before_a_trigger_than_was_wanted_is_told(tmp_path: Path) -> None:
         kept = -ss.read_record(done.paths[0]).start
         assert len(done.notes) == notes
         assert all(f"kept {kept:.3g} s before the trigger, not 10 s" in note for note in done.notes)
+        told = ss.read_record(done.paths[0]).history[0].arguments["trigger"]
+        assert told == f"x rising through 0.0003, {abs(kept):.4g} s before it kept"
 
 
 def test_a_folder_that_is_not_there_is_refused_before_anything_is_measured(tmp_path: Path) -> None:

@@ -318,12 +318,17 @@ class _Head:
                 self.held.popleft()  # a second more: another device may have the trigger
             return
         begin = max(self.held[0].first, math.ceil(at - before * fs - 1e-6))
+        kept = max(0.0, (at - begin) / fs)
         if before and begin > math.ceil(at - before * fs - 1e-6):
-            kept = max(0.0, (at - begin) / fs)
             self.short = f"{self.device.name} kept {kept:.3g} s before the trigger, not {before:g} s: it came too early"
         self.end = math.ceil(at + run.wanted.seconds * fs - 1e-6) if run.wanted.seconds else math.inf
         self.tape = Tape(
-            self.device, self.path, begin=begin, start=(begin - at) / fs, log=run.wanted.log, notes=_notes(run.wanted)
+            self.device,
+            self.path,
+            begin=begin,
+            start=(begin - at) / fs,
+            log=run.wanted.log,
+            notes=_notes(run.wanted, kept),
         )
         while self.held:
             self._write(self.held.popleft())
@@ -339,10 +344,11 @@ class _Head:
         self.tape.write(block)
 
 
-def _notes(wanted: Wanted) -> dict[str, Any]:
+def _notes(wanted: Wanted, kept: float) -> dict[str, Any]:
+    """How it was asked, for the history; of the time before the trigger what was there."""
     notes: dict[str, Any] = {}
     if (trigger := wanted.trigger) is not None:
-        notes["trigger"] = f"{trigger}, {trigger.before:g} s before it kept"
+        notes["trigger"] = f"{trigger}, {kept:.4g} s before it kept"
     for name, signal in wanted.drive.items():
         notes[f"drive {name}"] = (
             str(signal) if isinstance(signal, tuple) else f"{0 if signal is None else len(signal)} samples"
