@@ -126,6 +126,13 @@ def test_a_stiff_contact_that_leaves_far_less_stands_for_itself() -> None:
     assert [law.name for law in ranking if law.kept] == ["Coulomb"]
 
 
+def test_how_many_parameters_a_stiff_contact_has_makes_it_no_rigid_one() -> None:
+    """They count in its odds: it leaves 1.4 times less, and is neither excluded nor alone."""
+    ranking, _ = standings([misfit("Coulomb", 1, 1.4), stiff("LuGre", 5, 1.0)], EVIDENCE)
+    assert {law.name for law in ranking if law.kept} == {"Coulomb", "LuGre"}
+    assert not any(law.limit for law in ranking)
+
+
 def test_a_stiff_contact_stands_beside_a_law_of_another_family_that_leads() -> None:
     """A state variable led a rigid law by 1.7 times, and a contact that gave way and left no more was excluded."""
     stiff_contact = stiff("compliant", 3, 1.0)

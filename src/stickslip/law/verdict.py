@@ -115,14 +115,18 @@ class Evidence:
         variance = max(self.squares.get(key, 0.0), self.noise[key] ** 2)
         return math.sqrt(variance * max(1.0, samples / self.counts[key])) if key in self.counts else math.inf
 
-    def criterion(self, law: Misfit) -> float:
-        """Schwarz's, the variance of each channel unknown but for its noise: ``sum n log S + p log(sum n)``.
+    def deviance(self, law: Misfit) -> float:
+        """Of the likelihood, the variance of each channel unknown but for its noise: ``sum n log S``.
 
         With it counts how far the law had to move what was stated of springs and sensors.
         """
         left = law.squares
         likely = math.fsum(n * math.log(max(left[name], self.noise[name] ** 2)) for name, n in self.counts.items())
-        return likely + law.moved + law.count * math.log(max(2.0, math.fsum(self.counts.values())))
+        return likely + law.moved
+
+    def criterion(self, law: Misfit) -> float:
+        """Schwarz's: the deviance, and ``p log(sum n)``."""
+        return self.deviance(law) + law.count * math.log(max(2.0, math.fsum(self.counts.values())))
 
     @property
     def supported(self) -> float:
@@ -222,12 +226,14 @@ def _limits(order: Sequence[Misfit], evidence: Evidence) -> set[str]:
 
     Not where it leaves more than chance makes it: a rough surface may have done so, or the contact. Nor where a law of
     another family leads them all: what that explains beyond a rigid law, a contact that gives way may explain as well.
+    How many parameters a law has says nothing of it: weighed with them, bristles were left out on 6 of 24 rigs of
+    theirs, and without on 1, where 9 rigs of rigid laws were told as before.
     """
-    worth = {law.name: evidence.criterion(law) for law in order}
-    leads = min((law for law in order if not law.stiff), key=lambda law: worth[law.name], default=None)
-    rigid = min((worth[law.name] for law in order if law.family == "rigid"), default=math.inf)
+    left = {law.name: evidence.deviance(law) for law in order}
+    leads = min((law for law in order if not law.stiff), key=evidence.criterion, default=None)
+    rigid = min((left[law.name] for law in order if law.family == "rigid"), default=math.inf)
     chance = 0.0 if leads is not None and leads.family != "rigid" else -BLUNT * math.log(UNLIKELY)
-    return {law.name for law in order if law.stiff and rigid - worth[law.name] <= min(chance, evidence.allowance)}
+    return {law.name for law in order if law.stiff and rigid - left[law.name] <= min(chance, evidence.allowance)}
 
 
 def _why(law: Misfit, best: Misfit, ratios: Mapping[str, float], worse: float) -> str:
