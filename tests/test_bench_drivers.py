@@ -218,6 +218,18 @@ def ni(monkeypatch: pytest.MonkeyPatch) -> None:
     module(monkeypatch, "nidaqmx.stream_readers", AnalogMultiChannelReader=Reader)
 
 
+def test_a_unit_without_its_driver_is_one_sentence(ni: None, monkeypatch: pytest.MonkeyPatch) -> None:
+    def absent() -> None:
+        raise RuntimeError("Could not find an installation of NI-DAQmx.\nAsk for it.")
+
+    monkeypatch.setattr(sys.modules["nidaqmx"], "Task", absent)
+    unit = find_device(
+        "daq", {"daq": {"kind": "ni", "device": "Dev1", "fs": 500, "channels": {"x": "ai0 [V] @ 1 V/m"}}}
+    )
+    with pytest.raises(ss.errors.ModelError, match=r"installation of NI-DAQmx\.\); it needs NI-DAQmx; install"):
+        unit.open()
+
+
 def test_a_unit_of_national_instruments(ni: None) -> None:
     table = {
         "kind": "ni", "device": "Dev1", "fs": 1000,

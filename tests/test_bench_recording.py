@@ -272,6 +272,25 @@ def test_nothing_is_measured_where_the_record_can_not_be(tmp_path: Path) -> None
         acquire(Counter(), output=tmp_path / "left.h5", wanted=Wanted(seconds=1.0))
 
 
+class Unplugged(Counting):
+    """Its plug is pulled at the third block."""
+
+    def read(self, timeout: float = 1.0) -> Block | None:
+        if self.sent >= 2 * self.device.size:
+            raise OSError(5, "Input/output error")
+        return super().read(timeout)
+
+
+def test_a_plug_that_is_pulled_is_one_sentence_that_names_what_came(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(Counter, "open", lambda device: Unplugged(device))
+    said = r"counter can not be read any more.*Input/output error.*plug.*run\.h5\.journal holds what came until then"
+    with pytest.raises(ss.errors.RecordError, match=said):
+        acquire(Counter(), output=tmp_path / "run.h5")
+    assert len(ss.read_record(tmp_path / "run.h5.journal")) == 2000
+
+
 def test_a_counter_that_runs_back_ends_it_and_keeps_what_was(tmp_path: Path) -> None:
     tape = Tape(Counter(), tmp_path / "run.h5")
     tape.write(Block(0, 0.0, counts(0, 1000, 2)))

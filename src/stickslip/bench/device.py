@@ -404,7 +404,8 @@ def find_device(
     settings = dict(tables.get(name, {}))
     if name not in tables and name not in DRIVERS:
         known = (*tables, *DRIVERS)
-        raise ModelError(f"no device is called '{name}'", f"there are {', '.join(known)}", nearest(name, known))
+        step = nearest(name, known) + ("" if tables else f", or [devices.{name}] stands in a file that was not named")
+        raise ModelError(f"no device is called '{name}'", f"there are {', '.join(known)}", step)
     return driver(settings.pop("kind", name)).build(name, settings, folder or Path())  # type: ignore[no-any-return]
 
 

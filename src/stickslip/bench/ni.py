@@ -85,7 +85,10 @@ class Task:
         self.ni = vendors("nidaqmx")
         kinds = vendors("nidaqmx.constants")
         self.moving: dict[str, Any] = {}
-        self.task = self.ni.Task()
+        try:
+            self.task = self.ni.Task()
+        except Exception as error:  # as in listed()
+            raise _out_of_order(error) from error
         try:
             for one in device.inputs:
                 volts = min(VOLTS, one.limit / one.scale)
@@ -173,11 +176,12 @@ def listed() -> Sequence[str]:
     try:
         return tuple(f"{one.name}: {one.product_type}" for one in ni.system.System.local().devices)
     except Exception as error:  # the driver raises errors of its own, one of them where it is not installed
-        raise ModelError(
-            f"nidaqmx does not work ({str(error).partition(chr(10))[0]})",
-            "it needs NI-DAQmx",
-            "install the vendor's driver",
-        ) from error
+        raise _out_of_order(error) from error
+
+
+def _out_of_order(error: Exception) -> ModelError:
+    words = str(error).partition("\n")[0]
+    return ModelError(f"nidaqmx does not work ({words})", "it needs NI-DAQmx", "install the vendor's driver")
 
 
 def build(name: str, settings: Mapping[str, Any], folder: Path) -> Unit:

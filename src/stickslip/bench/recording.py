@@ -170,7 +170,7 @@ class _Run:
         self.wanted, self.watch, self.progress, self.stop = wanted, watch, progress, stop
         self.began: float | None = None  # by this computer's clock [s], of the trigger or the first sample
         self.ended = "complete"
-        self.failure: StickslipError | OSError | None = None
+        self.failure: StickslipError | None = None
 
     def all(self, heads: Sequence[_Head]) -> str:
         """Record with every head at once; returns why it ended."""
@@ -189,10 +189,7 @@ class _Run:
             for head, stream in zip(heads, streams, strict=True):
                 _move(head.device, stream, dict.fromkeys(self.wanted.drive))
         if self.failure is not None:
-            for head in heads:  # what was recorded stays, as a journal
-                if head.tape is not None and head.tape.journal is not None:
-                    head.tape.journal.__exit__()
-            raise self.failure
+            raise _with_journals(self.failure, [head.tape for head in heads if head.tape and head.tape.journal])
         return self.ended
 
     def nothing(self, heads: Sequence[_Head]) -> KeyboardInterrupt | RecordError:
@@ -223,7 +220,7 @@ class _Run:
                 if self.stop.is_set():
                     self.ended = self.ended if self.ended != "complete" else "stopped"
                     return
-                block = stream.read(0.2)
+                block = _read(head.device, stream)
                 if block is None:
                     self.ended = "the device ended"
                     if head.tape is None:  # nothing begins with it any more, nor with those that wait for it
@@ -244,7 +241,7 @@ class _Run:
                     )
         except KeyboardInterrupt:
             self.ended = "interrupted"
-        except (StickslipError, OSError) as failure:
+        except StickslipError as failure:
             self.failure = failure
             self.stop.set()
 
@@ -256,8 +253,31 @@ class _Run:
             raise RecordError(
                 f"{journal_of(head.path).name} can not be written ({error.strerror or error})",
                 "samples go to the disk as they come",
-                "what came until then can be read from it",
+                "make room, or name a file on another disk",
             ) from error
+
+
+def _read(device: Device, stream: Stream) -> Block | None:
+    try:
+        return stream.read(0.2)
+    except OSError as error:  # a plug that was pulled
+        raise RecordError(
+            f"{device.name} can not be read any more ({error})",
+            "a device stays there while it records",
+            "check plug, cable and power",
+        ) from error
+
+
+def _with_journals(failure: StickslipError, tapes: Sequence[Tape]) -> StickslipError:
+    """A failure that says where what came until then stays, as journals."""
+    for tape in tapes:
+        assert tape.journal is not None
+        tape.journal.__exit__()
+    kept = ", ".join(tape.path.name for tape in tapes)
+    if not kept:
+        return failure
+    step = f"{failure.next_step}; {kept} holds what came until then: stickslip convert makes a record of that"
+    return type(failure)(failure.value, failure.rule, step, kind=failure.kind)
 
 
 def _move(device: Device, stream: Stream, drive: Mapping[str, Signal]) -> None:
