@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from stickslip.decay.candidates import Fitted
+from stickslip.decay.candidates import ALWAYS, Fitted
 from stickslip.decay.choice import COLOURED, Candidate, lack_of_fit
 from stickslip.decay.motions import Restoring, free_decay
 from stickslip.decay.noise import Noise, Objective, extreme, minimise, solve
@@ -31,7 +31,6 @@ from stickslip.record.record import Step
 
 Array = NDArray[np.float64]
 
-PLAIN = ("both", "static")
 BEYOND = f"swings beyond {SWING:g} rad are left out"
 SURE = 3.0  # standard deviations of the noise by which a bracket is widened
 
@@ -184,11 +183,12 @@ def fit_pendulum(
         Several releases, a noise that is asked for, or what :func:`choice_of` refuses.
     """
     ring_down = _only(ring_downs, noise)
-    choice, zero = choice_of(ring_down, restoring=restoring, candidates=PLAIN)
+    before = {candidate.name: candidate.fitted for motion in motions for candidate in motion.choice.candidates}
+    choice, zero = choice_of(ring_down, restoring=restoring, candidates=ALWAYS, fitted=before)
     chosen = choice.chosen
     later = zero > ring_down.release
     large = (BEYOND,) if later and abs(ring_down.amplitude) >= SWING else ()
-    status = status_of(ring_down, "; ".join(filter(None, [*large, choice.seen_beside(*PLAIN) or lack_of_fit(chosen)])))
+    status = status_of(ring_down, "; ".join(filter(None, [*large, choice.seen_beside(*ALWAYS) or lack_of_fit(chosen)])))
     fitted = chosen.fitted
     blocks, model = fitted.blocks, f"{fitted.motion.words}, spring sin x"
     kind = "white" if chosen.noise.whiteness >= COLOURED else "correlated"

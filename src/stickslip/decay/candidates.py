@@ -9,10 +9,12 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from stickslip.decay.motions import MOTIONS, PARAMETERS, Motion, Restoring, free_decay
+from stickslip.decay.motions import MOTIONS, PARAMETERS, WORN, Motion, Restoring, free_decay
 
 Array = NDArray[np.float64]
 
+ALWAYS = ("both", "static")  # candidates that are fitted whatever is asked for
+DRIFTS = (0.0, -0.01, 0.01)  # in a first amplitude, from which friction that wears is searched
 TRIES = 12  # numbers of half cycles
 FIRST = 4.0  # periods fitted first; then twice as many, till the end: the phase can not slip
 LEAST = 24  # blocks of a fit
@@ -124,6 +126,14 @@ class Fitted:
         """Sum of squares left."""
         return float(self.residual @ self.residual)
 
+    @cached_property
+    def worn(self) -> Fitted:
+        """The same with friction that changes with the way slid, searched from here."""
+        starts = [self.parameters.copy() for _ in DRIFTS]
+        for start, drift in zip(starts, DRIFTS, strict=True):
+            start[NUMBERS["wear"]] = drift
+        return min((fit_motion(WORN, self.blocks, start) for start in starts), key=lambda fitted: fitted.cost)
+
     def value(self, name: str) -> float:
         """One parameter."""
         return float(self.parameters[NUMBERS[name]])
@@ -170,7 +180,7 @@ def fit_candidates(names: tuple[str, ...], blocks: BlockMeans, start: Array) -> 
     while reach < end:
         first = fit_motion(MOTIONS["static"], blocks.until(float(start[5]) + reach), first).parameters
         reach *= 2
-    fitted = {name: fit_motion(MOTIONS[name], blocks, first) for name in ("both", "static")}
+    fitted = {name: fit_motion(MOTIONS[name], blocks, first) for name in ALWAYS}
     base = min(fitted.values(), key=lambda candidate: candidate.cost)
     hopeless = HOPELESS * base.cost
     wanted = sorted((name for name in MOTIONS if name in names or name in fitted), key=lambda name: MOTIONS[name].size)

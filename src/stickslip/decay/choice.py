@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from stickslip.decay.candidates import (
+    ALWAYS,
     EXPONENT,
     HIGHEST,
     HOPELESS,
@@ -22,7 +23,7 @@ from stickslip.decay.candidates import (
     fit_candidates,
     fit_motion,
 )
-from stickslip.decay.motions import MOTIONS, WORN, Restoring
+from stickslip.decay.motions import MOTIONS, Restoring
 from stickslip.errors import EstimateError
 from stickslip.estimate import NORMAL_95, Estimate
 from stickslip.statistics import mean_uncertainty, student
@@ -33,7 +34,6 @@ SIZE = 0.05  # of each candidate's test: how often a true one is rejected
 COLOURED = 0.01  # p-value of the best residual's whiteness below which its correlation counts
 DRAWS = 20000  # of the greatest of correlated Student variables
 NEAR = 2.0  # times the least residual: what counts where no candidate is true
-DRIFTS = (0.0, -0.01, 0.01)  # in a first amplitude, from which friction that wears is searched
 APART = 1e-4  # share of a direction that the fitted parameters must leave for it to be seen
 SEEN = {
     "damping_ratio": "viscous damping",
@@ -325,9 +325,14 @@ def choose(
         )
     independent = sizes if weights is None else np.asarray(weights, dtype=float)
     blocks = BlockMeans(instants, data, sizes, independent, fs, restoring)
-    fits = fit_candidates(candidates, blocks, np.asarray(start, float))
+    return choose_fitted(fit_candidates(candidates, blocks, np.asarray(start, float)), candidates)
+
+
+def choose_fitted(fits: Mapping[str, Fitted], candidates: tuple[str, ...]) -> Choice:
+    """:func:`choose` among candidates that are fitted, `ALWAYS` among them."""
+    fits = {name: fitted for name, fitted in fits.items() if name in {*candidates, *ALWAYS}}
     best = min(fits.values(), key=lambda fitted: fitted.cost)
-    noise = Noise(best.residual, best.jacobian.shape[1], blocks.floor)
+    noise = Noise(best.residual, best.jacobian.shape[1], best.blocks.floor)
     tried = tuple(_tested(fitted, noise, best) for name, fitted in fits.items() if name in candidates)
     choice = _chosen(tried)
     worn = _worn(choice.chosen, fits["both"], best)
@@ -343,10 +348,7 @@ def _worn(chosen: Candidate, plain: Fitted, best: Fitted) -> str:
     plainly = chosen.kept and set(chosen.fitted.motion.terms) <= set(plain.motion.terms)
     if plainly and chosen.whiteness >= COLOURED:
         return ""
-    starts = [plain.parameters.copy() for _ in DRIFTS]
-    for start, drift in zip(starts, DRIFTS, strict=True):
-        start[NUMBERS["wear"]] = drift
-    worn = min((fit_motion(WORN, plain.blocks, start) for start in starts), key=lambda fitted: fitted.cost)
+    worn = plain.worn
     least = min(worn, best, key=lambda fitted: fitted.cost)
     tested = _tested(worn, Noise(least.residual, least.jacobian.shape[1], plain.blocks.floor), least)
     if not tested.kept or tested.whiteness < COLOURED:

@@ -19,6 +19,7 @@ from stickslip.decay.answer import (
     spring_of,
     unlike,
 )
+from stickslip.decay.candidates import ALWAYS
 from stickslip.decay.choice import Choice
 from stickslip.decay.motions import Restoring
 from stickslip.decay.noise import KINDS, find_noise
@@ -338,7 +339,7 @@ def _left_out(ring_downs: list[RingDown]) -> list[str]:
 
 def _seen_beside(choices: list[Choice]) -> list[str]:
     """Of the first release that shows another motion than viscous and dry friction, which one, in words."""
-    return [doubt for choice in choices if (doubt := choice.seen_beside("both", "static"))][:1]
+    return [doubt for choice in choices if (doubt := choice.seen_beside(*ALWAYS))][:1]
 
 
 def _misfit(releases: list[Release], fitted: list[Array]) -> tuple[Doubt, ...]:

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
 
-from stickslip.decay.choice import Candidate, Choice, choose, interval_of, kept_by_all
+from stickslip.decay.candidates import ALWAYS, Fitted
+from stickslip.decay.choice import Candidate, Choice, choose, choose_fitted, interval_of, kept_by_all
 from stickslip.decay.motions import MOTIONS, RESTORING, Restoring
 from stickslip.decay.release import CLIPPED, LOST, RingDown, find_releases
 from stickslip.decay.start import BLOCKS
@@ -144,9 +146,13 @@ def motion_of(
 
 
 def choice_of(
-    ring_down: RingDown, *, restoring: Restoring, candidates: tuple[str, ...] = tuple(MOTIONS)
+    ring_down: RingDown,
+    *,
+    restoring: Restoring,
+    candidates: tuple[str, ...] = tuple(MOTIONS),
+    fitted: Mapping[str, Fitted] = MappingProxyType({}),
 ) -> tuple[Choice, float]:
-    """The choice among the candidates, and the record's time [s] at its zero.
+    """The choice among the candidates, and the record's time [s] at its zero; all may have been `fitted` before.
 
     Raises
     ------
@@ -170,6 +176,9 @@ def choice_of(
             "record or integrate the displacement, or use fit_decay(record)",
         )
     rows, start = _begin(ring_down, restoring)
+    zero = ring_down.first + rows.start / ring_down.fs
+    if {*candidates, *ALWAYS} <= fitted.keys():
+        return choose_fitted(fitted, candidates), zero
     size = max(1, int(2 * math.pi / start[0] * ring_down.fs / BLOCKS))
     count = (rows.stop - rows.start) // size
     samples = ring_down.samples[rows.start : rows.start + count * size]
@@ -184,7 +193,7 @@ def choice_of(
         candidates=candidates,
         weights=(1 / _alike(ring_down)[rows.start : rows.start + count * size]).reshape(count, size).sum(axis=1),
     )
-    return choice, ring_down.first + rows.start / ring_down.fs
+    return choice, zero
 
 
 def _alike(ring_down: RingDown) -> Array:
