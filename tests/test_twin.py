@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from scipy.signal import lfilter
 
 import stepped
 import stickslip as ss
@@ -226,6 +227,33 @@ def test_bristles_are_found_with_their_stiffness() -> None:
     assert isinstance(tried.trial.belief.law, ss.laws.LuGre)
     assert tried.loops.level.value == pytest.approx(0.96, rel=0.01)
     assert tried.presliding.stiffness.value == pytest.approx(8000.0, rel=0.05)
+
+
+def test_bristles_whose_friction_does_not_fall_are_no_damped_spring() -> None:
+    # which was believed in with a quarter of their stiffness
+    level = 0.3 * PULL
+    rig = stepped.Rig(
+        "LuGre", 2.0, 800.0, 1.0, 4e-3, 2.4, kinetic=level, static=level, speed=1.0, contact=33e3, exponent=2.0
+    )
+    tried = ss.tried(ss.analyze(stepped.record(rig, np.random.default_rng(7), noise=2e-4), **rig.stated), twins=8)
+    assert isinstance(tried.trial.belief.law, ss.laws.Dahl)
+    assert estimate(tried, "presliding stiffness").includes(rig.contact)
+    assert tried.presliding.stiffness.value == pytest.approx(rig.contact, rel=0.02)
+
+
+def test_of_two_laws_that_chance_does_not_explain_the_nearer_is_believed_in() -> None:
+    # noise that is slow is taken for more samples under one law than under the other, whose chances said the reverse
+    rig = stepped.Rig(
+        "Stribeck", 2.0, 800.0, 1.0, 4e-3, 1.283, kinetic=1.225, static=1.784, speed=7.88e-3, exponent=1.0
+    )
+    rng = np.random.default_rng(4)
+    record = stepped.record(rig, rng, noise=1e-3, cycles=8)
+    for name in "xz":
+        slow = lfilter([0.4], [1, -0.9], rng.standard_normal(len(record)))
+        record = record.with_channel(name, record[name] + 1.5e-3 * rig.amplitude * slow, unit="m")
+    belief = believe(ss.friction_force(record, **rig.stated))
+    assert isinstance(belief.law, ss.laws.Stribeck)
+    assert belief.static == pytest.approx(rig.static, rel=0.05)
 
 
 def test_a_value_at_its_end_stays_and_the_search_goes_on_without_it() -> None:

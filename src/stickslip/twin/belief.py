@@ -14,7 +14,7 @@ from stickslip.errors import StickslipError
 from stickslip.law.stretch import DriveFrom, driving
 from stickslip.laws.compliant import CompliantContact
 from stickslip.laws.coulomb import Coulomb, LinearSlope
-from stickslip.laws.lugre import LuGre
+from stickslip.laws.lugre import Dahl, LuGre
 from stickslip.laws.state_variable import StateVariable
 from stickslip.laws.stribeck import Stribeck
 from stickslip.oscillator import Oscillator
@@ -105,7 +105,7 @@ class Belief:
     held: str = ""
 
     @property
-    def law(self) -> LinearSlope | CompliantContact | Stribeck | StateVariable | LuGre:
+    def law(self) -> LinearSlope | CompliantContact | Stribeck | StateVariable | LuGre | Dahl:
         """The contact's law: rigid and linear in speed, giving way, falling as Stribeck's, with bristles, lagging."""
         values = self.values
         kinetic = values.get(KINETIC, 0.0)
@@ -113,9 +113,11 @@ class Belief:
         if RATE in values and kinetic > 0:
             steepness = 1 / (STEEP * float(np.max(np.abs(self.record["v"]))))
             return StateVariable(kinetic, rate=math.exp(values[RATE]) / kinetic, steepness=steepness)
-        if GIVE in values and SPEED in values:
-            fall, bristles = math.exp(values[SPEED]), math.exp(values[GIVE])
-            return LuGre(kinetic, static or kinetic, speed=fall, stiffness=bristles, damping=0.0)
+        if GIVE in values and HELD in values:
+            if static is None:
+                return Dahl(kinetic, stiffness=self.contact)
+            fall = math.exp(values.get(SPEED, self.ends(SPEED)[0]))
+            return LuGre(kinetic, static, speed=fall, stiffness=self.contact, damping=0.0)
         if GIVE in values:
             loss = values.get(LOSS, 0.0) * math.sqrt(math.exp(values[GIVE]) * self.stated.mass)
             return CompliantContact(kinetic, stiffness=math.exp(values[GIVE]), damping=loss, static=static)
@@ -383,6 +385,8 @@ class Belief:
             begun["theta"] = held
         elif isinstance(law, LuGre):
             begun["bristle"] = held / self.contact
+        elif isinstance(law, Dahl):
+            begun["force_state"] = held
         elif isinstance(law, CompliantContact):
             begun["anchor"] = values["x"] - held / self.contact
         return begun

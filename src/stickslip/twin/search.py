@@ -190,7 +190,8 @@ def _stands_out(belief: Belief, part: str) -> bool:
 def _richer(simple: Belief, mapped: Map) -> Belief:
     """With the parts that leave the least of the displacement, where that is less than chance would leave."""
     laws = _led_by(_parts(simple), simple.record, mapped)
-    best = min([simple, *laws], key=lambda law: (CHANCE if law is simple else _by_chance(simple, law), _left(law)))
+    # their chances say nothing of each other: each counts as many independent samples as its own residual has
+    best = _simplest([law for law in laws if _by_chance(simple, law) < CHANCE] or [simple])
     if GIVE in best.values:
         laws += _led_by(_softer(best), simple.record, mapped)
         best = _simplest([law for law in laws if {GIVE, RATE} & law.values.keys()])
@@ -363,9 +364,11 @@ def _softer(give: Belief) -> list[list[Belief]]:
     furthest, fastest = (float(np.max(np.abs(record[name]))) for name in "xv")
     damped = [give.as_stated().at(**{LOSS: loss}) for loss in LOSSES]
     bristles = [begun for excess in EXCESSES[1:4] for begun in _bristles(give, excess)]
+    # x may tell bristles from a spring, and nothing of how their friction falls
+    level = [_slid(give).at(**{KINETIC: part * give.values[KINETIC]}) for part in LEVELS]
     rates = [math.log(rate * fastest / furthest) for rate in RATES]
     lags = [_slid(give).without(GIVE).at(**{RATE: rate}) for rate in rates]
-    return [damped, bristles, lags]
+    return [damped, level, bristles, lags]
 
 
 def _falling(give: Belief) -> list[list[Belief]]:
