@@ -105,6 +105,31 @@ def test_a_disk_without_room_for_the_record_leaves_the_journal(tmp_path: Path, m
     assert len(ss.read_record(tmp_path / "a.h5.journal")) == 20_000
 
 
+LIMITED = """
+import resource, sys
+from bench_devices import Counter
+from stickslip.bench import Wanted, acquire
+resource.setrlimit(resource.RLIMIT_FSIZE, (200_000, 200_000))
+try:
+    acquire(Counter(), output=sys.argv[1], wanted=Wanted(seconds=0.4))
+except Exception as error:
+    print(error)
+"""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no limits of files here")
+def test_a_disk_that_fills_while_the_record_is_written_leaves_the_journal(tmp_path: Path) -> None:
+    """HDF5 tells so as it closes the file, by an error that is no OSError."""
+    pytest.importorskip("h5py")
+    script = [sys.executable, "-c", LIMITED, str(tmp_path / "a.h5")]
+    run = subprocess.run(script, capture_output=True, text=True, cwd=ROOT, check=True)
+    assert "'a.h5' can not be written" in run.stdout
+    assert "a.h5.journal holds all of it" in run.stdout
+    assert not run.stderr
+    assert [path.name for path in tmp_path.iterdir()] == ["a.h5.journal"]
+    assert len(ss.read_record(tmp_path / "a.h5.journal")) == 20_000
+
+
 def test_a_trigger_begins_it_and_what_was_before_is_kept(tmp_path: Path) -> None:
     wanted = Wanted(0.5, Trigger("x", 3e-4, before=0.25), {"base": Tone(1e-3, 2.0)})
     still = Sim(system=ss.Oscillator(mass=2.42, stiffness=2310, law=ss.laws.Coulomb(1.1)), fast=True)

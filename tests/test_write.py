@@ -102,7 +102,7 @@ def test_any_record_comes_back(
 
 
 def test_an_unknown_ending_lists_those_that_there_are(tmp_path: Path) -> None:
-    with pytest.raises(ss.errors.FormatError, match=r"\.csv, \.h5, \.hdf5, \.parquet"):
+    with pytest.raises(ss.errors.ModelError, match=r"\.csv, \.h5, \.hdf5, \.parquet"):
         ss.write_record(example(), tmp_path / "kept.xls")
 
 

@@ -222,7 +222,12 @@ def require_writable(output: Path) -> None:
             f"there is no folder '{output.parent}'", "a record goes into a folder that is there", "make it"
         )
     require_free(output)
-    require_free(journal_of(output))
+    if (left := journal_of(output)).exists():
+        raise FormatError(
+            f"'{left.name}' is there already",
+            "it holds what came of a recording that was cut short",
+            f"stickslip convert {left.name} {output.name} makes a record of it; or choose another name",
+        )
 
 
 def _about(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import shutil
 from collections.abc import Callable, Iterator
@@ -162,12 +163,22 @@ def _write_csv(path: Path, columns: Columns, _: str) -> None:
 
 
 def _write_hdf5(path: Path, columns: Columns, metadata: str) -> None:
-    h5py = optional("h5py")
     _require_room(path, sum(values.nbytes for _, values in columns.values()) + len(metadata))
-    with h5py.File(path, "w", libver="latest") as file:  # only this layout lets an attribute pass 64 KiB
+    with _hdf5(path) as file:
         file.attrs[KEY] = metadata
         for name, (unit, values) in columns.items():
             file.create_dataset(name, data=values).attrs["unit"] = unit
+
+
+@contextmanager
+def _hdf5(path: Path) -> Iterator[Any]:
+    """A file of HDF5 that is written; what it raises of a disk that takes no more is an OSError."""
+    h5py = optional("h5py")
+    try:
+        with h5py.File(path, "w", libver="latest") as file:  # only this layout lets an attribute pass 64 KiB
+            yield file
+    except RuntimeError as error:  # what was left to write can not be, as it is closed
+        raise OSError(errno.ENOSPC, "the disk takes no more") from error
 
 
 def _require_room(path: Path, size: int) -> None:
@@ -200,14 +211,13 @@ def write_table(table: Table, path: Path) -> Path:
     FormatError
         The file is there already, or the disk can not be written.
     """
-    h5py = optional("h5py")
     require_free(path)
     units, digests = units_of(table.record), Digests()
     rows = int(table.record["rows"])
     with ExitStack() as stack:
         part = stack.enter_context(whole(path, replace=False))
         _require_room(part, 8 * rows * len(units) + len(json.dumps(table.record)))
-        file = stack.enter_context(h5py.File(part, "w", libver="latest"))
+        file = stack.enter_context(_hdf5(part))
         for name, unit in units.items():
             file.create_dataset(name, shape=(rows,), dtype="<f8").attrs["unit"] = unit
         first = 0
