@@ -5,14 +5,16 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+import pytest
 from click.testing import CliRunner
 
 import stickslip as ss
 from stickslip import bench
 from stickslip.bench import Block, Input, Picture
 from stickslip.bench.monitor import HEIGHTS
-from stickslip.bench.replay import Replay
+from stickslip.bench.replay import Playing, Replay
 from stickslip.cli.program import main
+from stickslip.errors import INTERRUPTED
 
 
 def test_a_step_at_the_rig_is_asked_recorded_and_answered_at_once(tmp_path: Path) -> None:
@@ -26,6 +28,27 @@ def test_a_step_at_the_rig_is_asked_recorded_and_answered_at_once(tmp_path: Path
     assert "Record 10 s now?" in done.stderr
     assert "  noise of x 0.9" in done.stderr  # at once, and not in the report alone
     assert (tmp_path / "report" / "report.html").exists()
+
+
+def test_a_step_that_is_interrupted_ends_the_walk_and_is_recorded_anew(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    ss.write_record(bench.SimulatedBench(fs=1000).record("rest"), tmp_path / "rest.csv")
+    rig = tmp_path / "rig.toml"
+    rig.write_text('[devices.desk]\nkind = "file"\npath = "rest.csv"\nfast = true\n', encoding="utf-8")
+    read = Playing.read
+
+    def until_interrupted(stream: Playing, timeout: float = 1.0) -> Block | None:
+        if stream.sent > 4000:
+            raise KeyboardInterrupt
+        return read(stream, timeout)
+
+    monkeypatch.setattr(Playing, "read", until_interrupted)
+    arguments = ["commission", "--device", "desk", "--config", str(rig), "--step", "rest", "--output", str(tmp_path)]
+    done = CliRunner().invoke(main, arguments, input="y\n")
+    assert done.exit_code == INTERRUPTED
+    assert not [*(tmp_path / "records").iterdir()]
+    assert not (tmp_path / "report").exists()
 
 
 def test_the_picture_shows_what_a_channel_read_last() -> None:

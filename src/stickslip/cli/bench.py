@@ -174,6 +174,9 @@ def _asked_at_rig(device: Device, step: BenchStep, kept: Path | None, rig: RigSe
     wanted = bench.Wanted(seconds=step.seconds, drive=moved, log=rig.log)
     with _picture(step.seconds) as watch:
         done = bench.acquire(device, output=kept, wanted=wanted, watch=watch)
+    if done.ended == "interrupted":  # half a step answers nothing; those before it stay
+        kept.unlink()
+        raise KeyboardInterrupt
     say(f"  {done.outcomes[device.name]}", err=True)
     return ss.read_record(done.paths[0])
 
