@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,7 +32,6 @@ from stickslip.signals.noise import noise_level
 from stickslip.statistics import FEW_INDEPENDENT, LeastSquares, mixture
 
 Array = NDArray[np.float64]
-Misfits = tuple[tuple[tuple[str, ...], Doubt], ...]  # the terms that each doubt is about
 
 BIASED = 0.01  # share of noise in the power of the acceleration above which the inertia is visibly low
 LATEST = 0.1  # s that a torque may be late
@@ -45,6 +44,16 @@ WAYS = ((1.0, "forward"), (-1.0, "back"))
 NOISY, LOADED, CONFOUNDED, SHIFTED, BENT, PLACE = "noisy", "loaded", "confounded", "shifted", "bent", "placed"
 RUBS = ("forward", "back", "viscous")  # terms by which friction is a line over the speed
 PLACED = ("forward", "back", "load", "sine", "cosine")  # terms that friction or torque of the place passes for
+
+
+class Misfit(NamedTuple):
+    """What no term follows: the terms that it passes for, what is told of it, and what it may make of the torque."""
+
+    terms: tuple[str, ...]
+    doubt: Doubt
+    strays: Array = np.zeros((1, 1))
+
+
 BARELY = 0.5  # of a value: an interval that is wider on either side hardly tells it
 RICHER = {"load", "uneven", *WARM}  # what Coulomb and viscous friction of both directions alike do not have
 
@@ -328,10 +337,10 @@ def _answer(
     if fall is not None:
         fit, terms, pull = fall.fits[fall.best], fall.terms, fall.pull
     status = Status(*_worries(data, fit, terms, record))
-    doubts = misfits(data, fit, bent, turning(record))
-    tell = Telling(data, fit, terms, turning(record), status, doubts)
+    beside = misfits(data, fit, bent, turning(record))
+    tell = Telling(data, fit, terms, turning(record), status, beside)
     if fall is not None:
-        tell = Averaged(data, fit, terms, turning(record), status, doubts, fall)
+        tell = Averaged(data, fit, terms, turning(record), status, beside, fall)
     known = {term: tell.one(term) for term in terms if term not in ("uneven", *FALL)}
     if "load" in known:
         known["load"] = known["load"].within(0.0)
@@ -447,18 +456,18 @@ def _worries(data: JointData, fit: LeastSquares, terms: tuple[str, ...], record:
     return worries
 
 
-def misfits(data: JointData, fit: LeastSquares, bent: bool, turning: bool) -> Misfits:
-    """What of the friction the terms do not follow, and which of them it makes doubtful."""
-    doubts: list[tuple[tuple[str, ...], Doubt]] = []
+def misfits(data: JointData, fit: LeastSquares, bent: bool, turning: bool) -> tuple[Misfit, ...]:
+    """What of the friction the terms do not follow."""
+    seen = []
     if bent:
-        line = Doubt("friction bends with the speed: this is of the line nearest to it, as its interval is", BENT)
-        doubts.append((RUBS, line))
-    torque, friction = data.repeating(fit.residual)
-    if max(torque, friction) > ROUNDING * float(np.sqrt(np.mean(data.torque**2))):
-        what = "friction" if friction > torque else "torque"
-        size = f"{max(torque, friction):.2g} {(TURNING if turning else UNITS)['coulomb']} r.m.s."
-        doubts.append((PLACED, Doubt(f"{what} changes along the way, by {size} beside this mean over it", PLACE)))
-    return tuple(doubts)
+        line = "friction bends with the speed: this is of the line nearest to it, as its interval is"
+        seen.append(Misfit(RUBS, Doubt(line, BENT)))
+    what, size, elsewhere = data.ripple(fit.residual)
+    if size > ROUNDING * float(np.sqrt(np.mean(data.torque**2))):
+        unit = (TURNING if turning else UNITS)["coulomb"]
+        doubt = Doubt(f"{what} changes along the way, by {size:.2g} {unit} r.m.s.", PLACE, lesser=True)
+        seen.append(Misfit(PLACED, doubt, elsewhere))
+    return tuple(seen)
 
 
 @dataclass(frozen=True)
@@ -470,7 +479,7 @@ class Telling:
     terms: tuple[str, ...]
     turning: bool
     status: str
-    doubts: Misfits
+    misfits: tuple[Misfit, ...]
 
     @cached_property
     def unsure(self) -> tuple[Array, ...]:
@@ -504,7 +513,10 @@ class Telling:
     def sum(self, weights: dict[str, float], name: str) -> Estimate:
         """A sum of coefficients."""
         row = np.array([weights.get(term, 0.0) for term in self.terms])
-        beside = math.hypot(*(float(row @ self.fit.projection @ column) for column in self.unsure), 0.0)
+        form = row @ self.fit.projection
+        misfits = [misfit for misfit in self.misfits if set(misfit.terms) & set(weights)]
+        strays = [float(np.sqrt(np.mean((misfit.strays @ form) ** 2))) for misfit in misfits if misfit.strays.any()]
+        beside = math.hypot(*(float(form @ column) for column in self.unsure), *strays, 0.0)
         heat = (
             {"warming": "N m/K", "thinning": "N m s/rad/K"}
             if self.turning
@@ -513,7 +525,10 @@ class Telling:
         units = {**(TURNING if self.turning else UNITS), "load": "1", "late": "s", **heat}
         kind = {"forward": "coulomb", "back": "coulomb", "sine": "coulomb", "cosine": "coulomb", "damping": "viscous"}
         unit = units[kind.get(next(iter(weights)), next(iter(weights)))]
-        status = Status(self.status, *(doubt for over, doubt in self.doubts if set(over) & set(weights)))
+        # a lesser one is less of the mean of both directions alone: any other term may have taken what it is about
+        mean = {"forward", "back"} <= set(weights)
+        doubts = [replace(misfit.doubt, lesser=misfit.doubt.lesser and mean) for misfit in misfits]
+        status = Status(self.status, *doubts)
         how = "instruments of the reference" if self.data.followed else "least squares"
         checks = (
             f"condition number {self.fit.condition:.3g}",
@@ -540,7 +555,7 @@ class Averaged(Telling):
     @cached_property
     def parts(self) -> list[Telling]:
         """What each of them tells."""
-        return [Telling(self.data, fit, self.terms, self.turning, self.status, self.doubts) for fit in self.fall.fits]
+        return [Telling(self.data, fit, self.terms, self.turning, self.status, self.misfits) for fit in self.fall.fits]
 
     def sum(self, weights: dict[str, float], name: str) -> Estimate:
         """A sum of coefficients: that of every curve by its weight."""

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stickslip.balance.motion import require_fit
-from stickslip.cycle.joint_slides import Sliding, repeating, sliding
+from stickslip.cycle.joint_slides import Sliding, places, repeating, sliding
 from stickslip.errors import EstimateError, ModelError, RecordError
 from stickslip.estimate import Constant, Estimate
 from stickslip.record.record import Record, Step, require_record
@@ -232,13 +232,19 @@ class JointData:
         raw = np.concatenate([np.asarray(log.torque) for log in logs])
         return replace(self, logs=tuple(logs), torque=np.concatenate(smoothed), raw=raw)
 
-    def repeating(self, residual: Array) -> tuple[float, float]:
-        """What of the residual repeats along the way: as a torque, and as friction, which changes with the side."""
+    def ripple(self, residual: Array) -> tuple[str, float, Array]:
+        """What of the residual repeats along the way: whether as friction, which changes with the side, or as torque,
+        its size, and what it makes of the torque at the rows if it stands elsewhere along the way, shape (places, n).
+        """
         slides = [log.sliding for log in self.logs]
-        left = residual / np.concatenate([one.weights for one in slides])
-        place = np.concatenate([log.position[log.sliding.rows] for log in self.logs])
-        side = np.concatenate([one.side[one.rows] for one in slides])
-        return repeating(place, left), repeating(place, left * side)
+        weights = np.concatenate([one.weights for one in slides])
+        number = places(np.concatenate([log.position[log.sliding.rows] for log in self.logs]))
+        sides = {"friction": np.concatenate([one.side[one.rows] for one in slides]), "torque": np.ones(len(number))}
+        seen = {what: repeating(number, residual / weights * side) for what, side in sides.items()}
+        what = max(seen, key=lambda name: float(np.linalg.norm(seen[name])))
+        elsewhere = np.stack([np.roll(seen[what], shift)[number] for shift in range(len(seen[what]))])
+        size = float(np.sqrt(np.mean(elsewhere[0] ** 2)))
+        return what, size, elsewhere * sides[what] * weights
 
     def unshared(self, inertia: float, viscous: float) -> tuple[Array, Array]:
         """As :meth:`Log.unshared`, of all logs."""

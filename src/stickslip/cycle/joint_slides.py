@@ -159,26 +159,32 @@ def _apart(within: NDArray[np.bool_], window: Window) -> NDArray[np.intp]:
     return np.flatnonzero(within)[:: max(1, window.half // APART)]
 
 
-def repeating(place: Array, values: Array) -> float:
-    """Root mean square of that part of values which repeats with the place; 0 where none surely does.
+def places(place: Array) -> NDArray[np.intp]:
+    """Which of `PLACES` along the way each row is at."""
+    reach = float(np.ptp(place))
+    along = (place - place.min()) * (PLACES / reach if reach else 0.0)
+    return np.asarray(np.minimum(along, PLACES - 1), dtype=np.intp)
+
+
+def repeating(number: NDArray[np.intp], values: Array) -> Array:
+    """That part of values which repeats with the place, at each; zeros where none surely does.
 
     Means over places are compared between the earlier half and the later one: noise of one half knows nothing of the
     other's, so that their covariance is the variance of what repeats, and their correlation says how surely it does
     (the transform of Fisher 1921).
     """
-    reach = float(np.ptp(place))
-    number = np.minimum((place - place.min()) * (PLACES / reach if reach else 0.0), PLACES - 1).astype(int)
-    early = np.arange(len(place)) < len(place) // 2
+    early = np.arange(len(number)) < len(number) // 2
     counts = np.array([np.bincount(number[half], minlength=PLACES) for half in (early, ~early)])
     sums = np.array([np.bincount(number[half], values[half], minlength=PLACES) for half in (early, ~early)])
     weights = np.sqrt(counts[0] * counts[1])
     total = float(weights.sum())
     if not total or total**2 < FEWEST * float(weights @ weights):
-        return 0.0
+        return np.zeros(PLACES)
     means = sums / np.maximum(counts, 1)
     means -= (means @ weights / total)[:, None]
     common, spread = float(weights @ (means[0] * means[1])), math.sqrt(math.prod(means**2 @ weights))
     if common <= 0:
-        return 0.0
+        return np.zeros(PLACES)
     sure = math.atanh(min(common / spread, ALIKE)) * math.sqrt(total**2 / float(weights @ weights) - 3)
-    return math.sqrt(common / total) if sure > REPEATS else 0.0
+    middle = np.where(weights > 0, means.mean(axis=0), 0.0)
+    return np.asarray(middle * math.sqrt(common / float(weights @ middle**2)) * (sure > REPEATS))
