@@ -24,6 +24,9 @@ FEW_CYCLES = 8  # below this no test of the interval holds at 0.5 correlation be
 HALF_ERROR = 0.5  # standard errors by which correlation is taken to be stronger: too weak a one costs more
 FEW_INDEPENDENT = 8.0  # independent samples per coefficient, below which an interval is not to be trusted
 MOST_LEVERAGE = 0.9  # of a sample and its neighbours: beyond, one stroke alone tells a coefficient
+BINS, FEWEST = 16, 6.0  # of a way or a cycle, and of how many, as they weigh, a correlation is told
+REPEATS = 3.0  # deviations of Fisher's z: once in 700 without an effect
+ALIKE = 0.999  # a correlation, beyond which Fisher's z grows without bound
 INSEPARABLE = 1e3  # condition number of columns of unit length; a force balance that can be read has less than 30
 
 
@@ -395,3 +398,45 @@ def follows(measured: Array, model: Array) -> float:
     residual, whole = (measured - model)[both], measured[both]
     size = float(np.linalg.norm(whole - whole.mean()))
     return 100 * (1 - float(np.linalg.norm(residual - residual.mean())) / size) if size else 0.0
+
+
+def repeating(number: NDArray[np.intp], values: Array) -> Array:
+    """That part of values which repeats with the part of a way or a cycle; zeros where none surely does.
+
+    Means over each part are compared between the earlier half and the later one: noise of one half knows nothing of the
+    other's, so that their covariance is the variance of what repeats, and their correlation says how surely it does
+    (the transform of Fisher 1921).
+
+    Parameters
+    ----------
+    number : ndarray of int, shape (n,)
+        Of `BINS`, that which each value is of.
+    values : ndarray, shape (n,)
+        In order of time.
+
+    Returns
+    -------
+    ndarray, shape (BINS,)
+
+    Examples
+    --------
+    >>> number = np.tile(np.arange(BINS), 40)
+    >>> noise = np.random.default_rng(0).normal(0, 0.1, number.size)
+    >>> repeating(number, noise)[[0, -1]].tolist(), repeating(number, noise + (number > 7))[[0, -1]].round(1).tolist()
+    ([0.0, 0.0], [-0.5, 0.5])
+    """
+    early = np.arange(len(number)) < len(number) // 2
+    counts = np.array([np.bincount(number[half], minlength=BINS) for half in (early, ~early)])
+    sums = np.array([np.bincount(number[half], values[half], minlength=BINS) for half in (early, ~early)])
+    weights = np.sqrt(counts[0] * counts[1])
+    total = float(weights.sum())
+    if not total or total**2 < FEWEST * float(weights @ weights):
+        return np.zeros(BINS)
+    means = sums / np.maximum(counts, 1)
+    means -= (means @ weights / total)[:, None]
+    common, spread = float(weights @ (means[0] * means[1])), math.sqrt(math.prod(means**2 @ weights))
+    if common <= 0:
+        return np.zeros(BINS)
+    sure = math.atanh(min(common / spread, ALIKE)) * math.sqrt(total**2 / float(weights @ weights) - 3)
+    middle = np.where(weights > 0, means.mean(axis=0), 0.0)
+    return np.asarray(middle * math.sqrt(common / float(weights @ middle**2)) * (sure > REPEATS))

@@ -12,14 +12,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stickslip.balance.motion import require_fit
-from stickslip.cycle.joint_slides import Sliding, places, repeating, sliding
+from stickslip.cycle.joint_slides import Sliding, places, sliding
 from stickslip.errors import EstimateError, ModelError, RecordError
 from stickslip.estimate import Constant, Estimate
 from stickslip.record.record import Record, Step, require_record
 from stickslip.signals.derivatives import five_point_difference, smooth
 from stickslip.signals.interpolate import band_limited, without_delays
 from stickslip.signals.noise import noise_level
-from stickslip.statistics import LeastSquares, least_squares
+from stickslip.statistics import LeastSquares, least_squares, repeating
 
 Array = NDArray[np.float64]
 
@@ -234,7 +234,7 @@ class JointData:
 
     def ripple(self, residual: Array) -> tuple[str, float, Array]:
         """What of the residual repeats along the way: whether as friction, which changes with the side, or as torque,
-        its size, and what it makes of the torque at the rows if it stands elsewhere along the way, shape (places, n).
+        its size, and what it makes of the torque at the rows if it stands elsewhere along the way, shape (parts, n).
         """
         slides = [log.sliding for log in self.logs]
         weights = np.concatenate([one.weights for one in slides])

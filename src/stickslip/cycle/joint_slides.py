@@ -13,6 +13,7 @@ from stickslip.balance.motion import away_from, stretches
 from stickslip.errors import EstimateError
 from stickslip.signals.derivatives import differentiate, five_point_difference
 from stickslip.signals.noise import quantisation_step
+from stickslip.statistics import BINS
 
 Array = NDArray[np.float64]
 
@@ -25,9 +26,6 @@ SLOW = 0.05  # of its fast speed (90 %): slower, static friction that falls with
 SLOWER = 0.02  # where that fall is asked for
 NARROW = 0.3  # of the window, near the ends of strokes
 APART = 4  # rows in the window's half: nearer ones tell the same
-PLACES, FEWEST = 16, 6.0  # along the way, and of how many, as they weigh, a correlation is told
-REPEATS = 3.0  # deviations of Fisher's z: once in 700 without an effect
-ALIKE = 0.999  # a correlation, beyond which Fisher's z grows without bound
 
 
 @dataclass(frozen=True)
@@ -160,31 +158,7 @@ def _apart(within: NDArray[np.bool_], window: Window) -> NDArray[np.intp]:
 
 
 def places(place: Array) -> NDArray[np.intp]:
-    """Which of `PLACES` along the way each row is at."""
+    """Which of `BINS` along the way each row is at."""
     reach = float(np.ptp(place))
-    along = (place - place.min()) * (PLACES / reach if reach else 0.0)
-    return np.asarray(np.minimum(along, PLACES - 1), dtype=np.intp)
-
-
-def repeating(number: NDArray[np.intp], values: Array) -> Array:
-    """That part of values which repeats with the place, at each; zeros where none surely does.
-
-    Means over places are compared between the earlier half and the later one: noise of one half knows nothing of the
-    other's, so that their covariance is the variance of what repeats, and their correlation says how surely it does
-    (the transform of Fisher 1921).
-    """
-    early = np.arange(len(number)) < len(number) // 2
-    counts = np.array([np.bincount(number[half], minlength=PLACES) for half in (early, ~early)])
-    sums = np.array([np.bincount(number[half], values[half], minlength=PLACES) for half in (early, ~early)])
-    weights = np.sqrt(counts[0] * counts[1])
-    total = float(weights.sum())
-    if not total or total**2 < FEWEST * float(weights @ weights):
-        return np.zeros(PLACES)
-    means = sums / np.maximum(counts, 1)
-    means -= (means @ weights / total)[:, None]
-    common, spread = float(weights @ (means[0] * means[1])), math.sqrt(math.prod(means**2 @ weights))
-    if common <= 0:
-        return np.zeros(PLACES)
-    sure = math.atanh(min(common / spread, ALIKE)) * math.sqrt(total**2 / float(weights @ weights) - 3)
-    middle = np.where(weights > 0, means.mean(axis=0), 0.0)
-    return np.asarray(middle * math.sqrt(common / float(weights @ middle**2)) * (sure > REPEATS))
+    along = (place - place.min()) * (BINS / reach if reach else 0.0)
+    return np.asarray(np.minimum(along, BINS - 1), dtype=np.intp)

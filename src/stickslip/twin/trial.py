@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from stickslip.errors import EstimateError, StickslipError
 from stickslip.estimate import FEW, NORMAL_95, UNSTATED, Doubt, Estimate, Status, doubts_of, kinds
 from stickslip.record.record import Record
-from stickslip.statistics import student
+from stickslip.statistics import BINS, repeating, student
 from stickslip.twin.belief import EXCESS, GIVE, KINETIC, RATE, SLOPE, Belief, levelled
 from stickslip.twin.search import CHANCE
 from stickslip.workers import Map
@@ -57,6 +57,7 @@ STICKS = ("stick", "microstick")  # kinds of event
 ANSWERED = 0.5  # of the twins, that must answer a question for the record's answer to be tried on them
 STRAINED = 4.0  # standard deviations by which a constant may be off before that is said
 LOST = 0.3  # of x, that the nearest rig may leave: beyond, twins scatter so far that none strays from another
+SAME = 0.95  # of x, that is the same in every cycle, where noise is told from a misfit by that: a bin of 16 holds 0.99
 UNLIKE = 1.15  # times what noise explains, by which x may stray from its twin before that is said
 ASTRAY, UNFELT, RIVALS = "unlike its twins", "not felt", "another law as likely"  # kinds of doubt
 
@@ -101,8 +102,9 @@ class Trial:
         What would have been felt: of the sliding friction [N], its slope against speed [N s/m], the static friction
         over it, the "compliance" of a contact that gives way [m/N], and the stuck share of the time; None where the
         record tells nothing.
-    strays : float
-        Root mean square by which x strays from its nearest rig, over that of twins from theirs.
+    strays, repeats : float
+        Root mean square by which x strays from its nearest rig, over that of twins from theirs; and of what of it
+        is the same in every cycle, as slow noise is not.
     """
 
     count: int
@@ -110,11 +112,12 @@ class Trial:
     estimates: Answers
     felt: Mapping[str, Power | None]
     strays: float
+    repeats: float
 
     @property
     def doubt(self) -> Doubt | None:
         """Why the record is not of the kind of its twins; None where it is."""
-        return _Misfit.of(self.belief, self.strays).doubt
+        return _Misfit.of(self.belief, self.strays, self.repeats).doubt
 
     @property
     def unlike(self) -> bool:
@@ -128,6 +131,7 @@ class Trial:
             "law": {"name": type(self.belief.law).__name__, **_numbers(self.belief)},
             "felt": {name: None if power is None else vars(power) for name, power in self.felt.items()},
             "strays": self.strays,
+            "repeats": self.repeats,
         }
 
 
@@ -190,7 +194,7 @@ def try_on_twins(
             "an answer is tried on most of its twins",
             "take the quick answers",
         )
-    misfit = _Misfit.of(belief, _strays(belief, twins))
+    misfit = _Misfit.of(belief, *_strays(belief, twins, frequency))
     tried = {}
     others = _counted(belief, frequency)
     for name in ASKED:
@@ -213,7 +217,7 @@ def try_on_twins(
     felt = {**_powers(belief), SHARE: _share_felt(bounded.get(SHARE))}
     if (share := felt[SHARE]) is not None and not share.claimed:
         bounded[SHARE] = _among(bounded[SHARE], [-bounded[SHARE].value]).within(*BOUNDS[SHARE])
-    return Trial(count, belief, bounded, felt, misfit.strays)
+    return Trial(count, belief, bounded, felt, misfit.strays, misfit.repeats)
 
 
 @dataclass(frozen=True)
@@ -221,17 +225,18 @@ class _Misfit:
     """How far a record is from its twins' kind: by its displacement, and by constants that would have to be off."""
 
     strays: float
+    repeats: float
     strain: float
     left: float
     slip: str
 
     @classmethod
-    def of(cls, belief: Belief, strays: float) -> _Misfit:
+    def of(cls, belief: Belief, strays: float, repeats: float) -> _Misfit:
         """That of a belief's record, with what else as well as its slip would be one."""
         nearest: dict[str, str] = {}  # of each kind
         for rig in (belief, *sorted(belief.rivals, key=lambda rival: rival.left)) if belief.slip else ():
             nearest.setdefault(rig.slipped, rig.slip)
-        return cls(strays, belief.strain, belief.left, " or ".join(filter(None, nearest.values())))
+        return cls(strays, repeats, belief.strain, belief.left, " or ".join(filter(None, nearest.values())))
 
     @property
     def doubt(self) -> Doubt | None:
@@ -243,11 +248,12 @@ class _Misfit:
                 ASTRAY,
             )
         if self.strays > UNLIKE:
-            return Doubt(
-                f"x strays {self.strays:.2g} times as far from its twins as noise explains: the contact is of no kind "
-                "that was tried, or a constant is not as stated",
-                ASTRAY,
+            why = (
+                ": the contact is of no kind that was tried, or a constant is not as stated"
+                if self.repeats
+                else ", in each cycle another way, as slow noise of a sensor does, which the intervals do not count"
             )
+            return Doubt(f"x strays {self.strays:.2g} times as far from its twins as noise explains{why}", ASTRAY)
         if self.slip:
             return Doubt(
                 f"its nearest twin has {self.slip}: correct that, or the contact is of no kind that was tried",
@@ -445,14 +451,25 @@ def _estimate(
     return Estimate(quick.name, value, interval, sd, quick.unit, method, Status(*doubts), checks or quick.checks)
 
 
-def _strays(belief: Belief, twins: list[_Twin]) -> float:
-    """How much more x strays from its nearest rig than a twin's does from its own, which noise alone parts."""
+def _strays(belief: Belief, twins: list[_Twin], frequency: float) -> tuple[float, float]:
+    """How much more x strays from its nearest rig than a twin's does from its own, which noise alone parts.
+
+    And how much of that is the same in every cycle: a law or a constant that is wrong is, slow noise is not. Of a
+    motion that is not the same in every cycle, all is counted.
+    """
     if belief.fit is None:
-        return math.inf
+        return math.inf, math.inf
     apart = levelled(np.array([twin.x - belief.moved for twin in twins]).T)
     apart -= belief.fit.jacobian @ (belief.fit.gain @ apart)
-    explained = float(np.mean(apart**2))
-    return float(np.std(belief.residual)) / math.sqrt(explained) if explained > 0 else math.inf
+    explained = math.sqrt(float(np.mean(apart**2)))
+    strays = float(np.std(belief.residual))
+    if not explained:
+        return math.inf, math.inf
+    cycles = (belief.record.time - belief.record.start) * (0.0 if math.isnan(frequency) else frequency)
+    number = (cycles % 1.0 * BINS).astype(np.intp)
+    moved, left = (repeating(number, values)[number] for values in (levelled(belief.record["x"]), belief.residual))
+    same = float(np.std(moved)) > SAME * float(np.std(belief.record["x"]))
+    return strays / explained, (float(np.std(left)) if same else strays) / explained
 
 
 def _numbers(belief: Belief) -> dict[str, float]:
