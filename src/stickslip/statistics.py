@@ -430,13 +430,13 @@ def repeating(number: NDArray[np.intp], values: Array) -> Array:
     sums = np.array([np.bincount(number[half], values[half], minlength=BINS) for half in (early, ~early)])
     weights = np.sqrt(counts[0] * counts[1])
     total = float(weights.sum())
-    if not total or total**2 < FEWEST * float(weights @ weights):
-        return np.zeros(BINS)
+    nothing, independent = np.zeros(BINS), total**2 / max(float(weights @ weights), 1.0)
+    if independent < FEWEST:
+        return nothing
     means = sums / np.maximum(counts, 1)
     means -= (means @ weights / total)[:, None]
     common, spread = float(weights @ (means[0] * means[1])), math.sqrt(math.prod(means**2 @ weights))
-    if common <= 0:
-        return np.zeros(BINS)
-    sure = math.atanh(min(common / spread, ALIKE)) * math.sqrt(total**2 / float(weights @ weights) - 3)
+    if common <= 0 or math.atanh(min(common / spread, ALIKE)) * math.sqrt(independent - 3) <= REPEATS:
+        return nothing
     middle = np.where(weights > 0, means.mean(axis=0), 0.0)
-    return np.asarray(middle * math.sqrt(common / float(weights @ middle**2)) * (sure > REPEATS))
+    return np.asarray(middle * math.sqrt(common / float(weights @ middle**2)))
