@@ -25,7 +25,8 @@ HALF_ERROR = 0.5  # standard errors by which correlation is taken to be stronger
 FEW_INDEPENDENT = 8.0  # independent samples per coefficient, below which an interval is not to be trusted
 MOST_LEVERAGE = 0.9  # of a sample and its neighbours: beyond, one stroke alone tells a coefficient
 BINS, FEWEST = 16, 6.0  # of a way or a cycle, and of how many, as they weigh, a correlation is told
-REPEATS = 3.0  # deviations of Fisher's z: once in 700 without an effect
+# Deviations of Fisher's z, once in 700 without an effect: 1 of 58 joints whose friction is the same along the way.
+REPEATS = 3.0
 ALIKE = 0.999  # a correlation, beyond which Fisher's z grows without bound
 INSEPARABLE = 1e3  # condition number of columns of unit length; a force balance that can be read has less than 30
 

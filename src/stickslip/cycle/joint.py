@@ -41,9 +41,12 @@ HEARD = 1.5
 STRAYS = 1.6  # times its chance that a delay strays: so it did on 60 joints of 15 ms, seeds 70100 to 70225
 NEARER, NEAR = 8, 1e-3  # steps towards the delay, and the last one's size in samples
 WAYS = ((1.0, "forward"), (-1.0, "back"))
+# Kinds of doubt.
 NOISY, LOADED, CONFOUNDED, SHIFTED, BENT, PLACE = "noisy", "loaded", "confounded", "shifted", "bent", "placed"
 RUBS = ("forward", "back", "viscous")  # terms by which friction is a line over the speed
 PLACED = ("forward", "back", "load", "sine", "cosine")  # terms that friction or torque of the place passes for
+BARELY = 0.5  # of a value: an interval that is wider on either side hardly tells it
+RICHER = {"load", "uneven", *WARM}  # what Coulomb and viscous friction of both directions alike do not have
 
 
 class Misfit(NamedTuple):
@@ -52,10 +55,6 @@ class Misfit(NamedTuple):
     terms: tuple[str, ...]
     doubt: Doubt
     strays: Array = np.zeros((1, 1))
-
-
-BARELY = 0.5  # of a value: an interval that is wider on either side hardly tells it
-RICHER = {"load", "uneven", *WARM}  # what Coulomb and viscous friction of both directions alike do not have
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -193,7 +192,9 @@ def regress_joint(
 
     Where friction surely falls with the speed, :math:`(F_s - F_c)\,e^{-(|\dot q|/v_s)^\delta}\,\mathrm{sgn}\,\dot q`
     stands beside (Stribeck's curve; Armstrong-Helouvry, Dupont and Canudas de Wit 1994), and every number is the mean
-    over all curves that the log allows, each by its likelihood.
+    over all curves that the log allows, each by its likelihood. Friction that surely bends otherwise bears a doubt. So
+    does what changes along the way, as what is left in two halves of the log repeats with the place (by Fisher's z,
+    1921); the intervals count it.
 
     Parameters
     ----------
