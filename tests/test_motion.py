@@ -5,7 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from stickslip.balance.motion import away_from, contact_motion, find_cycles, forcing_frequency, stretches
+from stickslip.arrays import stretches
+from stickslip.balance.motion import away_from, contact_motion, find_cycles, forcing_frequency
 from stickslip.errors import EstimateError, RecordError
 from stickslip.record.record import Record
 

@@ -12,8 +12,9 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from stickslip.arrays import Array
 from stickslip.drives.kinds import Drive, Release, require_drive
 from stickslip.drives.on_another import Both
 from stickslip.errors import ModelError
@@ -25,7 +26,6 @@ from stickslip.laws.guessing import registered
 from stickslip.laws.stribeck import SpeedCurve, Tabulated, TimeDelay
 from stickslip.parameters import changed, finite, parameter, parametric
 
-Array = NDArray[np.float64]
 ROUNDED = 1e-6  # of the largest stiffness: an asymmetry below it is no one's intention
 
 

@@ -13,12 +13,11 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from stickslip.arrays import Array, Rows
 from stickslip.errors import EstimateError
 from stickslip.estimate import NORMAL_95, Doubt, Estimate, Status
-
-Array = NDArray[np.float64]
 
 FEW_CYCLES = 8  # below this no test of the interval holds at 0.5 correlation between neighbours
 HALF_ERROR = 0.5  # standard errors by which correlation is taken to be stronger: too weak a one costs more
@@ -401,7 +400,7 @@ def follows(measured: Array, model: Array) -> float:
     return 100 * (1 - float(np.linalg.norm(residual - residual.mean())) / size) if size else 0.0
 
 
-def repeating(number: NDArray[np.intp], values: Array) -> Array:
+def repeating(number: Rows, values: Array) -> Array:
     """That part of values which repeats with the part of a way or a cycle; zeros where none surely does.
 
     Means over each part are compared between the earlier half and the later one: noise of one half knows nothing of the

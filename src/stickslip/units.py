@@ -13,8 +13,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from stickslip.arrays import Array
 from stickslip.errors import ModelError, RecordError
 
 GRAVITY = 9.80665  # m/s^2, standard gravity (CGPM 1901)
@@ -343,7 +343,7 @@ def parse_range(text: str, expect: str) -> tuple[float, float]:
     return low, high
 
 
-def prefixed(values: NDArray[np.float64] | float, unit: str) -> tuple[float, str]:
+def prefixed(values: Array | float, unit: str) -> tuple[float, str]:
     """Factor and unit that bring the largest of `values` between 1 and 1000.
 
     Examples

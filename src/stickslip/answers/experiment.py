@@ -9,8 +9,8 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from stickslip.arrays import Array
 from stickslip.balance.force import friction_force
 from stickslip.balance.lag import sensor_delay
 from stickslip.contact.contact import contact_stiffness
@@ -23,8 +23,6 @@ from stickslip.record.record import Record
 from stickslip.rig.rig import Rig, Shaker
 from stickslip.solve.trajectory import Trajectory
 from stickslip.units import parse_value, prefixed
-
-Array = NDArray[np.float64]
 
 RATES = (1000.0, 2000.0, 4000.0)
 SPARED = ("a", "load")  # sensors that an experiment may do without

@@ -9,9 +9,10 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from stickslip.answers.findings import Inquiry, record_name
+from stickslip.arrays import Array
 from stickslip.balance.motion import is_measured
 from stickslip.contact.frequency_transition import Transition, transition_of
 from stickslip.contact.microslip import MicroSlips, microslips_of
@@ -27,7 +28,6 @@ from stickslip.units import parse_range
 if TYPE_CHECKING:
     import xarray as xr
 
-Array = NDArray[np.float64]
 
 CHOSEN = ("a", "sound", "force", "load", "friction", "v", "x")  # the channel that is looked at, the first that is there
 LONG = 400_000  # samples, from which on the largest moduli of each stretch of time are kept

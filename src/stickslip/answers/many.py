@@ -16,9 +16,9 @@ from pathlib import Path
 from typing import Any, Protocol, Self, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from stickslip.answers.findings import Comparison, Findings, require_several
+from stickslip.arrays import Array
 from stickslip.errors import ModelError, RecordError
 from stickslip.estimate import NORMAL_95, Estimate, Result
 from stickslip.law.fit_curve import LATE
@@ -118,7 +118,7 @@ def against_load(findings: Sequence[Slid]) -> tuple[dict[str, Estimate | None], 
     return {**results, "coefficient": coefficient}, tuple(notes)
 
 
-def _line(design: NDArray[np.float64], levels: NDArray[np.float64], sds: NDArray[np.float64]) -> list[dict[str, float]]:
+def _line(design: Array, levels: Array, sds: Array) -> list[dict[str, float]]:
     """Coefficients by least squares; each varies as the scatter about the line says, or as `sds` do if that is more."""
     free = len(levels) - design.shape[1]
     inverse = np.linalg.pinv(design)

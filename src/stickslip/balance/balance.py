@@ -11,8 +11,8 @@ from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from stickslip.arrays import Array, Rows
 from stickslip.balance.motion import is_measured
 from stickslip.errors import EstimateError, ModelError
 from stickslip.estimate import Estimate, Result
@@ -29,8 +29,6 @@ from stickslip.signals.derivatives import (
 from stickslip.signals.interpolate import without_delays
 from stickslip.signals.noise import noise_along
 from stickslip.statistics import mean_of_cycles
-
-Array = NDArray[np.float64]
 
 FRICTION = "the friction force"
 ENDS = ("ground", "base")
@@ -368,7 +366,7 @@ def _over(value: float) -> float:
     return 1 / value if value > 0 else math.inf
 
 
-def _turns(force: Array, noise: float) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+def _turns(force: Array, noise: float) -> tuple[Rows, Rows]:
     """Maxima of the force, each followed by a drop that counts, and the minima after them.
 
     A drop after which the force does not rise as much again is cut by the end of the record, and left out.
@@ -388,7 +386,7 @@ def _turns(force: Array, noise: float) -> tuple[NDArray[np.intp], NDArray[np.int
     return tops, np.array(bottoms, dtype=np.intp)
 
 
-def _rate(force: Array, fs: float, lows: NDArray[np.intp], highs: NDArray[np.intp], unit: str) -> Estimate:
+def _rate(force: Array, fs: float, lows: Rows, highs: Rows, unit: str) -> Estimate:
     """Mean slope of the rises, by how long each lasts."""
     kept = [(low, high) for low, high in zip(lows, highs, strict=True) if high - low >= FEW]
     if not kept:

@@ -7,19 +7,17 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from stickslip.arrays import Array, Complex
 from stickslip.balance.balance import Balance, known_constants
 from stickslip.balance.force import friction_force
-from stickslip.balance.mass import Complex, Lines, find_lines
+from stickslip.balance.mass import Lines, find_lines
 from stickslip.balance.mounts import Resonance, find_mounts
 from stickslip.errors import EstimateError
 from stickslip.estimate import NORMAL_95, Constant, Estimate, Result, Status, plain
 from stickslip.record.flaws import saturated
 from stickslip.record.record import Record
 from stickslip.signals.interpolate import without_delays
-
-Array = NDArray[np.float64]
 
 QUESTION = "the comparison of forces"
 RATIO = 1.25  # of a band's upper edge to its lower one

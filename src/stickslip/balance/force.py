@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from dataclasses import asdict, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from stickslip.arrays import Array
 from stickslip.balance.balance import (
     FRICTION,
     Rig,
@@ -38,8 +38,6 @@ from stickslip.signals.derivatives import (
 )
 from stickslip.signals.interpolate import without_delays
 from stickslip.signals.noise import noise_along
-
-Array = NDArray[np.float64]
 
 FUSIONS = {"fusion": ("x", "v", "a", "load"), "motion": ("x", "v", "a"), "load": ("x", "load")}
 """Methods that know how the sensors lie, and the channels that each uses, where they are there."""

@@ -7,8 +7,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from stickslip.arrays import Array, Mask, Rows
 from stickslip.balance.balance import Balance
 from stickslip.record.channels import Channel
 from stickslip.record.flaws import saturated
@@ -16,8 +16,6 @@ from stickslip.record.record import Record
 from stickslip.signals.derivatives import LEAST, Filter, best_bandwidth
 from stickslip.signals.kalman import Motion, Seen, Smoothed, log_likelihood, smooth_motion, surprises
 from stickslip.signals.noise import local_noise, noise_along
-
-Array = NDArray[np.float64]
 
 POOL = 12.0  # samples over which the unrest of the friction is averaged
 FIRST = 0.05  # share of the friction's size by which it may change in a sample, before anything is known
@@ -190,13 +188,11 @@ class Held:
 
     model: _Model
     sensed: Sensed
-    regime: NDArray[np.intp]  # 0: slides, 1: holds, 2: half a step beside a stick
+    regime: Rows  # 0: slides, 1: holds, 2: half a step beside a stick
     unknown: Array
 
     @classmethod
-    def of(
-        cls, record: Record, balance: Balance, sensors: Sequence[str], holds: NDArray[np.bool_], level: float
-    ) -> Held:
+    def of(cls, record: Record, balance: Balance, sensors: Sequence[str], holds: Mask, level: float) -> Held:
         """`holds` is true for each step from a sample to the next within a stick; `level` [N] is the sliding friction.
 
         Between sticks nothing is taken over from what was found of the friction: it would lean on its own choice. The
@@ -308,7 +304,7 @@ class _Model:
         return start, doubt
 
 
-def _steps(models: Sequence[_Model], regime: NDArray[np.intp], sensed: Sensed) -> tuple[Motion, Seen]:
+def _steps(models: Sequence[_Model], regime: Rows, sensed: Sensed) -> tuple[Motion, Seen]:
     """The motion from sample to sample, by the model of each sample's regime."""
     transitions, spreads, pushed, changed = (
         np.array(part) for part in zip(*(model.step(sensed.step) for model in models), strict=True)

@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from stickslip.arrays import Array, Complex
 from stickslip.balance.balance import known_constants
 from stickslip.balance.mounts import ACCELEROMETER, CELL, Resonance
 from stickslip.errors import EstimateError
@@ -17,9 +17,6 @@ from stickslip.estimate import Constant, Doubt, Estimate, Plain, Result, Status
 from stickslip.record.record import Record
 from stickslip.signals.interpolate import without_delays
 from stickslip.signals.noise import noise_along
-
-Array = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 QUESTION = "the impact test"
 COUPLED = "coupled contact"

@@ -8,15 +8,13 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from stickslip.arrays import Array
 from stickslip.errors import EstimateError
 from stickslip.estimate import Doubt, Estimate, Result, Status
 from stickslip.record.record import Record
 from stickslip.signals.alignment import Alignment, Pair, align, likely_delays
 from stickslip.signals.noise import noise_level
-
-Array = NDArray[np.float64]
 
 QUESTION = "the delay between sensors"
 ORDERS = {"x": 0, "z": 0, "theta": 0, "v": 1, "a": 2}  # of the derivative of a displacement that a channel is

@@ -9,17 +9,16 @@ from typing import Any
 from weakref import WeakKeyDictionary
 
 import numpy as np
-from numpy.typing import NDArray
 
+from stickslip.arrays import Array, Mask, stretches
 from stickslip.balance.balance import Balance
 from stickslip.balance.force import FUSIONS
 from stickslip.balance.fusion import Held, fuse
-from stickslip.balance.motion import is_measured, stretches
+from stickslip.balance.motion import is_measured
 from stickslip.errors import EstimateError
 from stickslip.estimate import NORMAL_95, Doubt, Estimate, Status
 from stickslip.record.record import Record
 
-Array = NDArray[np.float64]
 Stretches = list[tuple[int, int]]
 
 STIFFNESS, DAMPING = "contact stiffness", "contact damping"
@@ -185,7 +184,7 @@ def sliding_level(friction: Array, velocity: Array) -> tuple[float, float]:
     return float(np.median(np.abs(friction[fast] - middle))), middle
 
 
-def held_steps(friction: Array, velocity: Array, level: float) -> tuple[NDArray[np.bool_], Stretches]:
+def held_steps(friction: Array, velocity: Array, level: float) -> tuple[Mask, Stretches]:
     """Which steps, each from a sample to the next, lie within a stick; and the samples of each stick.
 
     A stick begins where the velocity turns against the friction, which is sharp, and is over when the friction is

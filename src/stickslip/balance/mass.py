@@ -10,8 +10,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from stickslip.arrays import Array, Complex
 from stickslip.balance.motion import Cycles, away_from, contact_motion, find_cycles, is_measured
 from stickslip.errors import EstimateError
 from stickslip.estimate import Estimate
@@ -22,14 +22,11 @@ from stickslip.signals.interpolate import band_limited, without_delays
 from stickslip.signals.response import Response, leak, resonance
 from stickslip.statistics import least_squares, mean_uncertainty
 
-Array = NDArray[np.float64]
-
 QUESTION = "the stiffness over the mass"
 BOTH = "mass and stiffness together"
 HARMONICS = 9  # of the motion in which the load cell's force is told as spring and inertia
 LEFT_OVER = 0.1  # share of that force that may stay unexplained
 FAST = np.linspace(0.2, 0.7, 6)  # shares of the peak speed above which the contact slides with its whole friction
-Complex = NDArray[np.complex128]
 
 MOST = 400  # cycles looked at, spread over the record
 WINDOWS = 16  # half overlapping, where the motion does not repeat

@@ -7,18 +7,16 @@ from dataclasses import dataclass
 from weakref import WeakKeyDictionary
 
 import numpy as np
-from numpy.typing import NDArray
 
+from stickslip.arrays import Array, Mask, Rows
 from stickslip.errors import EstimateError, RecordError
 from stickslip.estimate import Estimate
-from stickslip.record.flaws import constant, runs_of
+from stickslip.record.flaws import constant
 from stickslip.record.record import Record
 from stickslip.signals.derivatives import differentiate
 from stickslip.signals.noise import noise_level
 from stickslip.statistics import least_squares, mean_of_cycles
 from stickslip.units import parse_value
-
-Array = NDArray[np.float64]
 
 LEAST = 32  # samples
 FORCES = {"m": "N", "rad": "N m"}  # what does work on a displacement, or an angle
@@ -88,7 +86,7 @@ class Cycles:
     status: str = "ok"
     turns: Array | None = None
 
-    def labels(self, size: int) -> NDArray[np.intp]:
+    def labels(self, size: int) -> Rows:
         """Number of the cycle that each of `size` samples lies in; -1 outside the complete cycles."""
         number = np.searchsorted(self.edges, np.arange(size), side="right") - 1
         return np.where(number < len(self.edges) - 1, number, -1)
@@ -333,13 +331,7 @@ def require_fit(record: Record, *forces: str, length: str, question: str) -> Non
             )
 
 
-def stretches(inside: NDArray[np.bool_]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """First samples of the stretches where `inside` holds, and the samples after their last."""
-    runs = np.array(runs_of(inside), dtype=np.intp).reshape(-1, 2)
-    return runs[:, 0], runs[:, 1] + 1
-
-
-def away_from(events: NDArray[np.bool_], margin: int) -> NDArray[np.bool_]:
+def away_from(events: Mask, margin: int) -> Mask:
     """Which samples are more than `margin` samples away from every sample where `events` holds."""
     count = np.concatenate([[0], np.cumsum(events)])
     rows = np.arange(len(events))

@@ -7,12 +7,12 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from stickslip.arrays import Array, Complex
 from stickslip.balance.balance import Balance, known_constants
 from stickslip.balance.fusion import fuse
 from stickslip.balance.lag import SensorDelay, sensor_delay
-from stickslip.balance.mass import Complex, Lines
+from stickslip.balance.mass import Lines
 from stickslip.balance.motion import is_measured
 from stickslip.errors import EstimateError
 from stickslip.estimate import Constant, Estimate, Plain
@@ -21,8 +21,6 @@ from stickslip.signals.derivatives import LEAST
 from stickslip.signals.interpolate import without_delays
 from stickslip.signals.noise import noise_along, noise_level
 from stickslip.signals.response import resonance
-
-Array = NDArray[np.float64]
 
 ACCELEROMETER, CELL = "mount of the accelerometer", "mount of the load cell"
 COARSE = 12  # frequencies of each mount that the search begins with

@@ -10,10 +10,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from stickslip.arrays import Array, stretches
 from stickslip.balance.balance import known_constants
-from stickslip.balance.motion import is_measured, require_change, stretches
+from stickslip.balance.motion import is_measured, require_change
 from stickslip.consistent.checks import (
     FAILS,
     HOLDS,
@@ -51,7 +51,6 @@ QUESTION = "the consistency of a record"
 USED = ("x", "z", "v", "a", "load", "force")
 FORCED = (acceleration_check, velocity_check, forces_check, energy_check, momentum_check, identity_check, stops_check)
 
-Array = NDArray[np.float64]
 
 NOISY = ("v", "a", "load", "force")  # whose noise moves every sample, unless it is held
 MAY_REST = ("z", "force")  # what may be held still while the mass moves

@@ -8,16 +8,14 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from stickslip.balance.mass import Complex, Lines, find_lines, response_of
+from stickslip.arrays import Array, Complex
+from stickslip.balance.mass import Lines, find_lines, response_of
 from stickslip.consistent.checks import APART, FAILS, HOLDS, UNTOLD, Amplitudes, Check, Slip, compared, judged, untold
 from stickslip.consistent.sliding_balance import Slider
 from stickslip.record.channels import Channel
 from stickslip.record.record import RIG_UNITS, Record
 from stickslip.statistics import mean_uncertainty
-
-Array = NDArray[np.float64]
 
 RATES = ("x_rate", "x_rate_rate")  # the displacement's derivatives
 ENERGY, STOPPING = "energy of whole cycles", "sliding without stops"

@@ -11,14 +11,13 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from stickslip.arrays import Array, Complex, Rows
 from stickslip.consistent.checks import HOLDS, UNTOLD, Check, compared, untold
 from stickslip.errors import EstimateError, ModelError
 from stickslip.estimate import Constant, Estimate
 from stickslip.units import parse_uncertain
-
-Array = NDArray[np.float64]
 
 POINTS = 1024  # of a period
 ROUNDS = 400
@@ -120,7 +119,7 @@ class Slider:
         gain, lag, lead, least = self._den_hartog()
         return gain / math.hypot(lag, least + lead)
 
-    def _impedance(self, order: int | NDArray[np.intp]) -> NDArray[np.complex128]:
+    def _impedance(self, order: int | Rows) -> Complex:
         w = self.angular * np.asarray(order)
         return np.asarray(self.stiffness - self.mass * w**2 + 1j * self.damping * w)
 

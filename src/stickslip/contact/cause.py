@@ -9,8 +9,8 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from stickslip.arrays import Array, Rows
 from stickslip.balance.lag import sensor_delay
 from stickslip.balance.likely_contact import LikelyContact, likely_contact
 from stickslip.balance.motion import is_measured, slid_on
@@ -23,8 +23,6 @@ from stickslip.signals.derivatives import smooth
 from stickslip.signals.interpolate import without_delays
 from stickslip.signals.pieces import turning_points
 from stickslip.statistics import mean_of_cycles
-
-Array = NDArray[np.float64]
 
 QUESTION = "lag or compliance"
 CAUSES = ("sensor lag", "contact compliance", "both", "neither", "cannot be told")
@@ -179,7 +177,7 @@ class _Fit:
         return RIGID * self.least
 
     @cached_property
-    def reversals(self) -> NDArray[np.intp]:
+    def reversals(self) -> Rows:
         """Where the motion turns, after it went as far as an eighth of its range."""
         return _turns(self.place, 0.125 * float(np.ptp(self.place)))
 
@@ -286,7 +284,7 @@ def _slide(place: Array, give: float, share: Array) -> None:
         share[t] = y / give
 
 
-def _turns(place: Array, least: float) -> NDArray[np.intp]:
+def _turns(place: Array, least: float) -> Rows:
     """Where a motion turns back, after it went `least` at least."""
     rows = np.empty(len(place), dtype=np.intp)
     count = turning_points(place, least, rows)

@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from stickslip.arrays import Array, stretches
 from stickslip.balance.balance import Balance
 from stickslip.balance.likely_contact import (
     HELD,
@@ -21,15 +21,13 @@ from stickslip.balance.likely_contact import (
     likely_contact,
     sliding_level,
 )
-from stickslip.balance.motion import is_measured, stretches
+from stickslip.balance.motion import is_measured
 from stickslip.contact.frequency_transition import transition
 from stickslip.cycle.loops import Loops, friction_loops
 from stickslip.errors import EstimateError
 from stickslip.estimate import NORMAL_95, Doubt, Estimate, Result, Status, kinds
 from stickslip.record.record import Record
 from stickslip.statistics import mean_of_cycles, mean_uncertainty, student
-
-Array = NDArray[np.float64]
 
 METHODS = ("contact", "curve", "equation")
 SPEED, FREQUENCY = "transition speed", "coupled frequency"

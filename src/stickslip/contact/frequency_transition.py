@@ -6,8 +6,8 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from stickslip.arrays import Array
 from stickslip.contact.ringing import Ringing, Window, checked_mass, find_ringing, not_one_mode
 from stickslip.errors import EstimateError
 from stickslip.estimate import Constant, Estimate, Result, Status
@@ -15,8 +15,6 @@ from stickslip.record.record import Record
 from stickslip.signals.morlet import ridge_centre
 from stickslip.signals.wavelet import CENTRE, wavelet_map
 from stickslip.statistics import correlation_time, least_squares, mean_of_cycles, student
-
-Array = NDArray[np.float64]
 
 QUESTION = "the transition"
 AFTER, BEFORE = 0.09, 0.03  # of a cycle at the ends of a ring that are not trusted: where it begins is less sure

@@ -9,8 +9,8 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from stickslip.arrays import Array
 from stickslip.contact.frequency_transition import heard_mode
 from stickslip.contact.ringing import PENALTY, UNTOLD, Ringing, Window, find_ringing, not_one_mode, too_fast
 from stickslip.errors import EstimateError
@@ -18,8 +18,6 @@ from stickslip.estimate import Constant, Estimate, Result, Status
 from stickslip.record.record import Record
 from stickslip.signals.pieces import RING, Piece
 from stickslip.statistics import mean_of_cycles
-
-Array = NDArray[np.float64]
 
 QUESTION = "micro-slips"
 ASTRAY = 0.27  # of a cycle of the ring: the cuts may lie so far from where a micro-slip begins and ends

@@ -11,8 +11,8 @@ from importlib import resources
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from stickslip.arrays import Array
 from stickslip.balance.motion import forcing_frequency
 from stickslip.balance.mounts import acceleration_of_mass
 from stickslip.cycle.sticks import Sticks, find_sticks
@@ -39,7 +39,6 @@ CHOPPED = 4.5  # micro-slips a stick: more are rather a mount's that rings than 
 ALONE = 0.8  # how often it is friction, where fewer are told by an acceleration whose mount nothing is known of
 STATE_MOUNT = "state the mount, record.with_details('a', mount=(frequency, damping)), or give x"
 STRANGE = 4.5  # standard deviations from what the simulated records of its kind were like
-Array = NDArray[np.float64]
 
 LEAD = 0.12  # of a stick's duration that is looked at before it, and LAG after it
 LAG = 0.06
@@ -235,7 +234,7 @@ COLUMNS = ("loudness", "excess", "gain over rest", "noise", "glides", "any glide
            "longest ring", "damping", "time glided")  # fmt: skip
 
 
-def columns(observed: Mapping[str, float]) -> NDArray[np.float64]:
+def columns(observed: Mapping[str, float]) -> Array:
     """The features as the regression takes them: logarithms and bounds keep single ones from deciding alone.
 
     Noise counts from where it is larger than the pieces' misfit: less leaves them as they are, and moves no verdict.

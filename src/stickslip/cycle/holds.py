@@ -7,17 +7,12 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from stickslip.arrays import Array, Rows, stretches
 from stickslip.balance.force import FUSIONS
 from stickslip.balance.likely_contact import sliding_level
-from stickslip.balance.motion import (
-    slid_on,
-    stretches,
-)
+from stickslip.balance.motion import slid_on
 from stickslip.record.record import Record
-
-Array = NDArray[np.float64]
 
 HELD = 0.9  # share of the sliding friction below which the contact certainly holds
 LEAST = 4  # samples of one hold from which its spring is told
@@ -112,7 +107,7 @@ def find_holds(trace: Trace) -> tuple[Hold, ...]:
     return tuple(_hold_at_each_turn(trace, spring, level, turns, dict(cores)))
 
 
-def _cores(trace: Trace, level: float, turns: NDArray[np.intp]) -> list[tuple[int, slice]]:
+def _cores(trace: Trace, level: float, turns: Rows) -> list[tuple[int, slice]]:
     """For each turn of the velocity out of sliding, the samples after it in which the contact certainly holds."""
     begins, ends = stretches(np.abs(trace.friction) < HELD * level)
     first_and_core: dict[int, tuple[int, slice]] = {}
@@ -156,7 +151,7 @@ def _centred(values: Array) -> Array:
 
 
 def _hold_at_each_turn(
-    trace: Trace, spring: Spring, level: float, turns: NDArray[np.intp], cores: dict[int, slice]
+    trace: Trace, spring: Spring, level: float, turns: Rows, cores: dict[int, slice]
 ) -> Iterator[Hold]:
     """Hold after hold; turns of the velocity within one are passed over."""
     free = 0  # where the last hold ended, in samples

@@ -8,8 +8,8 @@ from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from stickslip.arrays import Array
 from stickslip.cycle.joint_fall import FALL, ROUNDING, Fall, bends, falling
 from stickslip.cycle.joint_fit import (
     ADVICE,
@@ -30,8 +30,6 @@ from stickslip.estimate import NORMAL_95, Constant, Doubt, Estimate, Result, Sta
 from stickslip.record.record import Record
 from stickslip.signals.noise import noise_level
 from stickslip.statistics import FEW_INDEPENDENT, LeastSquares, mixture
-
-Array = NDArray[np.float64]
 
 BIASED = 0.01  # share of noise in the power of the acceleration above which the inertia is visibly low
 LATEST = 0.1  # s that a torque may be late

@@ -6,16 +6,14 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from stickslip.arrays import Array
 from stickslip.cycle.joint_fit import JointData, Log, coefficient
 from stickslip.cycle.joint_slides import Sliding
 from stickslip.errors import EstimateError
 from stickslip.estimate import Estimate
 from stickslip.signals.derivatives import differentiate
 from stickslip.statistics import LeastSquares, correlation_time, least_squares
-
-Array = NDArray[np.float64]
 
 EXPONENTS = (1.0, 1.5, 2.0)  # Tustin's, Gauss's and one between: a log hardly tells them apart, so all are counted
 SPEEDS = 12  # of each exponent

@@ -9,8 +9,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from stickslip.arrays import Array
 from stickslip.balance.motion import require_fit
 from stickslip.cycle.joint_slides import Sliding, places, sliding
 from stickslip.errors import EstimateError, ModelError, RecordError
@@ -20,8 +20,6 @@ from stickslip.signals.derivatives import five_point_difference, smooth
 from stickslip.signals.interpolate import band_limited, without_delays
 from stickslip.signals.noise import noise_level
 from stickslip.statistics import LeastSquares, least_squares, repeating
-
-Array = NDArray[np.float64]
 
 QUESTION = "the friction of a joint"
 LEAST = 200  # samples

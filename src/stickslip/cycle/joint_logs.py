@@ -6,16 +6,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from stickslip.arrays import Array
 from stickslip.cycle.joint import RICHER, Telling, delay_of, misfits, punctual
 from stickslip.cycle.joint_fall import bends
 from stickslip.cycle.joint_fit import JointData, about_load, fitted, joint_data, pooled, turning, warmed
 from stickslip.errors import EstimateError, RecordError
 from stickslip.estimate import Constant, Estimate, Result
 from stickslip.record.record import Record
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

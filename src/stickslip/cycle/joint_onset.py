@@ -10,9 +10,9 @@ from dataclasses import dataclass, replace
 from statistics import NormalDist
 
 import numpy as np
-from numpy.typing import NDArray
 
-from stickslip.balance.motion import away_from, stretches
+from stickslip.arrays import Array, stretches
+from stickslip.balance.motion import away_from
 from stickslip.cycle.joint import JointFriction
 from stickslip.cycle.joint_fit import motor_lead, turning
 from stickslip.cycle.joint_slides import sliding
@@ -24,8 +24,6 @@ from stickslip.signals.derivatives import differentiate
 from stickslip.signals.interpolate import without_delays
 from stickslip.signals.noise import noise_level, quantisation_step
 from stickslip.statistics import least_squares, mean_of_cycles, student
-
-Array = NDArray[np.float64]
 
 PLAY_QUESTION = "the backlash of a joint"
 LEAST_SIDE = 40  # instants, on either side of the teeth

@@ -7,15 +7,13 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
-from stickslip.balance.motion import away_from, stretches
+from stickslip.arrays import Array, Mask, Rows, stretches
+from stickslip.balance.motion import away_from
 from stickslip.errors import EstimateError
 from stickslip.signals.derivatives import differentiate, five_point_difference
 from stickslip.signals.noise import quantisation_step
 from stickslip.statistics import BINS
-
-Array = NDArray[np.float64]
 
 # of a stroke's length, that the window has on either side: with 0.15 the accelerations of an axis fall out
 SHARE = 0.08
@@ -58,14 +56,14 @@ class Window:
 
         return np.asarray(fftconvolve(five_point_difference(values, order) * self.fs**order, self.weights, mode="same"))
 
-    def at(self, values: Array, rows: NDArray[np.intp], order: int = 0) -> Array:
+    def at(self, values: Array, rows: Rows, order: int = 0) -> Array:
         """The same at some rows: no other is computed."""
         rough = five_point_difference(values, order) * self.fs**order
         return np.asarray(
             np.lib.stride_tricks.sliding_window_view(rough, 2 * self.half + 1)[rows - self.half] @ self.weights
         )
 
-    def within(self, side: Array) -> NDArray[np.bool_]:
+    def within(self, side: Array) -> Mask:
         """Where it lies within one stroke."""
         broken = (side == 0) | np.append(False, np.diff(side) != 0)
         within = away_from(broken, self.half + REACH)
@@ -101,9 +99,9 @@ class Sliding:
 
     side: Array
     window: Window
-    rows: NDArray[np.intp]
+    rows: Rows
     slowest: float
-    near: NDArray[np.bool_] | None = None
+    near: Mask | None = None
     narrow: Window | None = None
 
     @cached_property
@@ -152,12 +150,12 @@ def sliding(position: Array, fs: float, *, slowly: bool = False) -> Sliding:
     return replace(slides, rows=rows[order], near=near[order], narrow=narrow)
 
 
-def _apart(within: NDArray[np.bool_], window: Window) -> NDArray[np.intp]:
+def _apart(within: Mask, window: Window) -> Rows:
     """Rows that tell something of their own."""
     return np.flatnonzero(within)[:: max(1, window.half // APART)]
 
 
-def places(place: Array) -> NDArray[np.intp]:
+def places(place: Array) -> Rows:
     """Which of `BINS` along the way each row is at."""
     reach = float(np.ptp(place))
     along = (place - place.min()) * (BINS / reach if reach else 0.0)

@@ -6,8 +6,8 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from stickslip.arrays import Array, Mask, Rows
 from stickslip.balance.motion import (
     AUDIBLE,
     CREEP,
@@ -25,8 +25,6 @@ from stickslip.estimate import NORMAL_95, Doubt, Estimate, Result, Status
 from stickslip.record.record import Record, require_record
 from stickslip.signals.interpolate import without_delays
 from stickslip.statistics import least_squares, mean_of_cycles, mean_uncertainty, student
-
-Array = NDArray[np.float64]
 
 NO_SLOPE = "no slope"  # the kind of doubt where the motion does not tell how friction changes with speed
 LEAST_SPREAD = 0.1  # of the sliding speed about its mean, below which no slope against speed can be told
@@ -55,7 +53,7 @@ class Curve:
     friction: Array
     low: Array
     high: Array
-    count: NDArray[np.intp]
+    count: Rows
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -190,7 +188,7 @@ def friction_loops(
     )
 
 
-def sliding_parts(motion: Motion, cycles: Cycles) -> NDArray[np.bool_]:
+def sliding_parts(motion: Motion, cycles: Cycles) -> Mask:
     """Where the contact slides, away from reversals if there is sliding left there."""
     threshold = max(CREEP * cycles.peak, AUDIBLE * motion.noise)
     fast = np.abs(motion.velocity) > threshold
@@ -199,7 +197,7 @@ def sliding_parts(motion: Motion, cycles: Cycles) -> NDArray[np.bool_]:
 
 
 def _magnitudes(
-    friction: Array, motion: Motion, sliding: NDArray[np.bool_], label: NDArray[np.intp], count: int, unit: str
+    friction: Array, motion: Motion, sliding: Mask, label: Rows, count: int, unit: str
 ) -> dict[str, Estimate]:
     """The friction forward and back, half of their sum, and half of their difference."""
     forward, back = (levels_of(sign, friction, motion, sliding & (label >= 0), label, count) for sign in (1.0, -1.0))
@@ -214,9 +212,7 @@ def _magnitudes(
     return magnitudes | {key: magnitudes[key].within(0.0, otherwise=DRIVES) for key in ("forward", "back", "level")}
 
 
-def levels_of(
-    sign: float, friction: Array, motion: Motion, sliding: NDArray[np.bool_], label: NDArray[np.intp], count: int
-) -> Array:
+def levels_of(sign: float, friction: Array, motion: Motion, sliding: Mask, label: Rows, count: int) -> Array:
     """Magnitude of the friction to one side, per cycle; NaN where a cycle does not slide that way."""
     chosen = sliding & (sign * motion.velocity > 0)
     levels = np.full(count, np.nan)
@@ -238,7 +234,7 @@ def _energy(friction: Array, motion: Motion, cycles: Cycles) -> Estimate:
     return energy.within(0.0, otherwise=DRIVES)
 
 
-def _slope(friction: Array, motion: Motion, sliding: NDArray[np.bool_], label: NDArray[np.intp], unit: str) -> Estimate:
+def _slope(friction: Array, motion: Motion, sliding: Mask, label: Rows, unit: str) -> Estimate:
     """Slope of the sliding friction's magnitude against speed, per cycle, levels forward and back left free."""
     chosen = sliding & (label >= 0)
     # both directions of a cycle are groups of their own: within them, magnitude against speed
@@ -271,7 +267,7 @@ def _slope(friction: Array, motion: Motion, sliding: NDArray[np.bool_], label: N
     return _widened(slope, _branch_slopes(speed, magnitude, 2 * faster[chosen] + (motion.velocity[chosen] > 0)))
 
 
-def _branch_slopes(speed: Array, magnitude: Array, branch: NDArray[np.intp]) -> list[Estimate]:
+def _branch_slopes(speed: Array, magnitude: Array, branch: Rows) -> list[Estimate]:
     """Slope of each branch of the loop, its interval from how the friction strays from a line along the speed."""
     slopes = []
     for number in range(4):
@@ -310,7 +306,7 @@ def _widened(slope: Estimate, branches: list[Estimate]) -> Estimate:
     return replace(slope, interval=wide, sd=half / NORMAL_95, status=status, checks=(*slope.checks, slopes))
 
 
-def _curve(friction: Array, motion: Motion, cycles: Cycles, label: NDArray[np.intp], bins: int) -> Curve:
+def _curve(friction: Array, motion: Motion, cycles: Cycles, label: Rows, bins: int) -> Curve:
     reach = min(cycles.peak * 1.05, float(np.abs(motion.velocity).max()))
     edges = np.linspace(-reach, reach, bins + 1)
     place = np.searchsorted(edges, motion.velocity, side="right") - 1

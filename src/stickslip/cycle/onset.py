@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from stickslip.arrays import Array
 from stickslip.balance.balance import ALONE, Balance
 from stickslip.balance.force import FUSIONS
 from stickslip.balance.motion import FORCES, is_measured
@@ -19,8 +19,6 @@ from stickslip.record.record import Record
 from stickslip.signals.noise import noise_level
 from stickslip.statistics import mean_of_cycles
 from stickslip.units import prefixed
-
-Array = NDArray[np.float64]
 
 GIVING = "presliding"
 SIDES = ((1, "forward"), (-1, "back"))

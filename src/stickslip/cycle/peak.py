@@ -7,9 +7,8 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from stickslip.arrays import Array
 
 NEAR = 0.8  # of the level, up to which the friction's rise is timed: from there on a filter rounds it
 TWICE = 2.0  # times the level, beyond which a cell that rings passes its level in a small part of its rise

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from stickslip.arrays import Array, Rows
 from stickslip.balance.motion import is_measured, require_fit
 from stickslip.errors import EstimateError
 from stickslip.estimate import Estimate, Result, Status
@@ -16,8 +16,6 @@ from stickslip.signals.interpolate import without_delays
 from stickslip.signals.noise import noise_level
 from stickslip.statistics import FEW_INDEPENDENT, LeastSquares, least_squares
 from stickslip.units import parse_value
-
-Array = NDArray[np.float64]
 
 SIGNALS = ("force", "load", "friction")
 LEAST = 200  # samples
@@ -276,7 +274,7 @@ def _answer(
     fit: LeastSquares,
     terms: list[str],
     force: Array,
-    rows: NDArray[np.intp],
+    rows: Rows,
     width: float,
     noisy: float,
 ) -> Regression:

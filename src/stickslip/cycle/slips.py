@@ -13,8 +13,8 @@ from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from stickslip.arrays import Array
 from stickslip.balance.motion import (
     AUDIBLE,
     CREEP,
@@ -32,8 +32,6 @@ from stickslip.record.record import Record
 from stickslip.signals.interpolate import without_delays
 from stickslip.signals.noise import noise_along
 from stickslip.statistics import FEW_CYCLES, mean_of_cycles, student
-
-Array = NDArray[np.float64]
 
 QUESTION = "the ringing after slip begins"
 SOON = 4  # after slip begins: a quarter of the stroke

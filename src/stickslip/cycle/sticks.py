@@ -8,18 +8,9 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
-from stickslip.balance.motion import (
-    AUDIBLE,
-    CREEP,
-    Cycles,
-    Motion,
-    contact_motion,
-    find_cycles,
-    motion_channels,
-    stretches,
-)
+from stickslip.arrays import Array, Mask, stretches
+from stickslip.balance.motion import AUDIBLE, CREEP, Cycles, Motion, contact_motion, find_cycles, motion_channels
 from stickslip.cycle.holds import Hold, fused_holds
 from stickslip.errors import EstimateError
 from stickslip.estimate import NORMAL_95, Estimate, Result
@@ -27,8 +18,6 @@ from stickslip.record.record import Record, require_record
 from stickslip.signals.interpolate import without_delays
 from stickslip.statistics import mean_of_cycles
 from stickslip.units import parse_value
-
-Array = NDArray[np.float64]
 
 QUESTION = "sticks and slips"
 METHODS = ("fusion", "speed")
@@ -240,7 +229,7 @@ def _words(speed: float, motion: Motion) -> str:
     return f"{1e3 * speed:.3g} mm/s" if motion.unit == "m" else f"{speed:.3g} rad/s"
 
 
-def _stuck(motion: Motion, limit: float) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+def _stuck(motion: Motion, limit: float) -> tuple[Mask, Mask]:
     """Where the contact sticks; and where it still does if each slip's speed is carried on to zero."""
     speed = np.abs(motion.velocity)
     size = len(speed)
@@ -269,9 +258,7 @@ def _stuck(motion: Motion, limit: float) -> tuple[NDArray[np.bool_], NDArray[np.
     return stuck, certain
 
 
-def _share(
-    stuck: NDArray[np.bool_], certain: NDArray[np.bool_], cycles: Cycles, rule: str, stated: tuple[str, ...]
-) -> Estimate:
+def _share(stuck: Mask, certain: Mask, cycles: Cycles, rule: str, stated: tuple[str, ...]) -> Estimate:
     name = "stuck share of the time"
     above, below = (
         mean_of_cycles(name, _per_cycle(part, cycles), unit="1", method=f"mean of cycles; {rule}", checks=stated)
@@ -282,7 +269,7 @@ def _share(
     return Estimate(name, above.value, (low, high), sd, "1", above.method, above.status, above.checks)
 
 
-def _per_cycle(stuck: NDArray[np.bool_], cycles: Cycles) -> Array:
+def _per_cycle(stuck: Mask, cycles: Cycles) -> Array:
     """Share of each cycle in which `stuck` holds; a sample counts for the time around it."""
     total = np.concatenate([[0.0], np.cumsum(stuck)])
     at = np.interp(cycles.edges + 0.5, np.arange(len(total)), total)
@@ -295,7 +282,7 @@ def _counted(sticks: Sequence[StickEvent], cycles: Cycles, motion: Motion) -> Ar
     return counts.astype(float)
 
 
-def _events(stuck: NDArray[np.bool_], certain: NDArray[np.bool_], motion: Motion) -> tuple[StickEvent, ...]:
+def _events(stuck: Mask, certain: Mask, motion: Motion) -> tuple[StickEvent, ...]:
     """Sticks and slips by speed; a stick begins between where the speed is low and where it would reach zero."""
     turns = np.flatnonzero(np.diff(stuck)) + 1
     edges = np.concatenate([[0], turns, [len(stuck)]])
@@ -321,9 +308,7 @@ def _events(stuck: NDArray[np.bool_], certain: NDArray[np.bool_], motion: Motion
 # ---- from the holds of the contact
 
 
-def _events_of(
-    holds: tuple[Hold, ...], stuck: NDArray[np.bool_], motion: Motion, fast: float
-) -> tuple[StickEvent, ...]:
+def _events_of(holds: tuple[Hold, ...], stuck: Mask, motion: Motion, fast: float) -> tuple[StickEvent, ...]:
     """Sticks, the micro-slips within them, short holds and slips, in turn; a slip is micro where it never gets fast."""
 
     def rows(begin: float, end: float) -> slice:

@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from stickslip.arrays import Array, Rows
 from stickslip.balance.motion import (
     Cycles,
     Motion,
@@ -28,8 +28,6 @@ from stickslip.record.record import Record, require_record
 from stickslip.signals.interpolate import without_delays
 from stickslip.signals.noise import noise_level
 from stickslip.statistics import FEW_CYCLES, correlation_time, mean_of_cycles, student
-
-Array = NDArray[np.float64]
 
 QUESTION = "the coefficient of friction"
 PLACES, ROWS = 64, 400  # of the map: along the stroke, and groups of cycles
@@ -227,7 +225,7 @@ def _called(name: str) -> str:
     return f"coefficient of friction, {name.replace('_', ' ')}"
 
 
-def _load(record: Record, normal: Constant | None, label: NDArray[np.intp]) -> tuple[Estimate, Array]:
+def _load(record: Record, normal: Constant | None, label: Rows) -> tuple[Estimate, Array]:
     """The load, and that of every cycle."""
     count = int(label.max()) + 1
     if "normal" in record and normal is None:
@@ -251,7 +249,7 @@ def _load(record: Record, normal: Constant | None, label: NDArray[np.intp]) -> t
     return load, loads
 
 
-def _forces(friction: Array, motion: Motion, cycles: Cycles, label: NDArray[np.intp]) -> dict[str, Array]:
+def _forces(friction: Array, motion: Motion, cycles: Cycles, label: Rows) -> dict[str, Array]:
     """The friction of every cycle by each definition [N]."""
     count = len(cycles.edges) - 1
     means = []
@@ -271,16 +269,14 @@ def _forces(friction: Array, motion: Motion, cycles: Cycles, label: NDArray[np.i
     }
 
 
-def _levels(friction: Array, motion: Motion, cycles: Cycles, label: NDArray[np.intp]) -> tuple[Array, Array]:
+def _levels(friction: Array, motion: Motion, cycles: Cycles, label: Rows) -> tuple[Array, Array]:
     """The median of the friction of every cycle while it slides, forward and back [N]."""
     slides, count = sliding_parts(motion, cycles) & (label >= 0), len(cycles.edges) - 1
     forward, back = (levels_of(sign, friction, motion, slides, label, count) for sign in (1.0, -1.0))
     return forward, back
 
 
-def _under_mean_load(
-    friction: Array, normal: Array, loads: Array, label: NDArray[np.intp], levels: tuple[Array, Array]
-) -> Array:
+def _under_mean_load(friction: Array, normal: Array, loads: Array, label: Rows, levels: tuple[Array, Array]) -> Array:
     """The friction as under the mean load of its cycle, wherever along the stroke it is pressed; its zero as it is."""
     zero = np.nan_to_num((levels[0] - levels[1]) / 2)[label]
     mean = loads[label]
@@ -288,7 +284,7 @@ def _under_mean_load(
     return np.where(label >= 0, moved, friction)
 
 
-def _refuse_magnitudes(friction: Array, forces: Mapping[str, Array], label: NDArray[np.intp]) -> None:
+def _refuse_magnitudes(friction: Array, forces: Mapping[str, Array], label: Rows) -> None:
     """Refuse a force without its sign: alike both ways, and near none at every turn, as an offset never lets it be."""
     size = float(np.nanmedian(forces["by_cycle"]))
     side = 1.0 if np.median(friction) >= 0 else -1.0
@@ -384,7 +380,7 @@ def _doubts(wear_in: WearIn | None, steady: int, count: int) -> list[Doubt]:
     return [Doubt(doubt, WEARING)]
 
 
-def _map(friction: Array, motion: Motion, label: NDArray[np.intp], loads: Array) -> tuple[Array, Array, Array, Array]:
+def _map(friction: Array, motion: Motion, label: Rows, loads: Array) -> tuple[Array, Array, Array, Array]:
     """Friction over load along the stroke, of groups of cycles (Belin and Martin, Wear 1992, call it triboscopy)."""
     group = max(1, math.ceil(len(loads) / ROWS))
     rows = math.ceil(len(loads) / group)

@@ -15,8 +15,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from stickslip.arrays import Array
 from stickslip.decay.candidates import ALWAYS, Fitted
 from stickslip.decay.choice import COLOURED, Candidate, lack_of_fit
 from stickslip.decay.motions import Restoring, free_decay
@@ -28,8 +28,6 @@ from stickslip.decay.which_motion import SWING, DecayMotion, choice_of, status_o
 from stickslip.errors import EstimateError
 from stickslip.estimate import Constant, Estimate, Result
 from stickslip.record.record import Step
-
-Array = NDArray[np.float64]
 
 BEYOND = f"swings beyond {SWING:g} rad are left out"
 SURE = 3.0  # standard deviations of the noise by which a bracket is widened

@@ -7,11 +7,9 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from stickslip.arrays import Array
 from stickslip.decay.motions import MOTIONS, PARAMETERS, WORN, Motion, Restoring, free_decay
-
-Array = NDArray[np.float64]
 
 ALWAYS = ("both", "static")  # candidates that are fitted whatever is asked for
 DRIFTS = (0.0, -0.01, 0.01)  # in a first amplitude, from which friction that wears is searched

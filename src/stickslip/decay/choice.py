@@ -8,8 +8,9 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from stickslip.arrays import Array
 from stickslip.decay.candidates import (
     ALWAYS,
     EXPONENT,
@@ -27,8 +28,6 @@ from stickslip.decay.motions import MOTIONS, Restoring
 from stickslip.errors import EstimateError
 from stickslip.estimate import NORMAL_95, Estimate
 from stickslip.statistics import mean_uncertainty, student
-
-Array = NDArray[np.float64]
 
 SIZE = 0.05  # of each candidate's test: how often a true one is rejected
 COLOURED = 0.01  # p-value of the best residual's whiteness below which its correlation counts

@@ -7,16 +7,14 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from stickslip.arrays import Array, Rows, stretches
 from stickslip.decay import extremes as ex
 from stickslip.decay.release import RingDown, find_releases, locate
 from stickslip.errors import EstimateError
 from stickslip.estimate import Estimate, Result, Status
 from stickslip.record.record import Record, require_record
 from stickslip.statistics import student, weighted_mean
-
-Array = NDArray[np.float64]
 
 LOCATIONS = ("fit", "sample")
 NEEDED = {"immune": 4, "plain": 3}  # extremes
@@ -50,7 +48,7 @@ class Bounds:
     """
 
     i: int
-    m: NDArray[np.intp]
+    m: Rows
     error: float
     rate: Array
     rate_first_order: Array
@@ -309,9 +307,7 @@ def _used(ring_down: RingDown, times: Array, values: Array, sd: Array, errors: A
     if ring_down.order > 0:  # a derivative is zero where the motion begins and ends
         keep[0] &= not ring_down.held
         keep[-1] &= not ring_down.stopped
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], keep, [False]]).astype(int)))
-    runs = list(zip(edges[::2], edges[1::2], strict=True))
-    first, last = max(runs, key=lambda run: run[1] - run[0], default=(0, 0))
+    first, last = max(zip(*stretches(keep), strict=True), key=lambda run: run[1] - run[0], default=(0, 0))
     return tuple(part[first:last] for part in (times, values, sd, errors))
 
 

@@ -11,15 +11,14 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from stickslip.arrays import Array
 from stickslip.decay.release import RingDown, find_releases
 from stickslip.errors import EstimateError
 from stickslip.estimate import Doubt, Estimate, Result, Status
 from stickslip.record.record import Record
 from stickslip.statistics import least_squares, student
-
-Array = NDArray[np.float64]
 
 FORMS = ("immune", "plain")  # equations 6.11 and 6.8
 LEAST = 5  # extremes

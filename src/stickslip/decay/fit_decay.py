@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from stickslip.arrays import Array
 from stickslip.decay.answer import (
     DecayFit,
     Release,
@@ -26,7 +27,6 @@ from stickslip.decay.noise import KINDS, find_noise
 from stickslip.decay.profile import last_swing
 from stickslip.decay.release import CLIPPED, LOST, Releases, RingDown, find_releases
 from stickslip.decay.start import Search, roughness, variance, weights
-from stickslip.decay.waveform import Array
 from stickslip.decay.which_motion import DecayMotion, motion_of, named, whichever
 from stickslip.errors import EstimateError
 from stickslip.estimate import Constant, Doubt, Estimate, Status

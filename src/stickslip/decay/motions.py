@@ -21,11 +21,11 @@ from dataclasses import dataclass
 from typing import Literal, get_args
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from stickslip.arrays import Array
 from stickslip.compiled import OPTIONS, compiled
 
-Array = NDArray[np.float64]
 Restoring = Literal["linear", "pendulum"]
 RESTORING: tuple[str, ...] = get_args(Restoring)
 

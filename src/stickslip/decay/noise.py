@@ -19,16 +19,14 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from stickslip.arrays import Array
 from stickslip.compiled import FAST, compiled
 from stickslip.decay.profile import log_determinant
 from stickslip.decay.profile import solve as cholesky
 from stickslip.decay.start import variance
 from stickslip.decay.waveform import Blocks, normal_equations, sample_motion
 from stickslip.errors import EstimateError
-
-Array = NDArray[np.float64]
 
 STEEPEST = 0.9  # damping ratio
 FINEST = 0.02  # of the step: less noise than this is not told from it

@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
+from stickslip.arrays import Array, Mask, Rows
 from stickslip.decay.start import SEEN, Run, Swings, bounds_of, free_decays
 from stickslip.errors import UNNAMED, EstimateError, RecordError
 from stickslip.estimate import Status
@@ -18,9 +18,6 @@ from stickslip.record.record import Record
 from stickslip.signals.interpolate import without_delays
 from stickslip.signals.noise import noise_level, quantisation_step
 from stickslip.signals.pieces import extreme
-
-Array = NDArray[np.float64]
-Rows = NDArray[np.intp]
 
 QUESTION = "free decay"
 ORDERS = {"x": 0, "theta": 0, "v": 1, "a": 2}  # derivative of the displacement that a channel is, in order of choice
@@ -101,7 +98,7 @@ class RingDown:
     noise: float
     step: float
     turns: Rows
-    sound: NDArray[np.bool_]
+    sound: Mask
     notes: tuple[str, ...] = ()
 
     @property
@@ -337,7 +334,7 @@ def _ring_down(
     swings: Swings,
     run: Run,
     noise_step: tuple[float, float],
-    unsound: NDArray[np.bool_],
+    unsound: Mask,
     bounds: tuple[int, int],
 ) -> RingDown:
     """One release: where its motion begins and ends, how far hold and tail reach beyond, and where it turns."""
@@ -460,7 +457,7 @@ def _flat_before(values: Array, start: int, half: float, noise: float) -> bool:
     return False
 
 
-def _notes(levels: Array, sound: NDArray[np.bool_], order: int, run: Run, noise: float, unit: str) -> tuple[str, ...]:
+def _notes(levels: Array, sound: Mask, order: int, run: Run, noise: float, unit: str) -> tuple[str, ...]:
     notes = []
     if not sound.all():
         notes.append(f"{int(np.sum(~sound))} extremes are clipped and left out")
@@ -524,7 +521,7 @@ def _half(ring_down: RingDown) -> float:
     return ring_down.fs / ring_down.frequency / 2
 
 
-def _window(ring_down: RingDown, turn: float) -> NDArray[np.intp]:
+def _window(ring_down: RingDown, turn: float) -> Rows:
     reach = max(2.0, WINDOW / math.pi * _half(ring_down))
     return np.arange(max(0, math.ceil(turn - reach)), min(len(ring_down.samples), math.floor(turn + reach) + 1))
 

@@ -13,11 +13,11 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
+from stickslip.arrays import Array, Mask, stretches
 from stickslip.compiled import FAST, compiled
 from stickslip.decay.profile import intervals, over_half_cycles, solve
-from stickslip.decay.waveform import AMPLITUDE, DAMPING, DRY, RATE, RELEASE, REST, Array, Blocks, normal_equations
+from stickslip.decay.waveform import AMPLITUDE, DAMPING, DRY, RATE, RELEASE, REST, Blocks, normal_equations
 from stickslip.errors import EstimateError
 from stickslip.signals.pieces import crossings, turning_points
 from stickslip.statistics import student
@@ -347,13 +347,13 @@ def _paced(swings: Swings) -> list[tuple[int, int]]:
     return [*chains, (first, len(swings.middles))]
 
 
-def _refuse_growth(sizes: Array, grown: NDArray[np.bool_], swings: Swings) -> None:
+def _refuse_growth(sizes: Array, grown: Mask, swings: Swings) -> None:
     """Refuse a chain of swings that grows, beats or stays."""
     slowly = sizes[1:] > RISEN * sizes[:-1] + swings.seen / 2  # block means miss up to 0.9 % of a top
     rising = max((len(part) for part in "".join("r" if up else " " for up in slowly).split()), default=0)
     if len(sizes) >= 4 and (rising >= 3 or grown.sum() > len(sizes) / 3):
         top = int(np.argmax(sizes))
-        again = int(np.sum(np.diff(np.concatenate([[False], slowly]).astype(int)) == 1))
+        again = len(stretches(slowly)[0])
         if top > 0.8 * (len(sizes) - 1) and sizes[0] < 0.9 * sizes[top]:
             raise EstimateError(
                 f"the swings grow from {sizes[0]:.3g} to {sizes[top]:.3g}",

@@ -25,11 +25,9 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from stickslip.arrays import Array
 from stickslip.compiled import FAST, compiled
-
-Array = NDArray[np.float64]
 
 RATE, DAMPING, DRY, REST, AMPLITUDE, RELEASE = range(6)
 VALUE = 6  # the row of the value itself, after those of its derivatives

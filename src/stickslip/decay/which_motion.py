@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 from types import MappingProxyType
 
 import numpy as np
-from numpy.typing import NDArray
 
+from stickslip.arrays import Array
 from stickslip.decay.candidates import ALWAYS, Fitted
 from stickslip.decay.choice import Candidate, Choice, choose, choose_fitted, interval_of, kept_by_all
 from stickslip.decay.motions import MOTIONS, RESTORING, Restoring
@@ -18,8 +18,6 @@ from stickslip.decay.start import BLOCKS
 from stickslip.errors import EstimateError
 from stickslip.estimate import NORMAL_95, Estimate, Result, Status
 from stickslip.record.record import Record
-
-Array = NDArray[np.float64]
 
 PLAIN = {"viscous", "dry", "both", "static"}  # motions that viscous and dry friction together hold
 SWING = 2.5  # rad, above which a pendulum lingers near its top and its phase can not be held

@@ -10,8 +10,9 @@ from itertools import pairwise
 from typing import Any, Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from stickslip.arrays import Array
 from stickslip.errors import ModelError
 from stickslip.parameters import finite, parameter, parametric
 
@@ -59,7 +60,7 @@ class Motion:
     base: Row = field(default_factory=dict)
     face: Row = field(default_factory=dict)
     imposed: Row = field(default_factory=dict)
-    knots: NDArray[np.float64] | None = None
+    knots: Array | None = None
     knotted: tuple[str, ...] = ()
     end: float = math.inf
 
@@ -502,7 +503,7 @@ class Recorded:
         coarse = self._curve(known.astype(np.float64), values[known])(np.arange(known[-1] + 1))
         return float(np.max(np.abs(coarse - values[: known[-1] + 1])) / (2.0 ** (degree + 1) - 1))
 
-    def _curve(self, times: NDArray[np.float64], values: NDArray[np.float64]) -> Any:
+    def _curve(self, times: Array, values: Array) -> Any:
         """The pieces as a function of time, and what its derivatives are."""
         from scipy.interpolate import CubicSpline, make_interp_spline
 
@@ -540,7 +541,7 @@ def _require_increasing(times: Sequence[float], count: int) -> None:
     )
 
 
-def _pieces(times: NDArray[np.float64], columns: Sequence[ArrayLike], on: str, *, end: float = math.inf) -> Motion:
+def _pieces(times: Array, columns: Sequence[ArrayLike], on: str, *, end: float = math.inf) -> Motion:
     """A drive of polynomials, whose value and derivatives are set anew at each instant."""
     names = tuple(f"z{j}" for j in range(len(columns)))
     knots = np.column_stack([times, *columns])

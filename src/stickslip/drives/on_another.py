@@ -9,8 +9,8 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from stickslip.arrays import Array
 from stickslip.drives.kinds import Drive, Motion, Row, check_frequency, common_period, require, require_drive
 from stickslip.errors import ModelError
 from stickslip.parameters import parameter, parametric
@@ -244,7 +244,7 @@ def _numbered(motion: Motion, axis: int) -> Motion:
 def _moved(rates: Mapping[str, Row], start: Mapping[str, float], time: float) -> dict[str, float]:
     """Signals after a time [s]."""
     names: Sequence[str] = ["1", *start]
-    flow: NDArray[np.float64] = np.array([[rates.get(name, {}).get(other, 0.0) for other in names] for name in names])
+    flow: Array = np.array([[rates.get(name, {}).get(other, 0.0) for other in names] for name in names])
     values = np.array([1.0, *start.values()])
     term, result = values, values.copy()
     if not np.any(np.linalg.matrix_power(flow, len(names))):  # powers of time end: the sum is exact

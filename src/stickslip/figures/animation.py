@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from stickslip.arrays import Array
 from stickslip.errors import ModelError, RecordError
 from stickslip.figures.style import (
     BLUE,
@@ -20,7 +21,6 @@ from stickslip.figures.style import (
     ORANGE,
     PURPLE,
     SKY,
-    Array,
     axis_label,
     legend_above,
     prefixed,

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from stickslip.arrays import Array
 from stickslip.balance.motion import contact_motion
 from stickslip.figures.style import (
     BARS,
@@ -16,7 +17,6 @@ from stickslip.figures.style import (
     INK,
     ORANGE,
     SHADE,
-    Array,
     Plate,
     axes_of,
     axis_label,

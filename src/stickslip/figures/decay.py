@@ -7,8 +7,8 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from stickslip.arrays import Array
 from stickslip.decay import extremes as ex
 from stickslip.figures.style import (
     BLUE,
@@ -39,7 +39,6 @@ if TYPE_CHECKING:
     from stickslip.decay.decrement import Decrement
     from stickslip.decay.release import RingDown
 
-Array = NDArray[np.float64]
 
 WORDS = {"x": "displacement", "theta": "angle", "v": "velocity", "a": "acceleration"}
 MARGIN = 0.04  # of the motion's length, shown before and after it

@@ -8,8 +8,8 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from stickslip.arrays import Array
 from stickslip.figures.style import (
     BLUE,
     FAINT,
@@ -40,7 +40,6 @@ if TYPE_CHECKING:
     from stickslip.cycle.joint import JointFriction
     from stickslip.cycle.joint_logs import JointPrediction
 
-Array = NDArray[np.float64]
 WORDS = {
     "x": ("displacement", "m"), "v": ("velocity", "m/s"), "a": ("acceleration", "m/s^2"), "load": ("load cell", "N"),
     "friction": ("friction", "N"),

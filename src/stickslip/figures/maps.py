@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from stickslip.arrays import Array
 from stickslip.consistent.sliding_balance import Slider
 from stickslip.contact.ringing import UNTOLD
 from stickslip.drives.kinds import HarmonicBase, HarmonicForce
@@ -19,7 +20,6 @@ from stickslip.figures.style import (
     INK,
     ORANGE,
     SHADE,
-    Array,
     Plate,
     axes_of,
     axis_label,

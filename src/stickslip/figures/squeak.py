@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from stickslip.arrays import Array
 from stickslip.estimate import decimals
 from stickslip.figures.contact import plot_displacement_loop, plot_velocity_loop
 from stickslip.figures.style import (
@@ -20,7 +21,6 @@ from stickslip.figures.style import (
     INK,
     ORANGE,
     PURPLE,
-    Array,
     Plate,
     axis_label,
     captioned,

@@ -15,8 +15,8 @@ from importlib.resources import files
 from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from stickslip.arrays import Array, Rows
 from stickslip.errors import StickslipError
 from stickslip.estimate import Estimate
 from stickslip.units import prefixed as prefixed
@@ -27,7 +27,6 @@ if TYPE_CHECKING:
     from matplotlib.axis import Axis
     from matplotlib.figure import Figure
 
-Array = NDArray[np.float64]
 Arguments = ParamSpec("Arguments")
 Drawn = TypeVar("Drawn")
 
@@ -175,7 +174,7 @@ def envelope(time: Array, values: Array, columns: int = COLUMNS) -> tuple[Array,
     return np.repeat(time[edges], 2), np.column_stack([low, high]).ravel()
 
 
-def thinned(count: int, limit: int) -> NDArray[np.intp]:
+def thinned(count: int, limit: int) -> Rows:
     """At most `limit` indices spread evenly over `count`."""
     return np.unique(np.linspace(0, count - 1, min(count, limit)).astype(np.intp))
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
+from stickslip.arrays import Array
 from stickslip.balance.motion import is_measured
 from stickslip.figures.style import (
     BLUE,
@@ -17,7 +18,6 @@ from stickslip.figures.style import (
     PURPLE,
     SHADE,
     SKY,
-    Array,
     axes_of,
     axis_label,
     empty_figure,

@@ -8,8 +8,9 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from stickslip import arrays
+from stickslip.arrays import Array, Mask
 from stickslip.figures.style import (
     BLUE,
     FAINT,
@@ -19,7 +20,6 @@ from stickslip.figures.style import (
     PURPLE,
     SHADE,
     SKY,
-    Array,
     Plate,
     axes_of,
     axis_label,
@@ -322,7 +322,7 @@ def _portrait(run: Trajectory, across: Quantity, up: Quantity, ax: Axes, contact
     return ax
 
 
-def _middles(shown: NDArray[np.bool_]) -> list[int]:
+def _middles(shown: Mask) -> list[int]:
     """The middle of each unbroken row of True."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], shown, [False]]).astype(int)))
-    return [int(middle) for middle in (edges[::2] + edges[1::2] - 1) // 2]
+    begins, ends = arrays.stretches(shown)
+    return [int(middle) for middle in (begins + ends - 1) // 2]

@@ -12,8 +12,9 @@ from typing import Any
 
 import numpy as np
 
+from stickslip.arrays import Array
 from stickslip.errors import FormatError
-from stickslip.files.table import FREE, Array, Block, Column, Options, Table, optional, reading
+from stickslip.files.table import FREE, Block, Column, Options, Table, optional, reading
 from stickslip.record.metadata import KEY, parse_metadata
 
 NAME = "HDF5"

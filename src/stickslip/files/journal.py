@@ -17,6 +17,7 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from stickslip.arrays import Array, Index
 from stickslip.errors import FormatError
 from stickslip.files.table import Block, Column, Options, Table
 from stickslip.record.metadata import parse_metadata, units_of
@@ -162,10 +163,10 @@ class _Reader(NamedTuple):
     path: Path
     names: tuple[str, ...]
     kind: np.dtype[Any]
-    scales: NDArray[np.float64]
+    scales: Array
     data: Sequence[Frame]
-    firsts: NDArray[np.int64]
-    counts: NDArray[np.int64]
+    firsts: Index
+    counts: Index
     fs: float
     start: float
 
@@ -191,7 +192,7 @@ class _Reader(NamedTuple):
                 yield {name: rows[:, places[name]].copy() if name in places else time for name in names}
 
 
-def _layout(path: Path, about: Mapping[str, Any]) -> tuple[np.dtype[Any], NDArray[np.float64]]:
+def _layout(path: Path, about: Mapping[str, Any]) -> tuple[np.dtype[Any], Array]:
     """The type of the numbers and what one is worth in each channel."""
     try:
         kind, scales = str(about["type"]), np.array(about["scales"], dtype=np.float64)

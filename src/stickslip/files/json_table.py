@@ -10,15 +10,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from stickslip.arrays import Array
 from stickslip.errors import FormatError
 from stickslip.files.table import Budget, Column, Options, Table, slices, unique
 
 NAME = "JSON"
 SUFFIXES = (".json",)
-
-Array = NDArray[np.float64]
 
 
 def recognise(path: Path, head: bytes) -> bool:

@@ -12,10 +12,11 @@ from typing import Any, BinaryIO
 
 import numpy as np
 
+from stickslip.arrays import Array
 from stickslip.errors import FormatError
 from stickslip.files import hdf5
 from stickslip.files.select import path_parts
-from stickslip.files.table import Array, Budget, Column, Options, Table, optional, reading, slices
+from stickslip.files.table import Budget, Column, Options, Table, optional, reading, slices
 
 MATRIX, COMPRESSED = 14, 15
 BYTES = {1: 1, 2: 1, 3: 2, 4: 2, 5: 4, 6: 4, 7: 4, 9: 8, 12: 8, 13: 8, 16: 1, 17: 2, 18: 4}  # of integers, floats, text

@@ -9,8 +9,9 @@ from typing import Any
 
 import numpy as np
 
+from stickslip.arrays import Array
 from stickslip.errors import FormatError
-from stickslip.files.table import LISTED, Array, Block, Column, Options, Table, optional, reading
+from stickslip.files.table import LISTED, Block, Column, Options, Table, optional, reading
 from stickslip.record.metadata import KEY, parse_metadata
 
 NAME = "Parquet"

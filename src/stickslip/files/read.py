@@ -13,8 +13,8 @@ from types import ModuleType
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from stickslip.arrays import Array
 from stickslip.errors import NO_RATE, FormatError, RecordError
 from stickslip.files.select import Columns, Source, TimeColumn, Wanted, titled
 from stickslip.files.table import FREE, Block, Budget, Options, supplied
@@ -32,7 +32,6 @@ FORMATS = (
 )  # fmt: skip
 
 HEAD = 1 << 16  # bytes shown to `recognise`
-Array = NDArray[np.float64]
 
 ROWS_AT_ONCE = 1_000_000  # of a few columns; of many so many fewer that a block stays within what any file may become
 

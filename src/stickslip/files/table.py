@@ -11,11 +11,10 @@ from types import ModuleType
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from stickslip.arrays import Array
 from stickslip.errors import FormatError, StickslipError
 
-Array = NDArray[np.float64]
 Block = dict[str, Array]
 
 

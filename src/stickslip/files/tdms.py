@@ -13,8 +13,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from stickslip.arrays import Array
 from stickslip.errors import FormatError
-from stickslip.files.table import Array, Block, Column, Options, Table, optional, reading, unique
+from stickslip.files.table import Block, Column, Options, Table, optional, reading, unique
 
 NAME = "TDMS"
 SUFFIXES = (".tdms",)

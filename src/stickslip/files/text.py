@@ -12,8 +12,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO
 
 import numpy as np
-from numpy.typing import NDArray
 
+from stickslip.arrays import Array
 from stickslip.errors import MISSTATED, FormatError
 from stickslip.files.table import FREE, Block, Column, Options, Table
 from stickslip.record.metadata import read_beside
@@ -130,7 +130,6 @@ def _digits(cell: str) -> int:
 NAME = "text"
 SUFFIXES = (".csv", ".txt", ".tsv", ".dat", ".asc", ".prn", ".log", ".out")
 
-Array = NDArray[np.float64]
 
 HEAD = 1 << 18  # bytes looked at to find the layout
 LONGEST_ROW = 1 << 24  # bytes; the parser holds a whole row, and a disk that was full leaves holes of any length

@@ -11,8 +11,9 @@ from typing import Any
 
 import numpy as np
 
+from stickslip.arrays import Array
 from stickslip.errors import FormatError, RecordError
-from stickslip.files.table import Array, Budget, Column, Options, Table, optional, reading, slices, unique
+from stickslip.files.table import Budget, Column, Options, Table, optional, reading, slices, unique
 from stickslip.record.clock import roundest
 from stickslip.units import parse_unit
 

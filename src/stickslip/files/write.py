@@ -10,9 +10,7 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
+from stickslip.arrays import Array
 from stickslip.errors import FormatError, ModelError
 from stickslip.files.table import Table, optional
 from stickslip.record.metadata import (
@@ -30,8 +28,6 @@ from stickslip.record.metadata import (
 )
 from stickslip.record.record import Record, require_record
 from stickslip.whole import whole_file
-
-Array = NDArray[np.float64]
 
 ROWS_AT_ONCE = 200_000
 SLACK = 1 << 17  # bytes that HDF5 takes beside the samples and their description

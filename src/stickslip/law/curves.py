@@ -10,8 +10,8 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
+from stickslip.arrays import Array
 from stickslip.compiled import FAST, compiled
 from stickslip.errors import EstimateError
 from stickslip.estimate import Estimate
@@ -22,8 +22,6 @@ from stickslip.laws.lugre import Dahl
 from stickslip.laws.series import ElastoSlip
 from stickslip.laws.state_variable import RateState
 from stickslip.laws.stribeck import Stribeck, Tabulated
-
-Array = NDArray[np.float64]
 
 EXPONENTS = (0.5, 1.0, 2.0)  # of Stribeck's curve, to begin with
 SPEEDS = 12  # Stribeck speeds to begin with, from the slowest sliding to the fastest

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from stickslip.arrays import Array, Mask, Rows
 from stickslip.balance.motion import (
     AUDIBLE,
     CREEP,
@@ -27,8 +27,6 @@ from stickslip.signals.derivatives import smooth
 from stickslip.signals.interpolate import without_delays
 from stickslip.signals.noise import noise_level
 from stickslip.units import prefixed
-
-Array = NDArray[np.float64]
 
 BLOCKS = 200  # of a cycle, or of a motion without one, whose residuals are told apart
 LEAST = 50  # samples
@@ -77,8 +75,8 @@ class Samples:
     displacement: Array
     velocity: Array
     friction: Array
-    cycle: NDArray[np.intp]
-    block: NDArray[np.intp]
+    cycle: Rows
+    block: Rows
     cycles: int
     noise: float
     unit: str
@@ -91,7 +89,7 @@ class Samples:
         """Those that a curve is held against."""
         return replace(self.rows(slice(self.skipped, None)), skipped=0)
 
-    def rows(self, chosen: NDArray[np.bool_] | NDArray[np.intp] | slice) -> Samples:
+    def rows(self, chosen: Mask | Rows | slice) -> Samples:
         """Some of the samples."""
         arrays = ("time", "displacement", "velocity", "friction", "cycle", "block")
         return replace(self, **{name: getattr(self, name)[chosen] for name in arrays})

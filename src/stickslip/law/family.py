@@ -11,16 +11,15 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from stickslip.arrays import Array, Rows
 from stickslip.errors import EstimateError
 from stickslip.estimate import Estimate
 from stickslip.law.data import BLOCKS, Samples
 from stickslip.laws.base import Law
 from stickslip.laws.curved import CurvedLaw
 from stickslip.statistics import FEW_CYCLES, INSEPARABLE, correlation_time, mean_uncertainty, student
-
-Array = NDArray[np.float64]
 
 SETTLED = 1e-8  # of a parameter: far below what any record tells
 MOST = 60  # steps: more are taken along a valley that has no lowest point
@@ -265,7 +264,7 @@ def model_error(residual: Array, samples: Samples) -> float:
     return math.sqrt(max(0.0, float(repeats)))
 
 
-def _of_parts(influence: Array, part: NDArray[np.intp]) -> tuple[float, float]:
+def _of_parts(influence: Array, part: Rows) -> tuple[float, float]:
     sums = np.bincount(part, influence)[np.bincount(part) > 0]
     return mean_uncertainty(len(sums) * sums)
 

@@ -9,8 +9,8 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from stickslip.arrays import Array
 from stickslip.cycle.loops import LEAST_SPREAD, Loops
 from stickslip.errors import EstimateError, ModelError
 from stickslip.estimate import NORMAL_95, Estimate, Result, Status
@@ -24,8 +24,6 @@ from stickslip.record.record import Record
 from stickslip.settings import nearest
 from stickslip.statistics import student
 from stickslip.units import parse_value
-
-Array = NDArray[np.float64]
 
 LEAVES = 0.3  # of the friction's norm: more than that is worth a word
 MISSES = 0.1  # of the friction that is missed beyond noise and scatter, from which on it does not follow the curve

@@ -8,8 +8,8 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from stickslip.arrays import Array, Mask
 from stickslip.errors import ModelError
 from stickslip.estimate import Doubt, Estimate, Result, Status, doubts_of
 from stickslip.law.search import (
@@ -37,8 +37,6 @@ from stickslip.oscillator import Oscillator
 from stickslip.parameters import named
 from stickslip.parameters import unit as unit_of
 from stickslip.statistics import mean_uncertainty, student
-
-Array = NDArray[np.float64]
 
 REMAINDER = "remainder"  # the kind of doubt where a law leaves more than noise
 MISFIT = 1.2  # times its noise that a law may leave of any channel and yet explain it: readings alone stray by 1 or 2 %
@@ -353,9 +351,7 @@ def surety(problem: Problem, point: Point, tell: Callable[[], None]) -> Surety:
     return Surety(sd, freedom, ends, correlations)
 
 
-def _sandwich(
-    problem: Problem, point: Point, slopes: Sequence[Slopes]
-) -> tuple[Array, Array, Array, NDArray[np.bool_]]:
+def _sandwich(problem: Problem, point: Point, slopes: Sequence[Slopes]) -> tuple[Array, Array, Array, Mask]:
     left = without_starts(slopes)
     normal = sum((a.T @ a for a in left), np.zeros((left[0].shape[1],) * 2))
     scale = np.sqrt(np.maximum(np.diag(normal), 1e-300))

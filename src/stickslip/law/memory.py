@@ -7,8 +7,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from stickslip.arrays import Array, Rows
 from stickslip.balance.motion import CREEP
 from stickslip.errors import EstimateError
 from stickslip.estimate import NORMAL_95, Estimate, Result, Status
@@ -17,8 +17,6 @@ from stickslip.law.data import Samples, samples_of
 from stickslip.law.family import minimise
 from stickslip.record.record import Record
 from stickslip.statistics import mean_of_cycles
-
-Array = NDArray[np.float64]
 
 LEAST_PHASE = 0.005  # rad: what smoothing leaves of a phase
 POINTS = 2000  # of a mean cycle, at most
@@ -202,7 +200,7 @@ def _loop(samples: Samples) -> _Loop:
     return _Loop(_at_least(phase, least), 1 / length, displacement.mean(axis=0), mean, way.mean(axis=0))
 
 
-def _folded(values: Array, starts: NDArray[np.intp], ends: NDArray[np.intp], points: int) -> Array:
+def _folded(values: Array, starts: Rows, ends: Rows, points: int) -> Array:
     """Means over equal parts of each cycle (m, points): a jump inside a part keeps its place."""
     summed = np.concatenate([[0.0], np.cumsum(values)])
     edges = np.linspace(starts, ends, points + 1, axis=1)

@@ -9,8 +9,8 @@ from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from stickslip.arrays import Array, Index
 from stickslip.errors import ModelError
 from stickslip.law.stretch import DRIVES, Motion, Sampled, Sensor, Stretch, attempted, remembered
 from stickslip.laws.rough import RoughSurface
@@ -18,7 +18,6 @@ from stickslip.oscillator import Oscillator
 from stickslip.solve.sensitivity import sensitivity
 from stickslip.solve.trajectory import Trajectory
 
-Array = NDArray[np.float64]
 Start = Mapping[str, float | str]
 
 STEP = 1e-5  # of a coordinate, of which one is a natural change of the parameter
@@ -107,7 +106,7 @@ class Point:
     u: Array
     starts: tuple[Array, ...]
     raw: tuple[tuple[Array, ...], ...]
-    pieces: tuple[tuple[NDArray[np.int64] | None, ...], ...]
+    pieces: tuple[tuple[Index | None, ...], ...]
     runs: tuple[Trajectory, ...]
     residuals: tuple[Array, ...]
     chi2: float

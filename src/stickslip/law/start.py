@@ -9,8 +9,8 @@ from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from stickslip.arrays import Array, Rows
 from stickslip.errors import UNNAMED, EstimateError, ModelError, RecordError
 from stickslip.law.search import ABOVE, OF_MOUNTS, OF_SENSORS, Knob, Point, Problem, Profile, descend
 from stickslip.law.stretch import DriveFrom, Sensor, Stretch, as_driven, driving, measured_drive
@@ -21,8 +21,6 @@ from stickslip.settings import nearest
 from stickslip.signals.derivatives import LEAST, differentiate
 from stickslip.signals.noise import noise_level, quantisation_step
 from stickslip.solve.tables import require_oscillator
-
-Array = NDArray[np.float64]
 
 FAST = 0.5  # of the largest speed: then the contact slides for certain
 TURNED = 0.1  # of the largest speed, beyond which a motion has turned
@@ -95,14 +93,14 @@ class Shown:
         cut = max(1, int(EDGE * len(self.velocity)))
         return float(np.abs(self.velocity[cut:-cut]).max())
 
-    def slides(self) -> NDArray[np.intp]:
+    def slides(self) -> Rows:
         """Rows in which the mass moves fast, away from the ends."""
         cut = max(1, int(EDGE * len(self.velocity)))
         rows = np.flatnonzero(np.abs(self.velocity) > FAST * self.fastest)
         return rows[(rows >= cut) & (rows < len(self.velocity) - cut)]
 
     @property
-    def turns(self) -> NDArray[np.intp]:
+    def turns(self) -> Rows:
         """Rows at which the motion has turned."""
         return _turns(self.velocity, self.fastest)
 
@@ -156,7 +154,7 @@ def too_few(shown: Sequence[Shown], count: int) -> str:
     return f"{many} for {count} parameters: give a record of more cycles"
 
 
-def _turns(velocity: Array, fastest: float) -> NDArray[np.intp]:
+def _turns(velocity: Array, fastest: float) -> Rows:
     moving = np.flatnonzero(np.abs(velocity) > TURNED * fastest)
     return np.asarray(moving[1:][np.diff(np.sign(velocity[moving])) != 0])
 

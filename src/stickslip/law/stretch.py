@@ -12,8 +12,9 @@ from functools import cached_property
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from stickslip.arrays import Array, Index
 from stickslip.drives.kinds import Belt, Drive, HarmonicBase, MultiTone, Recorded, Release
 from stickslip.errors import EstimateError, ModelError, SolveError
 from stickslip.laws.coulomb import Coulomb
@@ -26,8 +27,6 @@ from stickslip.signals.response import Response, leak, resonance, respond
 from stickslip.solve.sensitivity import Sensitivity
 from stickslip.solve.simulate import simulate
 from stickslip.solve.trajectory import Trajectory
-
-Array = NDArray[np.float64]
 
 DRIVES = {"z": "base", "force": "force"}  # channels of what moves the mass, and what each moves
 HARMONICS = 5
@@ -289,9 +288,9 @@ class Motion:
 
     def __init__(self, run: Trajectory, outputs: tuple[str, ...]) -> None:
         self.run, self.outputs, self.breaks = run, outputs, run.starts
-        self.known: dict[bytes, tuple[dict[str, Array], NDArray[np.int64]]] = {}
+        self.known: dict[bytes, tuple[dict[str, Array], Index]] = {}
 
-    def __call__(self, at: Array) -> tuple[dict[str, Array], NDArray[np.int64]]:
+    def __call__(self, at: Array) -> tuple[dict[str, Array], Index]:
         """Values by name, and the piece that each instant falls in."""
         key = at.tobytes()
         if key not in self.known:
@@ -352,7 +351,7 @@ class Sensor:
         sizes = np.abs(np.diag(triangle))
         return np.asarray(known[:, sizes > 1e-6 * sizes[0]])
 
-    def predicted(self, run: Motion, late: float) -> tuple[Array, NDArray[np.int64] | None]:
+    def predicted(self, run: Motion, late: float) -> tuple[Array, Index | None]:
         """What it would read of a run, but for its gain and what is `known`; `late` [s] beyond the stated delay.
 
         Of what may jump from one sample to the next, also the piece of the run that each sample falls in.
@@ -441,7 +440,7 @@ class Stretch:
         """The oscillator under the stretch's drive, which is `off`."""
         return replace(oscillator, drive=self.drive(self.span[0], self.span[0] + self.end, off))
 
-    def told(self, run: Trajectory, delays: Mapping[str, float]) -> list[tuple[Array, NDArray[np.int64] | None]]:
+    def told(self, run: Trajectory, delays: Mapping[str, float]) -> list[tuple[Array, Index | None]]:
         """What each sensor would read of a run, as :meth:`Sensor.predicted`; `delays` [s] by channel."""
         motion = self.motion(run)
         return [sensor.predicted(motion, delays.get(sensor.channel.name, 0.0)) for sensor in self.sensors]

@@ -8,8 +8,8 @@ from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from stickslip.arrays import Array
 from stickslip.balance.force import friction_force
 from stickslip.drives.kinds import Release
 from stickslip.errors import EstimateError
@@ -22,7 +22,6 @@ from stickslip.laws.guessing import LEAST_EXCESS, STIFF, STIFFEST, Hypothesis, O
 from stickslip.oscillator import Oscillator
 from stickslip.record.record import Record
 
-Array = NDArray[np.float64]
 Left = dict[Key, Array]
 Tell = Callable[[], None]
 

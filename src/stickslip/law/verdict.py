@@ -8,8 +8,8 @@ from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from stickslip.arrays import Array
 from stickslip.estimate import Doubt, Estimate, Result, Status
 from stickslip.law.data import told
 from stickslip.law.law import REMAINDER, LawFit, explained
@@ -18,7 +18,6 @@ from stickslip.oscillator import Oscillator
 from stickslip.record.record import Record, Step
 from stickslip.statistics import correlation_time
 
-Array = NDArray[np.float64]
 Key = tuple[str, int]
 """A channel, and the number of its record."""
 

@@ -8,7 +8,6 @@ from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from stickslip.errors import EstimateError, ModelError
 from stickslip.estimate import Doubt, Estimate
@@ -67,8 +66,6 @@ from stickslip.laws.rough import RoughSurface
 from stickslip.oscillator import Oscillator
 from stickslip.record.record import Record, require_record
 from stickslip.units import dimensions
-
-Array = NDArray[np.float64]
 
 STIFFEST = 1e-5  # of the stroke: what a contact gives way at least
 UNEVEN = 0.1  # of its mean, that a surface strays

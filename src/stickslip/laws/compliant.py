@@ -11,9 +11,10 @@ from typing import ClassVar
 
 import numpy as np
 
+from stickslip.arrays import Array
 from stickslip.laws.base import Exit, Mode, Row, static_level
 from stickslip.laws.coulomb import held_until
-from stickslip.laws.guessing import GRID, STIFFEST, Array, Family, Hypothesis, Observed, Searched, share
+from stickslip.laws.guessing import GRID, STIFFEST, Family, Hypothesis, Observed, Searched, share
 from stickslip.parameters import parameter, parametric
 
 HARDEST, SOFTEST = 3000.0, 3.0  # of a guess, against the spring that its friction bends over the stroke

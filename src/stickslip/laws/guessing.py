@@ -13,14 +13,12 @@ from dataclasses import MISSING, dataclass, fields
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from stickslip import laws
+from stickslip.arrays import Array
 from stickslip.errors import ModelError
 from stickslip.parameters import declaration
 from stickslip.units import dimensions
-
-Array = NDArray[np.float64]
 
 LEAST_EXCESS = 0.03  # of the static friction over the kinetic, at a start
 EXCESSES = (0.06, 0.2, 0.4)  # the misfit has several valleys over it: where else a search starts

@@ -11,6 +11,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from stickslip.arrays import Array
 from stickslip.laws import compliant
 from stickslip.laws.base import Row
 from stickslip.laws.curved import CurvedMode, Sliding, either_side, symbol
@@ -20,7 +21,6 @@ from stickslip.laws.guessing import (
     LITTLE,
     SPEEDS,
     STIFFEST,
-    Array,
     Family,
     Hypothesis,
     Observed,

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from stickslip.arrays import Array
 from stickslip.errors import ModelError
 from stickslip.laws.base import Exit, Mode, Row
 from stickslip.laws.compliant import CompliantContact
@@ -86,7 +86,7 @@ class RoughSurface:
             ).of("share")
 
     @cached_property
-    def knots(self) -> NDArray[np.float64]:
+    def knots(self) -> Array:
         """Places [m] and values of the profile (n, 2)."""
         cells = 2 * math.ceil(self.span / self.length) if self.values is None else len(self.values) - 1
         places = self.length * (np.arange(cells + 1) - cells / 2)
@@ -145,7 +145,7 @@ class RoughSurface:
             for mode in self.contact.modes()
         )
 
-    def _over(self, mode: Mode, cell: int, level: float, slope: float, edges: NDArray[np.float64]) -> Mode:
+    def _over(self, mode: Mode, cell: int, level: float, slope: float, edges: Array) -> Mode:
         """A mode over one cell, in which every force of the contact is multiplied by level + slope x."""
 
         def put(form: Row) -> dict[str, float]:

@@ -11,8 +11,9 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from stickslip.arrays import Array, Index
 from stickslip.errors import ModelError, SolveError
 from stickslip.estimate import Doubt, Estimate, Status
 from stickslip.oscillator import Structure
@@ -21,7 +22,7 @@ from stickslip.record.metadata import labelled_arrays
 from stickslip.solve.periodic import aperiodic, settled_on
 from stickslip.solve.poincare import SteadyState, Table, alike, extent, lap, tables
 from stickslip.solve.simulate import opening
-from stickslip.solve.tables import Array, System
+from stickslip.solve.tables import System
 from stickslip.solve.trajectory import Trajectory
 
 if TYPE_CHECKING:
@@ -61,7 +62,7 @@ class Basins:
     names: tuple[str, str]
     axes: tuple[Array, Array]
     attractors: tuple[Attractor, ...]
-    which: NDArray[np.int64]
+    which: Index
     shares: tuple[Estimate, ...]
     lost: tuple[str, ...]
 

@@ -11,12 +11,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from stickslip.arrays import Array
 from stickslip.errors import ModelError
 from stickslip.maps.basins import Attractor, Start, numbers, onward, require_number, require_period, same, settled
 from stickslip.parameters import find
 from stickslip.record.metadata import labelled_arrays
 from stickslip.solve.continuation import Branch, continue_orbit
-from stickslip.solve.tables import Array, System
+from stickslip.solve.tables import System
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from stickslip.arrays import Array, Mask
 from stickslip.errors import ModelError, SolveError
 from stickslip.maps.basins import Attractor, Start, numbers, require_number, require_period, settled
 from stickslip.maps.grid import START, read_grid, unit
@@ -22,7 +23,7 @@ from stickslip.maps.plan import required
 from stickslip.maps.sweep import NoSystem, require_memory, sweep
 from stickslip.parameters import find
 from stickslip.record.metadata import labelled_arrays
-from stickslip.solve.tables import Array, System
+from stickslip.solve.tables import System
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -351,7 +352,7 @@ class _Refinement:
             self.whole = False
         return self.whole
 
-    def _forget(self, places: NDArray[np.bool_]) -> None:
+    def _forget(self, places: Mask) -> None:
         for name, variable in self.kept.items():
             self.arrays[name][places] = variable.fill
 
@@ -386,13 +387,13 @@ def _require_borders(system: System, grid: Mapping[str, Sequence[float]], measur
             )
 
 
-def _finer(column: NDArray[np.float64], step: int) -> NDArray[np.float64]:
+def _finer(column: Array, step: int) -> Array:
     """Each interval cut into `step` equal parts."""
     places = np.arange((len(column) - 1) * step + 1) / step
     return np.interp(places, np.arange(len(column)), column)
 
 
-def _halved(arrays: dict[str, NDArray[Any]], step: int) -> NDArray[np.bool_]:
+def _halved(arrays: dict[str, NDArray[Any]], step: int) -> Mask:
     """The points between those known that lie between different neighbours; the others are filled in, axis by axis."""
     first = next(iter(arrays.values()))
     wanted = np.zeros(first.shape, dtype=bool)

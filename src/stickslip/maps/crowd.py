@@ -8,8 +8,8 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from stickslip.arrays import Array, Index
 from stickslip.errors import ModelError, SolveError
 from stickslip.maps import measures as log
 from stickslip.maps.grid import START
@@ -24,20 +24,9 @@ from stickslip.solve.kernel import scratch
 from stickslip.solve.phasors import phasors_of
 from stickslip.solve.poincare import derivative, lap, lyapunov, tables
 from stickslip.solve.simulate import simulate
-from stickslip.solve.tables import (
-    Array,
-    System,
-    Systems,
-    Tables,
-    by_value,
-    kind_of_drive,
-    kind_of_law,
-    opened,
-    oscillators,
-)
+from stickslip.solve.tables import System, Systems, Tables, by_value, kind_of_drive, kind_of_law, opened, oscillators
 from stickslip.solve.trajectory import Event, Trajectory
 
-Index = NDArray[np.int64]
 Watch = Callable[[Given, Counted, int, int], None]  # march what is given into what is left; modes and physical entries
 KINDS = {"stick": log.STICK, "microstick": log.MICROSTICK}
 PARTS = ("law", "drive")

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike
 
+from stickslip.arrays import Array
 from stickslip.contact.frequency_transition import Transition
 from stickslip.drives.kinds import Belt
 from stickslip.drives.on_another import Dithered
@@ -18,7 +19,7 @@ from stickslip.maps.basins import Start
 from stickslip.oscillator import Oscillator
 from stickslip.solve.poincare import tables
 from stickslip.solve.simulate import simulate
-from stickslip.solve.tables import Array, require_oscillator
+from stickslip.solve.tables import require_oscillator
 from stickslip.solve.trajectory import Trajectory
 
 FAST = 20.0  # dither periods in one of the slow motion, at least, where no frequency is given

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from stickslip.arrays import Array
 from stickslip.errors import EstimateError, ModelError
 from stickslip.estimate import Estimate
 from stickslip.parameters import changed, find
@@ -25,8 +26,6 @@ Grid = Mapping[Any, Any] | Sequence[Mapping[str, Any]]
 DESIGNS = ("sobol", "random")
 KINDS = ("first", "total")  # the indices, in the order of _indices
 RESAMPLES = 400  # of the bootstrap: a standard deviation from it is good to 4 %
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

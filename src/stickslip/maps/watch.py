@@ -10,9 +10,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
+from stickslip.arrays import Array, Index, Mask
 from stickslip.compiled import OPTIONS, compiled
 from stickslip.maps.measures import (
     ABNORMAL,
@@ -36,7 +34,6 @@ from stickslip.solve.kernel import DONE, FULL, advance, begin, follow, march, se
 from stickslip.solve.phasors import Phasors
 from stickslip.solve.poincare import carry_tangents
 from stickslip.solve.refusal import Budget
-from stickslip.solve.tables import Array
 
 TIRELESS = 2**62  # cells: a march of many motions is not interrupted
 LAP = 64  # pieces remembered of a motion, a power of two; a lap of the drive with more has no fast path
@@ -67,11 +64,11 @@ class Look(NamedTuple):
     whether nothing moves; of each motion slip, displacement from the counter-face and, by mode, friction as linear
     forms."""
 
-    kinds: NDArray[np.int64]
+    kinds: Index
     sides: Array
-    inner: NDArray[np.bool_]
-    works: NDArray[np.int64]
-    still: NDArray[np.bool_]
+    inner: Mask
+    works: Index
+    still: Mask
     slip: Array
     gap: Array
     friction: Array
@@ -82,11 +79,11 @@ class Given(NamedTuple):
     leading axis; what is looked at and wanted; what carries tangents, and what each entry is measured by."""
 
     states: Array
-    modes: NDArray[np.int64]
+    modes: Index
     units: Array
     models: Model
     look: Look
-    wants: NDArray[np.int64]
+    wants: Index
     leaps: Array
     weights: Array
 
@@ -99,7 +96,7 @@ class Counted(NamedTuple):
     """What a watch leaves of each motion: status, sums, states at phase zero, growth of a small difference, derivative
     over the laps after which it repeats."""
 
-    statuses: NDArray[np.int64]
+    statuses: Index
     sums: Array
     sections: Array
     growths: Array

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from stickslip.arrays import Array, Mask, Rows
 from stickslip.record import flaws
 from stickslip.record.clock import BRIDGED, fit_line, inspect, is_uniform
 from stickslip.record.flaws import Runs
@@ -15,7 +15,6 @@ from stickslip.record.flaws import Runs
 if TYPE_CHECKING:
     from stickslip.record.record import Record
 
-Array = NDArray[np.float64]
 
 SHORTEST = 32  # samples below which no question about friction can be answered
 NAMED = 8  # constant channels named in one sentence
@@ -208,7 +207,7 @@ def _clock_fault(kind: str, runs: Runs, what: str, cure: tuple[str, str], *, ver
     return Fault(kind, None, runs, f"{what} ({in_words(runs)}); {verb} with {call}.", "error", repair)
 
 
-def _pairs(first: NDArray[np.intp], width: int = 1) -> Runs:
+def _pairs(first: Rows, width: int = 1) -> Runs:
     """Runs that cover each row and the `width` rows after it, merged where they touch."""
     if not len(first):
         return ()
@@ -378,6 +377,6 @@ def _fault(
     return Fault(kind, name, runs, f"channel {name} has {what} ({in_words(runs)}); {cure}.", severity, repair)
 
 
-def _inside(runs: Runs, lost: NDArray[np.bool_]) -> bool:
+def _inside(runs: Runs, lost: Mask) -> bool:
     """Whether all runs lie where values were missing anyway."""
     return all(lost[first : last + 1].any() for first, last in runs) and bool(runs)

@@ -6,13 +6,10 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from stickslip.arrays import Array, Mask, Rows
 from stickslip.errors import RecordError
 from stickslip.statistics import least_squares, student
-
-Array = NDArray[np.float64]
-Rows = NDArray[np.intp]
 
 NEGLIGIBLE = 1e-3  # of a sampling interval: such a timing error moves a sine at fs/10 by less than 1e-3 of itself
 COARSEST_SNAP = 2e-3  # a rate is taken as round only where the stamps fix it this well
@@ -307,6 +304,6 @@ def _usual(steps: Array, quantum: float) -> float:
     return float(np.mean(near))
 
 
-def _around(mask: NDArray[np.bool_], width: int) -> Array:
+def _around(mask: Mask, width: int) -> Array:
     """How many hold among the odd number of `width` rows about each; of short masks too."""
     return np.convolve(mask, np.ones(width))[width // 2 : width // 2 + len(mask)]

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from stickslip.arrays import Array
 from stickslip.errors import RecordError
 from stickslip.record.channels import Channel
 from stickslip.record.clock import Clock, fit_clock
@@ -36,8 +37,6 @@ from stickslip.units import parse_unit
 if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
-
-Array = NDArray[np.float64]
 
 
 def from_pandas(

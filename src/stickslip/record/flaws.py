@@ -10,10 +10,9 @@ from __future__ import annotations
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
+from stickslip.arrays import Array, Mask, stretches
+
 Runs = tuple[tuple[int, int], ...]
 
 EXACT = 1e-9  # relative to the range: equal but for the rounding of a unit's factor
@@ -36,8 +35,7 @@ def runs_of(mask: Mask) -> Runs:
     >>> runs_of(np.array([True, False, True, True]))
     ((0, 0), (2, 3))
     """
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(np.int8)))
-    return tuple((int(first), int(last) - 1) for first, last in zip(edges[::2], edges[1::2], strict=True))
+    return tuple((int(first), int(end) - 1) for first, end in zip(*stretches(mask), strict=True))
 
 
 def rows_of(runs: Runs, n: int) -> Mask:

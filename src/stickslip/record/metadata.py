@@ -17,8 +17,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from stickslip.arrays import Array
 from stickslip.errors import FormatError, RecordError
 from stickslip.record.channels import Channel
 from stickslip.units import parse_value
@@ -36,7 +36,6 @@ TITLES = {
     "temperature": "Temperature", "humidity": "Relative humidity", "normal": "Normal load", "operator": "Operator",
     "remark": "Remark", "photo": "Photo",
 }  # fmt: skip
-Array = NDArray[np.float64]
 
 VERSION = 1
 KEY = "stickslip record"  # of the HDF5 attribute, the Parquet entry, and the file beside a CSV

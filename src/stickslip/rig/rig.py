@@ -8,8 +8,8 @@ from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from stickslip.arrays import Array
 from stickslip.errors import ModelError
 from stickslip.oscillator import Oscillator
 from stickslip.parameters import finite
@@ -24,7 +24,6 @@ MOST_ROWS = 10_000_000  # of a record: with its sensors' convolutions some hundr
 
 UNITS = {"x": "m", "v": "m/s", "a": "m/s^2", "friction": "N", "z": "m", "force": "N"}  # of what a sensor sits on
 
-Array = NDArray[np.float64]
 
 POUND, GRAVITY = 4.4482216152605, 9.80665  # force [N], acceleration [m/s^2]
 

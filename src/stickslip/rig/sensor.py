@@ -7,13 +7,11 @@ from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from stickslip.arrays import Array, Mask
 from stickslip.errors import ModelError
 from stickslip.parameters import finite
 from stickslip.signals.response import Response, leak, resonance
-
-Array = NDArray[np.float64]
 
 SENSED = {"load": "friction"}  # what a channel's sensor sits on, where the run calls it otherwise
 
@@ -188,7 +186,7 @@ class Digitiser:
         clipped = np.clip(readings + self.offset, -self.limit, self.limit)
         return np.round(clipped / self.step) * self.step if self.step else clipped
 
-    def lost(self, count: int, *, fs: float, rng: np.random.Generator) -> NDArray[np.bool_]:
+    def lost(self, count: int, *, fs: float, rng: np.random.Generator) -> Mask:
         """Which of `count` samples at `fs` [Hz] fall into gaps, by chance from `rng`."""
         lost = np.zeros(count, dtype=bool)
         if self.dropouts:

@@ -8,13 +8,10 @@ from dataclasses import dataclass, fields, replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from stickslip.arrays import Array, Complex, Mask
 from stickslip.errors import EstimateError
 from stickslip.signals.response import derivative_spectra, window
-
-Array = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 BLOCK = 1 << 16  # samples under one window of a long record
 QUICK = 4 * BLOCK  # samples in which delays are told apart
@@ -102,7 +99,7 @@ class Lines:
     constant: Complex
 
     @property
-    def clear(self) -> NDArray[np.bool_]:
+    def clear(self) -> Mask:
         """Lines above the noise in either sensor, whatever the phase between them: the choice favours no delay."""
         loud = np.any(np.abs([self.first, self.second[0]]) ** 2 > CLEAR * self.noise, axis=0)
         inside = np.arange(len(self.turn)) < 2 * HIGHEST * len(self.turn)
@@ -125,7 +122,7 @@ class Lines:
         weight = self.information / np.abs(self.first) ** 2
         return float(np.sum(weight * (self.first.conj() * self.second[0]).real) / np.sum(self.information))
 
-    def chosen(self, which: NDArray[np.bool_]) -> Lines:
+    def chosen(self, which: Mask) -> Lines:
         """Some of the lines."""
         return Lines(
             self.turn[which], self.first[which], self.second[:, which], self.noise[:, which], self.constant[which]

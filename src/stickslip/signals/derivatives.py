@@ -13,14 +13,13 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from stickslip.arrays import Array, Complex, Rows
 from stickslip.errors import EstimateError, RecordError
 from stickslip.record.record import Record, Step, require_record
 from stickslip.signals.noise import ROUGHNESS, checked_samples, end_modes, noise_along, penalised
 from stickslip.units import parse_value
-
-Array = NDArray[np.float64]
 
 ORDER = 4  # of Butterworth's filter, which runs forward and back: the gain at an edge is one half
 SETTLES = 3  # periods of the lowest edge that a record must last
@@ -222,7 +221,7 @@ class Filter:
             values = penalised(values, self.penalty)
         return sum((c * self._derivative(values, order) for order, c in terms.items() if c), np.zeros_like(values))
 
-    def response(self, frequency: ArrayLike, terms: Mapping[int, float]) -> NDArray[np.complex128]:
+    def response(self, frequency: ArrayLike, terms: Mapping[int, float]) -> Complex:
         """Complex response at `frequency` [Hz] of what :meth:`apply` does away from the ends."""
         w = 2 * np.pi * np.asarray(frequency, dtype=float) / self.fs
         total = np.zeros(w.shape, dtype=complex)
@@ -282,7 +281,7 @@ class Filter:
             return 16
         return 8 + math.ceil(math.log(1e-4) / math.log(np.abs(end_modes(self.penalty)).max()))
 
-    def _row_norms(self, size: int, terms: Mapping[int, float], rows: NDArray[np.intp]) -> Array:
+    def _row_norms(self, size: int, terms: Mapping[int, float], rows: Rows) -> Array:
         if self.method == "five-point":
             return np.asarray(np.linalg.norm(self.apply(np.eye(size), terms)[rows], axis=1))
         # The smoother is a symmetric matrix S: row i of (difference S) is S times row i of the difference.

@@ -6,15 +6,13 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from stickslip.arrays import Array, Mask
 from stickslip.errors import EstimateError, RecordError
 from stickslip.estimate import Estimate, Status
 from stickslip.record.flaws import runs_of
 from stickslip.record.record import Record, Step
 from stickslip.statistics import least_squares, student
-
-Array = NDArray[np.float64]
 
 LOBES = 32  # zero crossings of the sinc kept on each side
 KAISER = 9.0  # window parameter: stop band below -90 dB
@@ -87,7 +85,7 @@ def _weights(distance: Array, cutoff: float) -> Array:
     return np.asarray(np.sinc(cutoff * distance) * i0(KAISER * np.sqrt(inside)) * (inside > 0))
 
 
-def bridge(values: Array, lost: NDArray[np.bool_]) -> Array:
+def bridge(values: Array, lost: Mask) -> Array:
     """Put values in place of lost samples, so that an autoregression of the rest is kept as well as possible.
 
     Minimises ``sum_i (x_i - sum_j a_j x_{i-j})^2`` over the lost samples, in both directions of time (Janssen,
@@ -117,7 +115,7 @@ def bridge(values: Array, lost: NDArray[np.bool_]) -> Array:
     return result
 
 
-def _neighbourhoods(lost: NDArray[np.bool_]) -> list[tuple[int, int]]:
+def _neighbourhoods(lost: Mask) -> list[tuple[int, int]]:
     """Stretches around lost samples, wide enough to learn from, merged where they meet."""
     rows = np.flatnonzero(lost)
     margin = 40 * ORDER
@@ -131,7 +129,7 @@ def _neighbourhoods(lost: NDArray[np.bool_]) -> list[tuple[int, int]]:
     return merged
 
 
-def _bridged(values: Array, lost: NDArray[np.bool_]) -> Array:
+def _bridged(values: Array, lost: Mask) -> Array:
     mean = float(np.mean(values[~lost]))
     signal = values - mean
     order = min(ORDER, int(np.sum(~lost)) // 6)
@@ -147,7 +145,7 @@ def _bridged(values: Array, lost: NDArray[np.bool_]) -> Array:
     return result
 
 
-def _solved(signal: Array, lost: NDArray[np.bool_], coefficients: Array) -> Array:
+def _solved(signal: Array, lost: Mask, coefficients: Array) -> Array:
     """The lost samples by least squares of all predictions that they are part of."""
     from scipy.sparse import diags
     from scipy.sparse.linalg import spsolve
@@ -161,7 +159,7 @@ def _solved(signal: Array, lost: NDArray[np.bool_], coefficients: Array) -> Arra
     return np.atleast_1d(spsolve(rows[:, unknown].tocsc(), -(rows[:, known] @ signal[known])))
 
 
-def _autoregression(signal: Array, lost: NDArray[np.bool_], order: int) -> Array | None:
+def _autoregression(signal: Array, lost: Mask, order: int) -> Array | None:
     """Coefficients of the forward-backward least-squares autoregression over complete stretches; None if too few."""
     windows = np.lib.stride_tricks.sliding_window_view(signal, order + 1)
     complete = ~np.lib.stride_tricks.sliding_window_view(lost, order + 1).any(axis=1)

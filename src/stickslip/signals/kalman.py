@@ -6,11 +6,9 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from stickslip.arrays import Array, Rows
 from stickslip.compiled import FAST, compiled
-
-Array = NDArray[np.float64]
 
 ROUNDING = 1e-12  # share of a variance before the readings that is left of it at least
 
@@ -82,7 +80,7 @@ class Seen(NamedTuple):
 
     readings: Array
     inputs: Array
-    regime: NDArray[np.intp]
+    regime: Rows
 
 
 class Filtered(NamedTuple):

@@ -11,9 +11,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from stickslip.arrays import Array
 from stickslip.compiled import FAST, compiled
-
-Array = NDArray[np.float64]
 
 TILE = 64  # samples gone through at once, so that what they make stays in the processor's cache
 MOST_PHASES = 64  # values made of one sample

@@ -9,12 +9,11 @@ import math
 from math import comb
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from stickslip.arrays import Array, Complex
 from stickslip.errors import EstimateError
 from stickslip.record.flaws import quantum
-
-Array = NDArray[np.float64]
 
 ORDERS = (2, 3, 4, 6, 8, 10)  # of differencing, tried in turn
 BLOCK = 12  # differences per block: short against the time between two friction events
@@ -235,7 +234,7 @@ def penalised(values: Array, penalty: float) -> Array:
     return np.asarray(u + trend)
 
 
-def end_modes(penalty: float) -> NDArray[np.complex128]:
+def end_modes(penalty: float) -> Complex:
     """Roots z, |z| < 1, of ``1 + lambda (2 - z - 1/z)^3 = 0``: how the effect of an end dies out."""
     angles = np.pi * (2 * np.arange(ROUGHNESS) + 1) / ROUGHNESS
     q = penalty ** (-1 / ROUGHNESS) * np.exp(1j * angles)
@@ -244,7 +243,7 @@ def end_modes(penalty: float) -> NDArray[np.complex128]:
     return np.asarray(np.where(np.abs(z[0]) < 1, z[0], z[1]))
 
 
-def _real(modes: NDArray[np.complex128]) -> Array:
+def _real(modes: Complex) -> Array:
     """Real and imaginary parts of complex modes as columns, without the empty ones."""
     columns = np.hstack([modes.real, modes.imag])
     return columns[:, np.abs(columns).max(axis=0) > 1e-9 * np.abs(columns).max()]

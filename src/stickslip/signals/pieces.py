@@ -13,11 +13,9 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from stickslip.arrays import Array, Rows
 from stickslip.compiled import FAST, OPTIONS, compiled
-
-Array = NDArray[np.float64]
 
 TOLD = 1e-13  # variance of the squared time within a stretch, below which a line explains it
 
@@ -72,7 +70,7 @@ class Splitter:
         _, came = self._programme(pole, shortest)
         return [_traced(origin, length) for origin, length in zip(came, self.lengths.tolist(), strict=True)]
 
-    def _programme(self, pole: complex, shortest: int) -> tuple[Array, NDArray[np.intp]]:
+    def _programme(self, pole: complex, shortest: int) -> tuple[Array, Rows]:
         many, count = self.values.shape
         wave = np.exp(pole * np.arange(count)) if pole else np.zeros(count, dtype=complex)
         c, s = wave.real, wave.imag
@@ -83,7 +81,7 @@ class Splitter:
         return best, came
 
 
-def _traced(came: NDArray[np.intp], length: int) -> tuple[Piece, ...]:
+def _traced(came: Rows, length: int) -> tuple[Piece, ...]:
     pieces, kind, last = [], GLIDE, length
     while last > 0:
         first = int(came[kind, last])
@@ -132,9 +130,9 @@ class Sums(NamedTuple):
         Of c y and s y.
     """
 
-    power: NDArray[np.float64]
-    waves: NDArray[np.float64]
-    products: NDArray[np.float64]
+    power: Array
+    waves: Array
+    products: Array
 
 
 @compiled(**OPTIONS)

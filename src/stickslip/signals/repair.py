@@ -6,17 +6,14 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from stickslip.arrays import Array, Rows
 from stickslip.errors import RecordError
 from stickslip.record import flaws
 from stickslip.record.check import SHARP_UNITS, in_words
 from stickslip.record.clock import BRIDGED, Line, fit_line, inspect
 from stickslip.record.record import Record, Step, require_record
 from stickslip.signals.interpolate import band_limited, bridge
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 DERIVED = "friction_force"  # the source of channels that were computed from
 SOURCES = ("x", "z", "v", "a", "force")
@@ -528,7 +525,7 @@ def resample(record: Record, fs: float) -> Record:
     return record.with_samples(samples, Step("resample", {"fs": float(fs)}, outcome), fs=float(fs), filtered=True)
 
 
-def _runs(rows: NDArray[np.intp]) -> flaws.Runs:
+def _runs(rows: Rows) -> flaws.Runs:
     return tuple((int(row), int(row) + 1) for row in rows)
 
 

@@ -13,18 +13,15 @@ from functools import cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from stickslip.arrays import Array, Complex
 from stickslip.compiled import FAST, compiled
-
-Array = NDArray[np.float64]
 
 TURN = 1.5  # radians that no pole turns further in a stretch of the quadrature
 NODES = 6  # of Gauss in a stretch
 BLOCK = 1 << 16  # samples at a time
 CRITICAL = 1e-7  # a damping ratio as near to 1 is moved away from it: a double pole has no partial fractions
 ALIKE = 1e-9  # of its length: an interval that differs by less from the one before has the same factors
-Complex = NDArray[np.complex128]
 
 TAPER = 0.05  # of the stretch, at each of its ends
 
@@ -48,7 +45,7 @@ class Response:
     direct: float = 1.0
     leak: float = 0.0
 
-    def at(self, frequency: Array | float) -> NDArray[np.complex128]:
+    def at(self, frequency: Array | float) -> Complex:
         """H at frequencies [Hz]."""
         s = 2j * np.pi * np.asarray(frequency, dtype=float)
         total = np.full(s.shape, self.direct, dtype=complex)

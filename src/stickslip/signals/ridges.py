@@ -10,8 +10,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from stickslip.arrays import Array, Mask, Rows
 from stickslip.errors import EstimateError, RecordError
 from stickslip.estimate import Estimate, Result
 from stickslip.record.metadata import labelled_arrays
@@ -22,7 +23,6 @@ from stickslip.statistics import LeastSquares, least_squares, student
 if TYPE_CHECKING:
     import xarray as xr
 
-Array = NDArray[np.float64]
 
 STEP = 0.25  # of the shortest scale: the columns of a map that are looked at
 LEVEL_STEP = 0.5  # dB: how finely a prominence is told
@@ -286,7 +286,7 @@ def _centre(level: Array, row: int, reach: int) -> float:
     return float(np.average(rows, weights=10 ** (level[rows] / 10)))
 
 
-def _grouped(times: Array, within: float | None) -> NDArray[np.intp]:
+def _grouped(times: Array, within: float | None) -> Rows:
     gaps = np.diff(times)
     if within is None:
         sizes = np.sort(np.log(gaps)) if len(gaps) else np.zeros(0)
@@ -309,14 +309,14 @@ def _coarse(wavelets: xr.DataArray) -> tuple[Array, Array, Array]:
     return np.abs(part.values).astype(float), part.time.values, part.frequency.values
 
 
-def _near_ends(wavelets: xr.DataArray, times: Array) -> NDArray[np.bool_]:
+def _near_ends(wavelets: xr.DataArray, times: Array) -> Mask:
     """Where in a map an end of the record is felt."""
     first, last = ends(wavelets)
     cone = wavelets.cone.values[:, None]
     return np.asarray((times < first + cone) | (times > last - cone))
 
 
-def _chains(crest: NDArray[np.bool_], level: Array) -> list[tuple[NDArray[np.intp], NDArray[np.intp]]]:
+def _chains(crest: Mask, level: Array) -> list[tuple[Rows, Rows]]:
     """Rows and columns of the ridges: neighbours joined, the strongest at each time, cut where that jumps."""
     from scipy.ndimage import label
 
@@ -334,7 +334,7 @@ def _chains(crest: NDArray[np.bool_], level: Array) -> list[tuple[NDArray[np.int
     return list(zip(np.split(rows, cuts), np.split(columns, cuts), strict=True))
 
 
-def _refined(level: Array, rows: NDArray[np.intp], columns: NDArray[np.intp]) -> tuple[Array, Array]:
+def _refined(level: Array, rows: Rows, columns: Rows) -> tuple[Array, Array]:
     """Place and height of the parabola through the three values about each crest."""
     low, middle, high = (level[rows + side, columns] for side in (-1, 0, 1))
     bend = low - 2 * middle + high

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from stickslip.arrays import Array
 from stickslip.errors import ModelError, RecordError
 from stickslip.record.metadata import labelled_arrays
 from stickslip.record.record import Record, require_record
@@ -19,7 +20,6 @@ from stickslip.signals.morlet import REACH, normalised_gain, ridge_centre, trans
 if TYPE_CHECKING:
     import xarray as xr
 
-Array = NDArray[np.float64]
 
 QUESTION = "a wavelet map"
 CENTRE = 4.5  # the thesis's wavelet: e-folding after 0.7 of a cycle

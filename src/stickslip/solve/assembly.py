@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from stickslip.arrays import Array
 from stickslip.compiled import meanwhile
 from stickslip.errors import ModelError
 from stickslip.laws.base import Mode
@@ -22,7 +23,6 @@ from stickslip.solve.cells import DEGREE, cells_of, derivatives, derive
 from stickslip.solve.operations import stilled
 from stickslip.solve.settling import settled
 from stickslip.solve.tables import (
-    Array,
     JointMode,
     Rubbing,
     System,

@@ -9,10 +9,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from stickslip.arrays import Array, Complex, Index, Mask
 from stickslip.compiled import OPTIONS, compiled, meanwhile
 
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
 Rows = NDArray[np.floating[Any]]
 
 DEGREE = 20  # of the Taylor polynomial in a cell; with rate * cell <= 1 the remainder is 1/21! = 2e-20 of its scale
@@ -55,7 +54,7 @@ class Linear(NamedTuple):
     hop: Array
     series: Array
     target: Index
-    crossing: NDArray[np.bool_]
+    crossing: Mask
     reset: Array
     first: Index
     tones: Array
@@ -175,14 +174,14 @@ def _fastest(flow: Array) -> Array:
     return rates
 
 
-def eigenvalues(flow: Array) -> NDArray[np.complex128]:
+def eigenvalues(flow: Array) -> Complex:
     """Those of one flow, part by part, for the same reason; what rounding leaves of a zero is one."""
     parts = _parts((flow != 0).tobytes(), len(flow))
     return np.concatenate([_spectrum(flow[np.ix_(part, part)].tobytes(), len(part)) for part in parts])
 
 
 @lru_cache(maxsize=1024)  # the systems of a fit have most of their parts in common
-def _spectrum(part: bytes, size: int) -> NDArray[np.complex128]:
+def _spectrum(part: bytes, size: int) -> Complex:
     values = np.linalg.eigvals(np.frombuffer(part).reshape(size, size)).astype(complex)
     return np.where(np.abs(values) > ROUNDED * np.max(np.abs(values)), values, 0.0)
 

@@ -14,9 +14,20 @@ from typing import NamedTuple
 import numpy as np
 from numpy.polynomial import Legendre
 
+from stickslip.arrays import Array
 from stickslip.compiled import compiled
 from stickslip.solve.roots import NOISE, NONE, first_rise
-from stickslip.solve.taylor import EXACT, Array, Exits, Guards, Sums, advance, awake, coded, turn, waking
+from stickslip.solve.taylor import (
+    EXACT,
+    Exits,
+    Guards,
+    Sums,
+    advance,
+    awake,
+    coded,
+    turn,
+    waking,
+)
 
 STAGES = 9  # Radau's: exact to order 17, near the 14 and 18 of the Taylor steps that a leap replaces
 WIDTH = STAGES + 1

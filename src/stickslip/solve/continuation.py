@@ -8,12 +8,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from stickslip.arrays import Array
 from stickslip.errors import ModelError
 from stickslip.parameters import find, places
 from stickslip.solve.periodic import closed_orbit, judged
 from stickslip.solve.poincare import SteadyState, alike, closes, cycle_of, derivative, extent, lap, tables
 from stickslip.solve.simulate import opening
-from stickslip.solve.tables import Array, System
+from stickslip.solve.tables import System
 
 NUDGE = 1e-6  # of the parameter, relative to the way ahead: the map is differenced across twice this
 FLOOR = 1e-11  # a step shorter than this, relative to the way ahead, has met a jump of the map

@@ -13,8 +13,9 @@ from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from stickslip.arrays import Array, Index
 from stickslip.compiled import compiled
 from stickslip.errors import ModelError, SolveError
 from stickslip.laws.base import Rigid, Row
@@ -27,7 +28,7 @@ from stickslip.solve.march import DONE, DUE, LAPS, TIME, TRY, Dense, Leaps, Show
 from stickslip.solve.refusal import Budget, chatter, held_back, named, require_numbers, unproved
 from stickslip.solve.tables import Stops, numbered
 from stickslip.solve.tape import Tape, tape
-from stickslip.solve.taylor import EXACT, GROWTH, Array, Index, coded, expansion, length
+from stickslip.solve.taylor import EXACT, GROWTH, coded, expansion, length
 from stickslip.solve.trajectory import Trajectory
 
 March = Callable[..., tuple[int, int, int, int]]  # of clock, state, `big`, mode, end, steps and room for a series
@@ -73,7 +74,7 @@ class CurvedTrajectory(Trajectory):
         """Start and length [s] of the steps."""
         return self.steps.starts, self.steps.lengths
 
-    def sample(self, times: ArrayLike, outputs: tuple[str, ...]) -> tuple[Array, NDArray[np.int64]]:
+    def sample(self, times: ArrayLike, outputs: tuple[str, ...]) -> tuple[Array, Index]:
         """Values at increasing instants; parameters and returns as of :meth:`Trajectory.sample`."""
         times = self.instants(times)
         table: Any = self.table

@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from stickslip.arrays import Array
 from stickslip.errors import ModelError
 from stickslip.oscillator import Structure
 from stickslip.solve.curved import CurvedTrajectory, run_curved
 from stickslip.solve.poincare import slowest_crossing
 from stickslip.solve.simulate import stops_of
-from stickslip.solve.tables import Array
 from stickslip.solve.trajectory import Trajectory
 
 ORDER = 12  # Gauss points on each cell; exact to rounding where no rate turns more than a radian

@@ -21,11 +21,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from stickslip.arrays import Array, Index
 from stickslip.compiled import FAST, OPTIONS, compiled
 from stickslip.solve.cells import Linear
 from stickslip.solve.phasors import CARRIES, STOPS, Phasors, drive_of, slide_of, way_out
 from stickslip.solve.roots import NOISE
-from stickslip.solve.tables import Array
 
 HISTORY = 4096  # pieces remembered, a power of two; the guess is one lap old
 SPLITS = 64  # intervals of a certificate at most; a piece that needs more is nearly tangent to an exit
@@ -61,11 +61,11 @@ class Clock(NamedTuple):
 class Past(NamedTuple):
     """A ring of pieces gone by: mode, exit, duration and parts of the certificate of each; and places in it."""
 
-    modes: NDArray[np.int64]
-    exits: NDArray[np.int64]
+    modes: Index
+    exits: Index
     times: Array
-    parts: NDArray[np.int64]
-    places: NDArray[np.int64]
+    parts: Index
+    places: Index
 
 
 NEXT, GUESS, LAP = range(3)  # places in a ring: of the next piece, of the one a lap ago, and of the lap's first

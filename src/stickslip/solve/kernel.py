@@ -10,11 +10,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from stickslip.arrays import Array
 from stickslip.compiled import OPTIONS, compiled
 from stickslip.solve.cells import DEGREE, SPLITTER
 from stickslip.solve.glide import Clock, Pieces, glide, later, new_lap, remember, until
 from stickslip.solve.roots import NOISE, NONE, UNSURE, first_rise, opening_order
-from stickslip.solve.tables import Array
 
 DONE, FULL, CHATTER, LOST, UNPROVED = 0, 1, 2, 3, 4
 CHAIN = 64  # transitions without time in between before a run is given up

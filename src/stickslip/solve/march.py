@@ -8,13 +8,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from stickslip.arrays import Array, Index
 from stickslip.compiled import compiled
 from stickslip.solve.collocation import Stages, at, landing, leap
 from stickslip.solve.roots import NOISE
 from stickslip.solve.taylor import (
     EXACT,
-    Array,
-    Index,
     Step,
     advance,
     awake,

@@ -15,10 +15,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from stickslip.arrays import Array
 from stickslip.errors import ModelError
 from stickslip.laws.curved import Expression
 from stickslip.solve import taylor
-from stickslip.solve.tables import Array
 from stickslip.solve.taylor import Guards, Sums
 
 Form = tuple[dict[int, float], float]  # weights of nodes, and a constant

@@ -14,6 +14,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from stickslip.arrays import Array
 from stickslip.errors import ModelError, SolveError
 from stickslip.solve.poincare import (
     CLOSED,
@@ -32,7 +33,7 @@ from stickslip.solve.poincare import (
 )
 from stickslip.solve.self_excited import self_excited
 from stickslip.solve.simulate import opening
-from stickslip.solve.tables import Array, System
+from stickslip.solve.tables import System
 from stickslip.solve.tape import Tape
 from stickslip.solve.trajectory import Trajectory
 

@@ -16,11 +16,11 @@ from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from stickslip.arrays import Array, Complex, Index, Mask
 from stickslip.compiled import FAST, compiled, meanwhile
 from stickslip.solve.cells import distinct
-from stickslip.solve.tables import Array, Tables
+from stickslip.solve.tables import Tables
 
 KEEPS, STOPS, CARRIES = 0.0, 1.0, 2.0  # what an exit does to velocity and memory
 HALF_STEP = 0.09  # rad between a node and the edge of its polynomial; degree 9 leaves 1e-17
@@ -57,7 +57,7 @@ class Phasors(NamedTuple):
     exit: Array
     rest: Array
     nodes: Array
-    span: NDArray[np.int64]
+    span: Index
 
     def of(self, number: int) -> Phasors:
         """The tables of one system."""
@@ -181,7 +181,7 @@ def _phasors(tables: Tables, flow: Array, rows: Array, reset: Array, tones: Arra
     return Phasors(drives, modes, levels, ways, rests, nodes, span)
 
 
-def _slides(flow: Array, omega: Array, able: NDArray[np.bool_]) -> tuple[NDArray[np.complex128], Any, Array, Array]:
+def _slides(flow: Array, omega: Array, able: Mask) -> tuple[Complex, Any, Array, Array]:
     """Rate l of the free motion in a mode, forced amplitude, stiffness over mass, and what :func:`slide_of` reads.
 
     Systems whose free motion hardly turns, or that the drive hardly differs from, are no longer `able`.
@@ -208,7 +208,7 @@ def without(count: int) -> Phasors:
     return Phasors._make([*tables, np.zeros((0, 3)), np.zeros((count, 2), np.int64)])
 
 
-def _all_nodes(turns: NDArray[np.complex128], able: NDArray[np.bool_]) -> tuple[NDArray[np.int64], Array, Array]:
+def _all_nodes(turns: Complex, able: Mask) -> tuple[Index, Array, Array]:
     """Nodes of all that turns, the drive first: where each system's lie in the table, and in them first node and number
     of each of its turning parts. Systems that turn alike share theirs."""
     where, which = np.empty((2, len(turns)), np.int64)

@@ -27,6 +27,7 @@ import numpy as np
 from numpy.polynomial import Polynomial
 from numpy.typing import ArrayLike
 
+from stickslip.arrays import Array, Index
 from stickslip.laws.curved import CurvedMode, symbol
 from stickslip.oscillator import PlanarOscillator
 from stickslip.solve import march
@@ -37,7 +38,7 @@ from stickslip.solve.operations import Form, Operations, combined, flat, guards_
 from stickslip.solve.refusal import named, unproved
 from stickslip.solve.tables import Stops
 from stickslip.solve.tape import Tape, kept_of
-from stickslip.solve.taylor import Array, Exits, Index, Nodes
+from stickslip.solve.taylor import Exits, Nodes
 
 SLIP, STUCK, SLOW = range(3)  # a slow slip is followed where its end is not near, or where it turns
 STOPPED, RELEASED, SPED, FAINT = range(4)  # exits: out of slip, out of stick, and two out of slow slip

@@ -14,8 +14,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from stickslip.arrays import Array, Complex
 from stickslip.compiled import OPTIONS, compiled
 from stickslip.errors import ModelError, SolveError
 from stickslip.estimate import Estimate
@@ -26,7 +26,7 @@ from stickslip.solve.curved import CurvedTrajectory, run_curved
 from stickslip.solve.glide import Pieces
 from stickslip.solve.kernel import follow, multiply
 from stickslip.solve.simulate import opening, run, stops_of
-from stickslip.solve.tables import Array, System, Tables, is_curved, laws_of
+from stickslip.solve.tables import System, Tables, is_curved, laws_of
 from stickslip.solve.tape import Tape, tape
 from stickslip.solve.trajectory import Event, Trajectory
 
@@ -63,10 +63,10 @@ class SteadyState:
     period: float
     order: int
     orbit: Trajectory
-    multipliers: NDArray[np.complex128]
+    multipliers: Complex
     exponent: Estimate | None = None
     frequencies: tuple[float, ...] = ()
-    lines: NDArray[np.float64] | None = None
+    lines: Array | None = None
 
     @property
     def rotation_numbers(self) -> tuple[float, ...]:

@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from stickslip.arrays import Array
 from stickslip.errors import SolveError
-from stickslip.solve.tables import Array
 
 if TYPE_CHECKING:
     from stickslip.solve.tables import Tables

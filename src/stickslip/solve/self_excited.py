@@ -13,8 +13,8 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from stickslip.arrays import Array, Complex
 from stickslip.drives.kinds import Belt
 from stickslip.errors import ModelError, SolveError
 from stickslip.laws.curved import CurvedLaw
@@ -23,7 +23,7 @@ from stickslip.solve.curved import CurvedTrajectory
 from stickslip.solve.march import Dense
 from stickslip.solve.poincare import SteadyState, Table, closes, derivative, stretch
 from stickslip.solve.simulate import opening
-from stickslip.solve.tables import Array, System, require_oscillator
+from stickslip.solve.tables import System, require_oscillator
 from stickslip.solve.tape import Tape
 from stickslip.solve.trajectory import Trajectory
 
@@ -46,7 +46,7 @@ class SteadySliding:
 
     state: Mapping[str, float]
     friction: float
-    eigenvalues: NDArray[np.complex128]
+    eigenvalues: Complex
     status: str
 
 
@@ -267,7 +267,7 @@ def _between(motion: Trajectory, first: int, last: int) -> SteadyState:
     return SteadyState("unique", orbit.duration, 1, orbit, np.zeros(motion.table.physical, dtype=np.complex128))
 
 
-def settled_cycle(motion: Trajectory, shortest: float) -> tuple[Trajectory, NDArray[np.complex128]] | None:
+def settled_cycle(motion: Trajectory, shortest: float) -> tuple[Trajectory, Complex] | None:
     """The orbit that a motion ends in, closed to rounding, with its multipliers; None where it does not repeat.
 
     Of each orbit tried the period is first guessed from when the motion was last where it is now.
@@ -283,7 +283,7 @@ def settled_cycle(motion: Trajectory, shortest: float) -> tuple[Trajectory, NDAr
     return None
 
 
-def _shortest(orbit: Trajectory, multipliers: NDArray[np.complex128]) -> tuple[Trajectory, NDArray[np.complex128]]:
+def _shortest(orbit: Trajectory, multipliers: Complex) -> tuple[Trajectory, Complex]:
     """The part of an orbit that already repeats, where it is several times the same."""
     state, _ = opening(orbit.table, {})
     state[: orbit.table.physical] = orbit.states[0, : orbit.table.physical]
@@ -297,9 +297,7 @@ def _shortest(orbit: Trajectory, multipliers: NDArray[np.complex128]) -> tuple[T
     return orbit, multipliers
 
 
-def closed(
-    system: System, table: Table, state: Array, mode: int, period: float
-) -> tuple[Trajectory, NDArray[np.complex128]] | None:
+def closed(system: System, table: Table, state: Array, mode: int, period: float) -> tuple[Trajectory, Complex] | None:
     """The orbit near a state and a period, with the multipliers across it, largest first; None where Newton finds none.
 
     Without a drive the phase is free: the correction is taken across the flow, and the multiplier along it is left out.
@@ -333,7 +331,7 @@ def closed(
     return None
 
 
-def _across(jacobian: Array) -> NDArray[np.complex128]:
+def _across(jacobian: Array) -> Complex:
     """Multipliers without the one along the orbit, which is 1."""
     values = np.linalg.eigvals(jacobian).astype(np.complex128)
     values = np.delete(values, np.argmin(np.abs(values - 1)))

@@ -14,6 +14,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
+from stickslip.arrays import Array
 from stickslip.compiled import OPTIONS, compiled
 from stickslip.errors import ModelError
 from stickslip.laws.stribeck import TimeDelay
@@ -24,7 +25,7 @@ from stickslip.solve.cells import DEGREE
 from stickslip.solve.curved import CurvedTrajectory
 from stickslip.solve.kernel import multiply
 from stickslip.solve.settling import settled_alike
-from stickslip.solve.tables import Array, Tables, systems_of
+from stickslip.solve.tables import Tables, systems_of
 from stickslip.solve.trajectory import Trajectory
 from stickslip.solve.variation import Variation, opening_moved, variation
 

@@ -24,9 +24,10 @@ from typing import Any
 
 import numpy as np
 
+from stickslip.arrays import Array
 from stickslip.errors import SolveError
 from stickslip.solve.cells import DEGREE, cells_of, derivatives, eigenvalues
-from stickslip.solve.tables import OWN, Array, Tables
+from stickslip.solve.tables import OWN, Tables
 
 APART = 1e4  # fastest over slow rates from which a mode is split: the fast part is followed for 60 cells and more
 FARTHEST = 1e13  # fast over slow rates: beyond, rounding of the state takes part in the speed that the contact has

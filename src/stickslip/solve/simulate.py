@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from stickslip.arrays import Array
 from stickslip.compiled import by_python, meanwhile
 from stickslip.drives.kinds import HarmonicBase, Recorded
 from stickslip.errors import ModelError, SolveError
@@ -26,7 +27,7 @@ from stickslip.solve.phasors import fast_tables
 from stickslip.solve.planar import planar_tape, run_planar
 from stickslip.solve.refusal import LISTED, Budget, chatter, held_back, named, require_numbers, unproved
 from stickslip.solve.roots import NOISE
-from stickslip.solve.tables import Array, Stops, System, Tables, is_curved
+from stickslip.solve.tables import Stops, System, Tables, is_curved
 from stickslip.solve.tape import tape
 from stickslip.solve.trajectory import Trajectory
 

@@ -17,8 +17,8 @@ from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from stickslip.arrays import Array, Index, Mask
 from stickslip.drives.kinds import Drive, Motion
 from stickslip.errors import ModelError
 from stickslip.laws import filippov
@@ -73,7 +73,7 @@ class Stops(NamedTuple):
     new values (K, P) as each begins to be gone to."""
 
     ends: Array
-    places: NDArray[np.int64]
+    places: Index
     values: Array
 
 
@@ -119,8 +119,6 @@ def numbered(name: str, count: int) -> tuple[str, ...]:
     return (name,) if count == 1 else tuple(f"{name}{j + 1}" for j in range(count))
 
 
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
 System = Oscillator | Structure
 
 
@@ -168,7 +166,7 @@ class Tables:
     hop: Array
     series: Array
     target: Index
-    crossing: NDArray[np.bool_]
+    crossing: Mask
     reset: Array
     first: Index
     tones: Array
@@ -283,7 +281,7 @@ class Systems:
     mass: Array
     stiffness: Array
     damping: Array
-    on_base: NDArray[np.bool_]
+    on_base: Mask
     share: Array
     seeds: tuple[tuple[str, ...], ...]
     joint: bool
@@ -347,7 +345,7 @@ def oscillators(
     drive: Index,
     *,
     numbers: Array,
-    on_base: NDArray[np.bool_],
+    on_base: Mask,
 ) -> Systems:
     """Oscillators as systems of one mass: the different laws and drives, which of them each has (B,), its mass,
     stiffness and damping (3, B), and whether its damper is fixed to the base (B,)."""

@@ -9,8 +9,8 @@ from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from stickslip.arrays import Array, Index
 from stickslip.drives.kinds import Motion
 from stickslip.errors import ModelError
 from stickslip.laws.base import Exit, Mode
@@ -19,7 +19,7 @@ from stickslip.laws.filippov import curved_modes
 from stickslip.oscillator import Contact, Oscillator, Structure
 from stickslip.solve.operations import Bound, Form, Operations, Scaled, combined, flat, guards_of, stilled, sums_of
 from stickslip.solve.tables import JointMode, System, by_value, mode_number, numbered, reached
-from stickslip.solve.taylor import Array, Exits, Guards, Nodes, Sums
+from stickslip.solve.taylor import Exits, Guards, Nodes, Sums
 
 DTYPES = (np.int64, np.float64)
 LEAST = 1e-13  # some hundred roundings of the motion's own speed: below it a velocity that falls can not be followed
@@ -83,7 +83,7 @@ class Tape:
     watched: Nodes
     exits: Exits
     guards: Guards
-    places: Mapping[str, NDArray[np.int64]]
+    places: Mapping[str, Index]
 
     @property
     def shown(self) -> tuple[tuple[int, ...], ...]:
@@ -98,12 +98,12 @@ class Tape:
         return frozenset()
 
     @property
-    def first(self) -> NDArray[np.int64]:
+    def first(self) -> Index:
         """Exits of mode j are ``first[j]`` to ``first[j + 1]``."""
         return self.exits.first
 
     @property
-    def target(self) -> NDArray[np.int64]:
+    def target(self) -> Index:
         """The mode behind each exit."""
         return self.exits.target
 

@@ -22,13 +22,10 @@ import numpy as np
 from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic
-from numpy.typing import NDArray
 
+from stickslip.arrays import Array, Index, Mask
 from stickslip.compiled import compiled, generated
 from stickslip.solve.roots import NOISE, NONE, UNSURE, first_rise
-
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
 
 # No references are counted: each named array would cost two atomic operations a call.
 OPTIONS = {"error_model": "numpy", "_nrt": False, "fastmath": {"contract"}}
@@ -85,9 +82,9 @@ class Exits(NamedTuple):
     node: Index
     factor: Array
     target: Index
-    crossing: NDArray[np.bool_]
-    polished: NDArray[np.bool_]
-    carried: NDArray[np.bool_]
+    crossing: Mask
+    polished: Mask
+    carried: Mask
     reset: Array
     first: Index
 
@@ -300,17 +297,17 @@ class Nodes(NamedTuple):
     """A tape: of each node its operation, operands, exponent, first weight and constant; the weights and their nodes;
     the first node of each mode; and node and factor of each state entry's rate, by mode."""
 
-    kinds: NDArray[np.int64]
-    left: NDArray[np.int64]
-    right: NDArray[np.int64]
-    power: NDArray[np.float64]
-    low: NDArray[np.int64]
-    weights: NDArray[np.float64]
-    terms: NDArray[np.int64]
-    constant: NDArray[np.float64]
-    first: NDArray[np.int64]
-    rate: NDArray[np.int64]
-    factor: NDArray[np.float64]
+    kinds: Index
+    left: Index
+    right: Index
+    power: Array
+    low: Index
+    weights: Array
+    terms: Index
+    constant: Array
+    first: Index
+    rate: Index
+    factor: Array
 
     @property
     def most(self) -> int:
@@ -331,7 +328,7 @@ class Structure(NamedTuple):
     kept: tuple[Number, ...]
 
 
-def expansion(nodes: Nodes, kept: tuple[Number, ...], order: int) -> tuple[int, NDArray[np.float64]]:
+def expansion(nodes: Nodes, kept: tuple[Number, ...], order: int) -> tuple[int, Array]:
     """Address of compiled code that fills a work array with coefficients 0 .. `order`, and its numbers.
 
     It takes the numbers, the mode, the state, the unit of time and the work array; coefficient k of node j stands at

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from stickslip.arrays import Array, Index
 from stickslip.compiled import meanwhile
 from stickslip.errors import SolveError
 from stickslip.printing import html_table
@@ -18,7 +19,7 @@ from stickslip.record.channels import Channel, described
 from stickslip.record.record import Record, Step
 from stickslip.solve.cells import DEGREE
 from stickslip.solve.kernel import follow, sample
-from stickslip.solve.tables import Array, JointMode, System, Tables
+from stickslip.solve.tables import JointMode, System, Tables
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -216,7 +217,7 @@ class Trajectory:
         return shares
 
     @cached_property
-    def _changes(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    def _changes(self) -> tuple[Index, Index]:
         """Pieces that begin with an event, and a number for what happens there.
 
         By which exit, from which mode, into which; by none (-1) where the drive jumps and the mass goes on in another.
@@ -242,7 +243,7 @@ class Trajectory:
         ]
 
     @property
-    def event_pieces(self) -> NDArray[np.int64]:
+    def event_pieces(self) -> Index:
         """Numbers of the pieces that begin with an event."""
         return self._changes[0]
 
@@ -311,7 +312,7 @@ class Trajectory:
             )
         return times
 
-    def sample(self, times: ArrayLike, outputs: tuple[str, ...]) -> tuple[Array, NDArray[np.int64]]:
+    def sample(self, times: ArrayLike, outputs: tuple[str, ...]) -> tuple[Array, Index]:
         """Exact values at increasing instants.
 
         Parameters

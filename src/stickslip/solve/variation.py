@@ -16,10 +16,23 @@ import numpy as np
 from numpy.polynomial import Legendre
 from numpy.typing import NDArray
 
+from stickslip.arrays import Array, Index
 from stickslip.oscillator import Oscillator
 from stickslip.solve.curved import CurvedTrajectory
 from stickslip.solve.tape import Tape, tape
-from stickslip.solve.taylor import ASINH, EXP, LINEAR, LOG, POWER, PRODUCT, QUOTIENT, SQUARE, STILL, TANH, Array, Nodes
+from stickslip.solve.taylor import (
+    ASINH,
+    EXP,
+    LINEAR,
+    LOG,
+    POWER,
+    PRODUCT,
+    QUOTIENT,
+    SQUARE,
+    STILL,
+    TANH,
+    Nodes,
+)
 
 POINTS = 10  # of Gauss in a step, exact to order 20: the motion's own steps are of order 14 or 18
 ASIDE = 1e-30  # a step along the imaginary axis: the derivative is exact, since no difference is taken
@@ -181,7 +194,7 @@ def _states(run: CurvedTrajectory, times: Array) -> Array:
     return run.sample(times, tuple(run.table.names))[0]
 
 
-def _passages(motion: Variation, steps: NDArray[np.int64], lengths: Array) -> tuple[Array, Array]:
+def _passages(motion: Variation, steps: Index, lengths: Array) -> tuple[Array, Array]:
     """What carries derivatives over the first so much [s] of steps: D -> M D + q, as M (S, N, N) and q (S, N, K)."""
     size, count = len(motion.run.table.names), len(motion.near)
     passage, own = np.empty((len(steps), size, size)), np.empty((len(steps), size, count))

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from stickslip.arrays import Array
 from stickslip.drives.kinds import Belt
 from stickslip.errors import ModelError
 from stickslip.squeak.cycles import LimitCycle, limit_cycle, separating_cycle
@@ -32,7 +33,6 @@ from stickslip.squeak.stability import (
 if TYPE_CHECKING:
     import xarray as xr
 
-Array = NDArray[np.float64]
 
 SMALL, HALF, LARGE = 1e-3, 0.5, 1.5  # `push`: mostly, close to the threshold, and where no small one lasts
 LEAST = 3  # values of a parameter

@@ -8,8 +8,8 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from stickslip.arrays import Array
 from stickslip.errors import EstimateError, RecordError
 from stickslip.estimate import Estimate, Plain, Result, Status, plain
 from stickslip.record.record import Record, require_record
@@ -22,7 +22,6 @@ WORDS = {
     "scrape": "broad band", "tonal": "tonal, with no sign of friction", "noise": "broad band throughout",
 }  # fmt: skip
 OF_MEDIAN = math.sqrt(math.pi / 2)  # its standard deviation over that of the mean
-Array = NDArray[np.float64]
 
 LOWEST = 50.0  # Hz
 GROWN = 12.0  # cycles of growth to the peak: what is struck is there within fewer

@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from stickslip.arrays import Array, Complex
 from stickslip.errors import EstimateError
 from stickslip.estimate import NORMAL_95, Doubt, Estimate, Plain, Result, Status, plain
 from stickslip.parameters import finite
@@ -19,9 +19,6 @@ from stickslip.squeak.hearing import filtered
 from stickslip.squeak.spectra import coherence_by_chance, stretches
 from stickslip.statistics import student
 from stickslip.units import parse_value
-
-Array = NDArray[np.float64]
-Waves = NDArray[np.complex128]
 
 MOTIONS = ("a", "normal_acceleration", "torsion_velocity", "friction", "sound")
 CYCLES = 8.0  # of the tone in a segment: its line is an eighth of its frequency wide
@@ -231,7 +228,7 @@ def coupling(record: Record, *, squeaks: Squeaks | None = None, lever: float | s
     return Coupling(frequency, tuple(pairs), **energies, segments=len(within), compared=where.words)
 
 
-def _tones(values: Array, rows: list[int], size: int, frequency: float) -> Waves:
+def _tones(values: Array, rows: list[int], size: int, frequency: float) -> Complex:
     """The tone of a frequency [1/sample] in each segment."""
     time = np.arange(size)
     wave = np.hanning(size) * np.exp(-2j * np.pi * frequency * time)
@@ -240,7 +237,12 @@ def _tones(values: Array, rows: list[int], size: int, frequency: float) -> Waves
 
 
 def _pair(
-    one: str, other: str, inside: dict[str, Waves], outside: dict[str, Waves] | None, frequency: float, computed: bool
+    one: str,
+    other: str,
+    inside: dict[str, Complex],
+    outside: dict[str, Complex] | None,
+    frequency: float,
+    computed: bool,
 ) -> Pair:
     count = len(inside[one])
     coherence, angle = _coherence(inside[one], inside[other])
@@ -290,7 +292,7 @@ def _coherence_interval(coherence: float, count: int) -> tuple[float, float]:
     return min(low, coherence), max(high, coherence)
 
 
-def _coherence(one: Waves, other: Waves) -> tuple[float, float]:
+def _coherence(one: Complex, other: Complex) -> tuple[float, float]:
     cross = np.sum(one * np.conj(other))
     power = float(np.sum(np.abs(one) ** 2) * np.sum(np.abs(other) ** 2))
     return (float(np.abs(cross) ** 2 / power) if power else 0.0), float(np.angle(cross))

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from stickslip.arrays import Array, Complex
 from stickslip.drives.kinds import Belt
 from stickslip.errors import ModelError
 from stickslip.oscillator import Structure
@@ -21,8 +21,6 @@ from stickslip.solve.self_excited import settled_cycle
 from stickslip.solve.simulate import opening
 from stickslip.solve.trajectory import Trajectory
 from stickslip.squeak.stability import Stability, System, stability
-
-Array = NDArray[np.float64]
 
 FIRST = 64  # cycles of a small vibration before a cycle is looked for
 SMALL = 1e-5  # of the vibration that would lift or stop a contact: what the growth is measured on
@@ -72,7 +70,7 @@ class LimitCycle:
     separation_share: tuple[float, ...]
     growth: float
     energy: EnergyFlow
-    multipliers: NDArray[np.complex128]
+    multipliers: Complex
     sliding: Stability
     motion: Trajectory
 
@@ -188,9 +186,7 @@ def separating_cycle(system: System, lasting: LimitCycle) -> LimitCycle | None:
     return None
 
 
-def _cycle_of(
-    system: System, sliding: Stability, status: str, motion: Trajectory, multipliers: NDArray[np.complex128]
-) -> LimitCycle:
+def _cycle_of(system: System, sliding: Stability, status: str, motion: Trajectory, multipliers: Complex) -> LimitCycle:
     """What there is to say of a motion."""
     shares, still = _shares(motion), status in ("steady sliding", "held")
     swing, slide = (np.zeros(len(sliding.place)), 0.0) if still else _swings(motion)
@@ -211,7 +207,7 @@ def _cycle_of(
 
 def _followed(
     system: System, table: Table, sliding: Stability, begin: tuple[Array, int], cycle: float, patience: int
-) -> tuple[str, Trajectory, NDArray[np.complex128]]:
+) -> tuple[str, Trajectory, Complex]:
     """Status, one cycle or the last stretch, multipliers."""
     state, mode = begin
     none, physical = np.zeros(0, dtype=np.complex128), table.physical

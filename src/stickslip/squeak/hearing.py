@@ -8,14 +8,10 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from stickslip.arrays import Array, Mask, Rows, stretches
 from stickslip.record.check import find_clipping
 from stickslip.record.record import Record
-
-Array = NDArray[np.float64]
-Flags = NDArray[np.bool_]
-Waves = NDArray[np.complex128]
 
 HEARD = ("sound", "normal_acceleration", "a", "friction", "ch1")  # the first of these, unless told
 WINDOW = 0.0232  # s
@@ -110,7 +106,7 @@ class Hearing:
         return cls(heard, fs, band, span, frequencies[inside], np.abs(map_[inside]) ** 2, size, hop)
 
     @cached_property
-    def lines(self) -> tuple[Array, Array, Flags]:
+    def lines(self) -> tuple[Array, Array, Mask]:
         """Of each frame the strongest line [Hz], its level [dB], and whether it is a tone."""
         power, count = self.power, len(self.frequencies)
         peak = np.argmax(power, axis=0)
@@ -255,7 +251,7 @@ class Hearing:
             needed = np.maximum(needed, least)
         return float(np.quantile(needed, 0.95))
 
-    def _active(self) -> tuple[Flags, bool]:
+    def _active(self) -> tuple[Mask, bool]:
         """Frames in which something sounds, and whether it does from end to end."""
         loud = _decibel(self.power.sum(axis=0))
         quiet = float(np.quantile(loud, 0.1))
@@ -339,7 +335,7 @@ class Hearing:
         times = f"{round(line / mains)} times " if round(line / mains) > 1 else ""
         return f"it keeps {line:.1f} Hz from end to end, {times}the {mains:g} Hz of the mains, as their hum does"
 
-    def _one_pitch(self, line: Array, tonal: Flags) -> list[tuple[int, int]]:
+    def _one_pitch(self, line: Array, tonal: Mask) -> list[tuple[int, int]]:
         """Runs of frames of one tone: it may glide, leap to a multiple, or be drowned for a moment."""
         octaves = np.abs(np.diff(np.log2(np.maximum(line, 1e-9))))
         bins = np.abs(np.diff(line)) / self.frequencies[1]
@@ -386,7 +382,7 @@ class Hearing:
     def _frame(self, row: int) -> int:
         return int(min(self.power.shape[1], round(row / self.hop)))
 
-    def _refined(self, peak: NDArray[np.intp]) -> Array:
+    def _refined(self, peak: Rows) -> Array:
         inner = np.clip(peak, 1, len(self.frequencies) - 2)
         columns = np.arange(len(peak))
         low, middle, high = (_decibel(self.power[inner + side, columns]) for side in (-1, 0, 1))
@@ -486,7 +482,7 @@ def _middle(values: Array, levels: Array) -> float:
     return float(values[order][np.searchsorted(share, share[-1] / 2)])
 
 
-def _multiples(one: Array | float, other: Array | float) -> Flags:
+def _multiples(one: Array | float, other: Array | float) -> Mask:
     """Whether one frequency is two to six times another."""
     ratio = np.maximum(one, other) / np.maximum(np.minimum(one, other), 1e-9)
     whole = np.rint(ratio)
@@ -510,9 +506,8 @@ def _decibel(power: Array | float) -> Array:
     return np.asarray(10 * np.log10(np.maximum(power, 1e-300)))
 
 
-def _runs(flags: Flags) -> list[tuple[int, int]]:
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(int)))
-    return [(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
+def _runs(flags: Mask) -> list[tuple[int, int]]:
+    return [(int(first), int(end)) for first, end in zip(*stretches(flags), strict=True)]
 
 
 def _joined(runs: list[tuple[int, int]], gap: int) -> list[tuple[int, int]]:

@@ -9,15 +9,13 @@ from types import ModuleType
 from typing import Any, cast
 
 import numpy as np
-from numpy.typing import NDArray
 
+from stickslip.arrays import Array
 from stickslip.errors import FormatError, RecordError
 from stickslip.estimate import Plain, plain
 from stickslip.record.record import Record
 from stickslip.squeak.bursts import LOWEST
 from stickslip.squeak.hearing import PULSE, chosen_channel, clipped_rows, filtered, short_time_level
-
-Array = NDArray[np.float64]
 
 NEEDED = 48_000  # Hz, of the methods
 ROUGH = 0.2  # s, of a roughness's window

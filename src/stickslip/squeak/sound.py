@@ -10,8 +10,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from stickslip.arrays import Array
 from stickslip.drives.kinds import HarmonicBase
 from stickslip.errors import ModelError, RecordError
 from stickslip.laws.coulomb import LinearSlope
@@ -24,7 +25,6 @@ from stickslip.units import parse_constant
 if TYPE_CHECKING:
     from stickslip.solve.trajectory import Trajectory
 
-Array = NDArray[np.float64]
 
 AIR, SPEED_OF_SOUND = 1.204, 343.2  # kg/m^3 and m/s, dry air at 20 C and 101.325 kPa
 REFERENCES = {"Pa": 20e-6, "m/s^2": 1e-6, "m/s": 1e-9, "N": 1e-6}  # ISO 1683

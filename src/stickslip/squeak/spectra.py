@@ -14,16 +14,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from stickslip.arrays import Array, Complex
 from stickslip.errors import EstimateError, FormatError, RecordError
 from stickslip.files.write import require_free, whole
 from stickslip.record.record import Record
 from stickslip.squeak.bursts import Squeak, Squeaks, find_squeaks
 from stickslip.squeak.hearing import chosen_channel, filtered
-
-Array = NDArray[np.float64]
-Waves = NDArray[np.complex128]
 
 LISTENED = ("a", "v", "normal_acceleration", "torsion_velocity", "friction", "load", "sound")
 LONGEST = 0.1  # s: the window where bursts allow it
@@ -215,16 +212,16 @@ def _longest(record: Record, squeaks: Squeaks) -> tuple[int, Stretches]:
     )
 
 
-def _waves(values: Array, rows: list[int], size: int) -> Waves:
+def _waves(values: Array, rows: list[int], size: int) -> Complex:
     parts = values[np.add.outer(rows, np.arange(size))]
     return np.asarray(np.fft.rfft((parts - parts.mean(axis=1, keepdims=True)) * np.hanning(size), axis=1))
 
 
-def _power(waves: Waves) -> Array:
+def _power(waves: Complex) -> Array:
     return np.asarray(np.mean(np.abs(waves) ** 2, axis=0))
 
 
-def _cross(waves: Mapping[str, Waves], pair: tuple[str, str]) -> tuple[Array, Array]:
+def _cross(waves: Mapping[str, Complex], pair: tuple[str, str]) -> tuple[Array, Array]:
     """Coherence and phase of two channels."""
     one, other = (waves[name] for name in pair)
     shared = np.mean(one * np.conj(other), axis=0)

@@ -12,8 +12,8 @@ from itertools import combinations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from stickslip.arrays import Array, Complex
 from stickslip.drives.kinds import Belt
 from stickslip.errors import ModelError
 from stickslip.laws.base import Exit
@@ -25,7 +25,6 @@ ROUNDING = 1e-11  # of the largest eigenvalue: growth below it is none
 STEPS = 30  # of Newton towards steady sliding under loads that grow with a power: a dozen reach it from no load
 JAMS, ITSELF = "jamming", "the structure itself"
 
-Array = NDArray[np.float64]
 Matrices = tuple[Array, Array, Array]
 System = Oscillator | Structure
 
@@ -46,7 +45,7 @@ class SlidingMode:
 
     frequency: float
     growth: float
-    shape: NDArray[np.complex128]
+    shape: Complex
 
     @property
     def damping_ratio(self) -> float:

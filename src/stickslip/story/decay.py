@@ -11,6 +11,7 @@ import numpy as np
 
 from stickslip.answers.decays import CLEAR, Decay
 from stickslip.answers.findings import Comparison, Findings
+from stickslip.arrays import Array
 from stickslip.decay.answer import beginning, rig_units
 from stickslip.decay.choice import SIZE
 from stickslip.decay.decrement import Decrement
@@ -18,7 +19,7 @@ from stickslip.decay.fit_decay import LEFT_OVER, UNSHARED
 from stickslip.decay.release import CAUGHT
 from stickslip.estimate import Estimate, kinds
 from stickslip.figures.decay import plates_of, plates_together
-from stickslip.record.record import Array, Record
+from stickslip.record.record import Record
 from stickslip.story.scope import Scope, completed, corrected, of_fit
 from stickslip.story.story import Line, Story, Table, tried
 from stickslip.story.words import WITHIN_DIGIT, cautions, doubts, interval_of, number, value_of

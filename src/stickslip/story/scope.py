@@ -11,11 +11,12 @@ from typing import Any
 import numpy as np
 
 from stickslip.answers.findings import Findings
+from stickslip.arrays import Array
 from stickslip.balance.motion import is_measured
 from stickslip.consistent.checks import Slip
 from stickslip.errors import StickslipError
 from stickslip.figures.contact import across
-from stickslip.figures.style import Array, envelope, prefixed, spelled
+from stickslip.figures.style import envelope, prefixed, spelled
 from stickslip.files.expression import shifted, split_spec, times
 from stickslip.printing import printable
 from stickslip.record.record import RIG_UNITS, Record
