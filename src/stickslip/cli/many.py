@@ -11,7 +11,7 @@ import click
 
 import stickslip as ss
 from stickslip.cli.records import answer_together, names_of, together
-from stickslip.cli.terminal import deliver, progress
+from stickslip.cli.terminal import Output, progress
 
 if TYPE_CHECKING:
     from stickslip import Record
@@ -118,14 +118,14 @@ def answer_many(
     query: Mapping[str, Any],
     places: Places,
     *,
-    folder: Path,
-    output: Path | None,
-    **shown: bool,
+    usual: Path,
+    output: Output,
 ) -> None:
-    """Ask all records, show what was found, write it into `folder` (not of JSON alone), forget what was kept of it."""
+    """Ask all records, show what was found, write it into a folder (not of JSON alone), forget what was kept of it."""
+    folder = output.chosen or usual
     with progress(len(groups)) as tell:
         batch = ask_many(question, groups, rig, query, places, folder=folder, tell=tell)
-    deliver(batch, folder if output or not shown["as_json"] else None, **shown)
+    output.deliver(batch, output.folder(usual))
     if places.table is not None:
         ss.story.write_table(batch, places.table)
     _kept(folder).unlink(missing_ok=True)
@@ -139,22 +139,20 @@ def answer_all(
     places: Places,
     *,
     compare: Callable[[Any], Any],
-    folder: Path,
-    output: Path | None,
-    **shown: bool,
+    usual: Path,
+    output: Output,
 ) -> None:
     """Ask all records: many are a row each, few have each a part of the page, and are compared."""
     if places.wanted(groups):
-        answer_many(question, groups, rig, query, places, folder=folder, output=output, **shown)
+        answer_many(question, groups, rig, query, places, usual=usual, output=output)
         return
     answer_together(
         groups,
         rig,
         lambda record: ASK[question](record, rig, **query),
         together=lambda findings: compare(findings) if len(findings) > 1 else findings[0],
-        folder=folder if output or not shown["as_json"] else None,
-        as_json=shown["as_json"],
-        everything=shown["everything"],
+        folder=output.folder(usual),
+        output=output,
     )
 
 

@@ -16,10 +16,9 @@ from stickslip.cli.terminal import compiling, complain, say, spoken
 from stickslip.errors import INTERRUPTED, INTERRUPTION, MISSTATED, TOO_SHORT, UNNAMED, StickslipError
 
 COMMANDS = {  # by the file that they stand in
-    "analyze": ("analyze", "demo", "impact"),
+    "analyze": ("analyze", "demo", "fit", "impact", "predict"),
     "bench": ("acquire", "commission", "devices", "simulated_bench"),
     "files": ("check", "convert", "datasets", "init"),
-    "fit": ("fit", "predict"),
     "rig": ("rig", "thesis"),
     "simulate": ("bifurcation", "dither", "lab", "simulate", "stability", "sweep"),
     "vibrations": ("decay", "joint", "squeak", "tribometer", "wavelet"),

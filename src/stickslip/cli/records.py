@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import click
 
 import stickslip as ss
-from stickslip.cli.terminal import complain, deliver, progress, spoken
+from stickslip.cli.terminal import Output, complain, progress, spoken
 
 if TYPE_CHECKING:
     from stickslip import Record
@@ -241,8 +241,7 @@ def answer_together(
     *,
     together: Callable[[list[Answer]], Any],
     folder: Path | None,
-    as_json: bool,
-    everything: bool,
+    output: Output,
     reader: Reader | None = None,
 ) -> None:
     """Ask every record, put the answers together, leave them in a folder, and show them."""
@@ -250,7 +249,7 @@ def answer_together(
         answered, refused = answers(groups, rig, ask, tell, reader=reader)
         results = with_left_out(together(answered), refused)
     name_left_out(refused)
-    deliver(results, folder, as_json=as_json, everything=everything)
+    output.deliver(results, folder)
 
 
 def _say(tell: Callable[[str, float], None], what: str, done: float, state: str) -> None:
@@ -379,8 +378,11 @@ all_option = click.option(
 
 
 def result_options(folder: str) -> Decorator:
-    """The options that say where the results go, `folder` unless it is said, and how much of them is printed."""
-    output = click.option(
+    """The options that say where the results go, `folder` unless it is said, and how much of them is printed.
+
+    The command gets them together, as its `output`.
+    """
+    chosen = click.option(
         "--output",
         type=click.Path(path_type=Path),
         callback=usable,
@@ -393,7 +395,15 @@ def result_options(folder: str) -> Decorator:
         is_flag=True,
         help="Print the results as JSON and nothing else; a folder is written only with --output.",
     )
-    return together(output, as_json, all_option)
+    return together(chosen, as_json, all_option, _gathered)
+
+
+def _gathered(command: Callable[..., None]) -> Callable[..., None]:
+    @functools.wraps(command)
+    def gathering(*, output: Path | None, as_json: bool, everything: bool, **arguments: Any) -> None:
+        command(output=Output(output, as_json, everything), **arguments)
+
+    return gathering
 
 
 changes_option = click.option(

@@ -23,7 +23,7 @@ from stickslip.cli.records import (
     rig_of,
     wanted_case,
 )
-from stickslip.cli.terminal import aligned, deliver, progress, say, say_json, wrapped
+from stickslip.cli.terminal import Output, aligned, progress, say, say_json, wrapped
 
 if TYPE_CHECKING:
     from stickslip import Record, Rig
@@ -96,7 +96,7 @@ def rig() -> None:
 @form_option
 @case_options
 @result_options("NAME-rig, or NAME-plan,")
-def measure(case: str, output: Path | None, as_json: bool, everything: bool, plan: bool, **options: Any) -> None:
+def measure(case: str, output: Output, plan: bool, **options: Any) -> None:
     """Measure a simulated motion with a virtual rig, or plan an experiment on it.
 
     SCENARIO or FILE.toml is what stickslip simulate takes. The record is what sensors would have written that lag,
@@ -114,7 +114,7 @@ def measure(case: str, output: Path | None, as_json: bool, everything: bool, pla
     """
     wanted = wanted_case(case, **{key: options.pop(key) for key in ("duration", "cycles", "changes")})
     bench = _bench(options.pop("preset"), options.pop("sensors"))
-    folder = output or (None if as_json else folder_name(wanted, "plan" if plan else "rig"))
+    folder = output.folder(folder_name(wanted, "plan" if plan else "rig"))
     needs = [pair(need, "--need") for need in options.pop("need")]
     if needs and not plan:
         raise click.BadParameter("what is needed is asked of a plan; add --plan", param_hint="--need")
@@ -126,7 +126,7 @@ def measure(case: str, output: Path | None, as_json: bool, everything: bool, pla
         run = ss.story.outcome(wanted, progress=lambda share: tell(f"simulating, {100 * share:.0f} %", 0)).run
         results = _planned(run, bench, tell, options) if plan else _measured(run, bench, tell, options)
     context = {"needs": needs} if plan else {"form": form}
-    deliver(results, folder, as_json=as_json, everything=everything, **context)
+    output.deliver(results, folder, **context)
 
 
 def _bench(preset: str, changes: tuple[str, ...]) -> Rig:
@@ -184,7 +184,7 @@ def _planned(
 )
 @result_options("FIRST-joined")
 @reading_options
-def join(first: str, second: str, output: Path | None, as_json: bool, everything: bool, **options: Any) -> None:
+def join(first: str, second: str, output: Output, **options: Any) -> None:
     """Make one record of what two recorders wrote of the same run, each on its own clock.
 
     FIRST keeps its clock; SECOND is moved by the offset at which both saw the same motion, and interpolated onto FIRST.
@@ -213,14 +213,13 @@ def join(first: str, second: str, output: Path | None, as_json: bool, everything
         named_on: Any = shared[0] if shared and len(shared) == 1 else shared
         rate = ss.signals.clock_rate(a, b, on=named_on) if drift else 1.0
         joined = ss.signals.synchronise(a, b, on=named_on, offset=seconds, rate=rate)
-    folder = output or (None if as_json else folder_after(groups[0][0], "joined"))
-    deliver(joined, folder, as_json=as_json, everything=everything, form=form)
+    output.deliver(joined, output.folder(folder_after(groups[0][0], "joined")), form=form)
 
 
 @click.command()
 @click.argument("chapters", nargs=-1, metavar="[CHAPTER]...")
 @result_options("thesis-stickslip")
-def thesis(chapters: tuple[str, ...], output: Path | None, as_json: bool, everything: bool) -> None:
+def thesis(chapters: tuple[str, ...], output: Output) -> None:
     """Reproduce the thesis: every printed number beside ours with a verdict, every figure beside its caption.
 
     All chapters, or those named: numbers and figures are computed from the printed parameters, and one page is
@@ -239,14 +238,14 @@ def thesis(chapters: tuple[str, ...], output: Path | None, as_json: bool, everyt
     wanted = chapters or tuple(pages.CHAPTERS)
     if strangers := [name for name in wanted if name not in pages.CHAPTERS]:
         raise click.BadParameter(f"'{strangers[0]}' is none of {', '.join(pages.CHAPTERS)}", param_hint="CHAPTER")
-    folder = output or (None if as_json else Path("thesis-stickslip"))
+    folder = output.folder(Path("thesis-stickslip"))
     with progress(len(wanted) + 1) as tell:
         done = pages.reproduce(wanted, folder=folder, tell=tell)
     results = pages.results(done)
-    if as_json:
+    if output.as_json:
         say_json(results)
     else:
-        _show(results, done, folder, everything=everything)
+        _show(results, done, folder, everything=output.everything)
     if not pages.holds(results):
         raise SystemExit(1)
 

@@ -26,7 +26,7 @@ from stickslip.cli.records import (
     wanted_case,
 )
 from stickslip.cli.terminal import (
-    deliver,
+    Output,
     print_json,
     progress,
     publish,
@@ -63,9 +63,7 @@ LIST_WIDTH = 100
 def simulate(
     case: str | None,
     listed: bool,
-    output: Path | None,
-    as_json: bool,
-    everything: bool,
+    output: Output,
     fmu: Path | None,
     **options: Any,
 ) -> None:
@@ -85,19 +83,19 @@ def simulate(
     Ctrl-C while it runs keeps what was simulated until then, marked "interrupted", with exit code 130.
     """
     if case is None or listed:
-        _list_scenarios(as_json=as_json, everything=everything)
+        _list_scenarios(as_json=output.as_json, everything=output.everything)
         return
     wanted = wanted_case(case, **{key: options.pop(key) for key in ("duration", "cycles", "changes", "fs")})
     if fmu is not None:
         _write_fmu(wanted, fmu)
-    folder = output or (None if as_json else folder_name(wanted, "stickslip"))
+    folder = output.folder(folder_name(wanted, "stickslip"))
     if folder:
         ss.story.require_output(wanted, folder=folder, **{key: options[key] for key in ("form", "animation")})
     with progress(1) as tell:
         tell("simulating", 0)
         result = ss.story.outcome(wanted, progress=lambda share: tell(f"simulating, {100 * share:.0f} %", share))
     parts = 4 if options["animation"] else 3
-    deliver(result, folder, as_json=as_json, everything=everything, parts=parts, **options)
+    output.deliver(result, folder, parts=parts, **options)
     if result.run.status == "interrupted":
         raise SystemExit(INTERRUPTED)
 
@@ -208,9 +206,7 @@ def sweep(file: Path, engine: str, store: Path | None, output: Path | None, as_j
 )
 @changes_option
 @result_options("NAME-stability")
-def stability(
-    case: str, output: Path | None, as_json: bool, everything: bool, speed: str | None, changes: tuple[str, ...]
-) -> None:
+def stability(case: str, output: Output, speed: str | None, changes: tuple[str, ...]) -> None:
     """Does steady sliding last, or does it squeal, and what feeds the vibration?
 
     SCENARIO or FILE.toml is what stickslip simulate takes: a mass or a structure on a belt, or at the speed given. Told
@@ -223,7 +219,7 @@ def stability(
     """
     wanted = _case(case, changes)
     fast = None if speed is None else number_of(speed, "m/s", "--speed")
-    _answer(wanted, "stability", lambda: ss.stability(wanted.system, speed=fast), output, as_json, everything)
+    _answer(wanted, "stability", lambda: ss.stability(wanted.system, speed=fast), output)
 
 
 @click.command()
@@ -242,9 +238,7 @@ def stability(
 @click.option("--branches", is_flag=True, help="Continue periodic orbits too, the unstable ones between.")
 @changes_option
 @result_options("NAME-bifurcation")
-def bifurcation(
-    case: str, parameter: str, output: Path | None, as_json: bool, everything: bool, **options: Any
-) -> None:
+def bifurcation(case: str, parameter: str, output: Output, **options: Any) -> None:
     """How does the motion change with a PARAMETER, and which motions exist side by side?
 
     The motion is followed upwards and downwards; where both differ there is hysteresis. Changes of the kind of motion
@@ -264,8 +258,6 @@ def bifurcation(
         "bifurcation",
         lambda: ss.bifurcation(wanted.system, parameter, values=values, **chosen),
         output,
-        as_json,
-        everything,
     )
 
 
@@ -301,7 +293,7 @@ def bifurcation(
 )
 @changes_option
 @result_options("NAME-dither")
-def dither(case: str, output: Path | None, as_json: bool, everything: bool, **options: Any) -> None:
+def dither(case: str, output: Output, **options: Any) -> None:
     """Which is the smallest fast vibration along the contact that removes stick-slip?
 
     Amplitudes are tried by exact simulation, from small to large, until no stick outlasts a period of the dither.
@@ -321,8 +313,6 @@ def dither(case: str, output: Path | None, as_json: bool, everything: bool, **op
         "dither",
         lambda: ss.dither(system, frequency=tones, start=wanted.start or None, **chosen),
         output,
-        as_json,
-        everything,
     )
 
 
@@ -330,14 +320,12 @@ def _case(name: str, changes: Sequence[str]) -> Case:
     return wanted_case(name, duration=None, cycles=None, changes=changes)
 
 
-def _answer(
-    case: Case, what: str, ask: Callable[[], Any], output: Path | None, as_json: bool, everything: bool
-) -> None:
-    folder = output or (None if as_json else folder_name(case, what))
+def _answer(case: Case, what: str, ask: Callable[[], Any], output: Output) -> None:
+    folder = output.folder(folder_name(case, what))
     with progress(1) as tell:
         tell(f"{what} of {case.name}", 0)
         answer = ask()
-    deliver(answer, folder, as_json=as_json, everything=everything)
+    output.deliver(answer, folder)
 
 
 PORT = 8723

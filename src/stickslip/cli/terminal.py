@@ -14,6 +14,7 @@ import sys
 import textwrap
 import threading
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -224,6 +225,31 @@ def deliver(
             tell("drawing and writing", 0)
             written = publish(result, folder, **({"tell": tell} if parts else {}), **context)
     say_report(written, as_json=as_json)
+
+
+@dataclass(frozen=True)
+class Output:
+    """Where the results of a command go, and how much of them is printed: as result_options have it.
+
+    Attributes
+    ----------
+    chosen : Path or None
+        The folder asked for.
+    as_json, everything : bool
+        Whether JSON is printed and nothing else, or all of the story.
+    """
+
+    chosen: Path | None
+    as_json: bool
+    everything: bool
+
+    def folder(self, usual: Path) -> Path | None:
+        """The folder asked for, or the usual one; none where JSON alone is asked for."""
+        return self.chosen or (None if self.as_json else usual)
+
+    def deliver(self, result: Any, folder: Path | None, **context: Any) -> None:
+        """Show a result, then write its folder, as :func:`deliver` does."""
+        deliver(result, folder, as_json=self.as_json, everything=self.everything, **context)
 
 
 def say_report(written: Path | None, *, as_json: bool) -> None:

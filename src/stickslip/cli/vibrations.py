@@ -26,7 +26,7 @@ from stickslip.cli.records import (
     result_options,
     rig_of,
 )
-from stickslip.cli.terminal import deliver, progress
+from stickslip.cli.terminal import Output, progress
 
 if TYPE_CHECKING:
     from stickslip import Record
@@ -51,9 +51,7 @@ BLOCK = 1_000_000  # rows of a part that is mapped: spikes and sticks are asked 
 )
 @result_options("LOG-joint")
 @reading_options
-def joint(
-    files: tuple[str, ...], output: Path | None, as_json: bool, everything: bool, propose: Path | None, **options: Any
-) -> None:
+def joint(files: tuple[str, ...], output: Output, propose: Path | None, **options: Any) -> None:
     """How much friction is in this joint of a robot, servo or axis?
 
     Each of LOGS holds its position with one of: the torque, the motor's current (then --torque-constant), or the
@@ -79,7 +77,7 @@ def joint(
         raise click.BadParameter(f"'{propose}' is there already; name another file", param_hint="--propose")
     rig = rig_of(**options)
     groups = groups_of(*files)
-    folder = output or (None if as_json else default_folder(groups, "joint"))
+    folder = output.folder(default_folder(groups, "joint"))
 
     def ask(record: Record) -> list[Findings]:
         parts = list(ss.answers.episodes(record))
@@ -94,7 +92,7 @@ def joint(
     if propose is not None:
         log = ss.answers.axis_record(next(ss.answers.episodes(ss.answers.read_mended(groups[0], rig=rig))), axis=axis)
         ss.write_record(ss.cycle.telling_motion(log), propose)
-    answer_together(groups, rig, ask, together=together, folder=folder, as_json=as_json, everything=everything)
+    answer_together(groups, rig, ask, together=together, folder=folder, output=output)
 
 
 @click.command()
@@ -103,9 +101,7 @@ def joint(
 @click.option("--frequency", metavar="HZ", help="Strokes to and fro in a second; found unless given.")
 @result_options("FILE-tribometer")
 @reading_options
-def tribometer(
-    files: tuple[str, ...], output: Path | None, as_json: bool, everything: bool, frequency: str | None, **options: Any
-) -> None:
+def tribometer(files: tuple[str, ...], output: Output, frequency: str | None, **options: Any) -> None:
     """What is the coefficient of friction, by which definition, and how does it wear in?
 
     FILES are tests of a tribometer that slides to and fro: displacement or velocity, the friction force, and the
@@ -125,16 +121,13 @@ def tribometer(
     rig = rig_of(**options)
     groups = groups_of(*files)
     require_fits(options["normal"], groups)
-    folder = output or (None if as_json else default_folder(groups, "tribometer"))
-
     answer_together(
         groups,
         rig,
         lambda record: ss.answers.analyze_tribometer(record, frequency=strokes, rig=rig),
         together=lambda tests: ss.answers.compare_tribometers(tests) if len(tests) > 1 else tests[0],
-        folder=folder,
-        as_json=as_json,
-        everything=everything,
+        folder=output.folder(default_folder(groups, "tribometer")),
+        output=output,
     )
 
 
@@ -160,7 +153,7 @@ def tribometer(
 @many_options
 @result_options("FILE-stickslip")
 @reading_options
-def decay(files: tuple[str, ...], output: Path | None, as_json: bool, everything: bool, **options: Any) -> None:
+def decay(files: tuple[str, ...], output: Output, **options: Any) -> None:
     """Tell viscous from dry friction by how a released mass dies away.
 
     FILES hold free decays: displacement, angle, velocity or acceleration of something that was let go. Several
@@ -173,7 +166,7 @@ def decay(files: tuple[str, ...], output: Path | None, as_json: bool, everything
     stickslip decay release.csv --channels "x=disp [mm]" --stiffness "2.31 N/mm"
     stickslip decay "release_*.csv" --method thesis --json
     """
-    places, shown = Places.of(options), {"as_json": as_json, "everything": everything}
+    places = Places.of(options)
     query = {key: options.pop(key) for key in ("method", "channel", "restoring", "mass", "stiffness")}
     rig = rig_of(**options)
     if any(repair.partition(":")[0] == "drift" for repair in rig.repair):
@@ -183,10 +176,10 @@ def decay(files: tuple[str, ...], output: Path | None, as_json: bool, everything
             "leave it out: what drifts is said, and the whole waveform bears it",
         )
     groups = groups_of(*files)
-    folder = output or (default_folder(groups) if len(groups) == 1 else Path("decays-stickslip"))
+    usual = default_folder(groups) if len(groups) == 1 else Path("decays-stickslip")
     query |= {key: getattr(rig, key) for key in ("mass", "stiffness") if query[key] is None}
     compare = ss.answers.compare_decays
-    answer_all("decay", groups, rig, query, places, compare=compare, folder=folder, output=output, **shown)
+    answer_all("decay", groups, rig, query, places, compare=compare, usual=usual, output=output)
 
 
 @click.command()
@@ -203,9 +196,7 @@ def decay(files: tuple[str, ...], output: Path | None, as_json: bool, everything
 @reading_options
 def squeak(
     files: tuple[str, ...],
-    output: Path | None,
-    as_json: bool,
-    everything: bool,
+    output: Output,
     channel: str | None,
     frequencies: str | None,
     lever: str | None,
@@ -223,14 +214,14 @@ def squeak(
     stickslip squeak squeal.wav --channels "sound=sound * 2.5 [Pa]"
     stickslip squeak wet_6N.csv wet_1N.csv --normal "*6N*=6.13" --normal "*1N*=1.23"
     """
-    places, shown = Places.of(options), {"as_json": as_json, "everything": everything}
+    places = Places.of(options)
     rig = rig_of(**options)
     groups = groups_of(*files)
     require_fits(options["normal"], groups)
-    folder = output or Path(f"{groups[0][0].stem}-squeak" if len(groups) == 1 else "squeaks-compared")
+    usual = Path(f"{groups[0][0].stem}-squeak" if len(groups) == 1 else "squeaks-compared")
     query = {"channel": channel, "frequencies": frequencies, "lever": lever}
     compare = ss.answers.compare_squeaks
-    answer_all("squeak", groups, rig, query, places, compare=compare, folder=folder, output=output, **shown)
+    answer_all("squeak", groups, rig, query, places, compare=compare, usual=usual, output=output)
 
 
 @click.command()
@@ -243,9 +234,7 @@ def squeak(
 @click.option("--stiffness", metavar="VALUE", help="Spring in N/m, or with its unit, for the same.")
 @result_options("FILE-wavelet")
 @reading_options
-def wavelet(
-    file: str, output: Path | None, as_json: bool, everything: bool, frequencies: str | None, **options: Any
-) -> None:
+def wavelet(file: str, output: Output, frequencies: str | None, **options: Any) -> None:
     """Map a channel over time and frequency, and tell what its sticks are like.
 
     Of an acceleration: at which frequency the contact rings while the mass sticks, how many micro-slips there are,
@@ -258,13 +247,12 @@ def wavelet(
     files = files_of(file, "one is mapped at a time")
     query = {key: options.pop(key) for key in ("channel", "wavelet_frequency", "normalisation")}
     rig = rig_of(**options)
-    folder = output or (None if as_json else folder_after(files[0], "wavelet"))
     with progress(2) as tell:
         tell(f"reading {name_of(files)}", 0)
         parts = _told_of(ss.answers.read_parts(files, rig=rig, size=BLOCK), tell)
         query |= {"mass": rig.mass, "stiffness": rig.stiffness}
         findings = ss.answers.time_frequency(parts, frequencies=frequencies, **query)
-    deliver(findings, folder, as_json=as_json, everything=everything)
+    output.deliver(findings, output.folder(folder_after(files[0], "wavelet")))
 
 
 def _told_of(parts: Iterator[Record], tell: Callable[[str, float], None]) -> Iterator[Record]:
