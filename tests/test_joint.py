@@ -58,7 +58,7 @@ def test_truth_without_noise():
 
 
 @pytest.mark.parametrize("kind", ["torque", "controller", "play"])
-@pytest.mark.parametrize(("draws", "least"), [(15, 0.78), pytest.param(250, 0.91, marks=pytest.mark.soak)])
+@pytest.mark.parametrize(("draws", "least"), [(8, 0.71), pytest.param(250, 0.91, marks=pytest.mark.soak)])
 def test_intervals_hold_on_joints_of_another_integrator(kind, draws, least):
     """Of 250 each 93 to 97 % held; `least` is three binomial deviations below 95 %."""
     held = []
@@ -79,7 +79,7 @@ def test_intervals_hold_on_joints_of_another_integrator(kind, draws, least):
     assert np.mean(held) >= least
 
 
-@pytest.mark.parametrize(("draws", "least"), [(12, 0.75), pytest.param(250, 0.91, marks=pytest.mark.soak)])
+@pytest.mark.parametrize(("draws", "least"), [(8, 0.71), pytest.param(250, 0.91, marks=pytest.mark.soak)])
 def test_friction_over_the_temperature_is_told_or_left_alone(draws, least):
     """Of joints that warm up, with friction that falls or does not; `least` is three binomial deviations below 95 %."""
     held, claimed = [], []
@@ -173,10 +173,11 @@ def test_constants_that_are_stated_go_through():
     assert controlled.forward.value == pytest.approx(0.07, rel=0.02)
 
 
-def test_a_load_part_is_not_made_up():
-    """Without one its interval holds zero, as often as it should: in 27 of 30 draws or more."""
-    loads = [regress_joint(log(noise=0.02, seed=seed, load=0.0)).load for seed in range(30)]
-    assert sum(load.interval[0] <= 0 for load in loads) >= 26
+@pytest.mark.parametrize(("draws", "least"), [(8, 0.71), pytest.param(30, 0.86, marks=pytest.mark.soak)])
+def test_a_load_part_is_not_made_up(draws, least):
+    """Without one its interval holds zero, as often as it should."""
+    loads = [regress_joint(log(noise=0.02, seed=seed, load=0.0)).load for seed in range(draws)]
+    assert np.mean([load.interval[0] <= 0 for load in loads]) >= least
 
 
 def test_what_the_log_can_not_tell_is_said_with_the_motion_that_would():
