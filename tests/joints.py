@@ -76,7 +76,7 @@ class Joint:
         return float(warm[np.rint(time * self.record.fs).astype(int)].mean() - warm.mean())
 
 
-@numba.njit
+@numba.njit(cache=True)
 def march(p, reference, slope, steps, count, control, heat=(COLD, 0.0, 0.0), falls=(2.0, 1.0)):  # type: ignore[no-untyped-def]
     """Angle and motor torque at each sample of a reference that is known at `steps` instants a sample.
 
@@ -107,7 +107,7 @@ def march(p, reference, slope, steps, count, control, heat=(COLD, 0.0, 0.0), fal
     return angle, torque
 
 
-@numba.njit
+@numba.njit(cache=True)
 def march_slack(p, slack, reference, slope, steps, count, control):  # type: ignore[no-untyped-def]
     """Angles of motor and link, and motor torque, of a joint whose teeth have play: two masses, each rubbing.
 

@@ -43,7 +43,7 @@ class Servo:
     records: tuple[ss.Record, ...]
 
 
-@numba.njit
+@numba.njit(cache=True)
 def _level(x, rough):  # type: ignore[no-untyped-def]
     """Friction at a place over its mean."""
     total = 1.0
@@ -52,7 +52,7 @@ def _level(x, rough):  # type: ignore[no-untyped-def]
     return total
 
 
-@numba.njit
+@numba.njit(cache=True)
 def _passed(x, rough):  # type: ignore[no-untyped-def]
     """Mean of the friction over its level along the way, and the way."""
     total, way = 0.0, 0.0
@@ -62,14 +62,14 @@ def _passed(x, rough):  # type: ignore[no-untyped-def]
     return total / way, way
 
 
-@numba.njit
+@numba.njit(cache=True)
 def _between(z, i, share):  # type: ignore[no-untyped-def]
     """The base between three instants half a step apart."""
     a, b, c = z[2 * i], z[2 * i + 1], z[2 * i + 2]
     return a + share * (-3 * a + 4 * b - c) + 2 * share * share * (a - 2 * b + c)
 
 
-@numba.njit
+@numba.njit(cache=True)
 def _rigid(p, z, h, rough):  # type: ignore[no-untyped-def]
     m, k, c, kinetic, static, fall = p[:6]
     count = z.shape[0] // 2
@@ -126,7 +126,7 @@ def _rigid(p, z, h, rough):  # type: ignore[no-untyped-def]
     return out
 
 
-@numba.njit
+@numba.njit(cache=True)
 def _remembering(p, z, h, rough, kind):  # type: ignore[no-untyped-def]
     """Contacts with a memory: a spring that slides (3), friction that lags (4), bristles (5)."""
     m, k, c, kinetic, static, fall, contact, loss, rate, steep = p

@@ -55,7 +55,7 @@ class Rig:
         return {"mass": self.mass, "stiffness": self.stiffness, "damping": self.damping}
 
 
-@numba.njit
+@numba.njit(cache=True)
 def along(x, amplitude, rough):  # type: ignore[no-untyped-def]
     """Friction at a place over its mean, which strays by a share: three waves along the surface."""
     place = x / amplitude
@@ -67,7 +67,7 @@ def passed(x: np.ndarray, rig: Rig) -> float:
     return float(np.average(along((x[1:] + x[:-1]) / 2, rig.amplitude, rig.rough), weights=np.abs(np.diff(x))))
 
 
-@numba.njit
+@numba.njit(cache=True)
 def _accelerated(t, x, v, way, p):  # type: ignore[no-untyped-def]
     m, k, c, amplitude, w, kinetic, static, slope, speed = p[:9]
     drop = (static - kinetic) * np.exp(-((abs(v) / speed) ** p[11])) if speed > 0 else 0.0
@@ -75,7 +75,7 @@ def _accelerated(t, x, v, way, p):  # type: ignore[no-untyped-def]
     return (k * (amplitude * np.sin(w * t) - x) - c * v - way * dry - slope * v) / m
 
 
-@numba.njit
+@numba.njit(cache=True)
 def _step(t, x, v, way, h, p):  # type: ignore[no-untyped-def]
     a1 = _accelerated(t, x, v, way, p)
     a2 = _accelerated(t + h / 2, x + h / 2 * v, v + h / 2 * a1, way, p)
@@ -84,7 +84,7 @@ def _step(t, x, v, way, h, p):  # type: ignore[no-untyped-def]
     return x + h * v + h * h / 6 * (a1 + a2 + a3), v + h / 6 * (a1 + 2 * a2 + 2 * a3 + a4)
 
 
-@numba.njit
+@numba.njit(cache=True)
 def _rigid(p, samples, settle, h, steps):  # type: ignore[no-untyped-def]
     """Displacement, velocity and acceleration at each sample; time stuck, and stops."""
     k, amplitude, w, static = p[1], p[3], p[4], p[6]
@@ -129,7 +129,7 @@ def _rigid(p, samples, settle, h, steps):  # type: ignore[no-untyped-def]
     return out, held, stops
 
 
-@numba.njit
+@numba.njit(cache=True)
 def _compliant(p, samples, settle, h, steps):  # type: ignore[no-untyped-def]
     """The same of a contact that is a spring until it slides; no sticks are counted."""
     m, k, c, amplitude, w, kinetic, stiffness = p[0], p[1], p[2], p[3], p[4], p[5], p[9]
@@ -148,7 +148,7 @@ def _compliant(p, samples, settle, h, steps):  # type: ignore[no-untyped-def]
     return out, 0.0, 0
 
 
-@numba.njit
+@numba.njit(cache=True)
 def _remembering(p, samples, settle, h, steps):  # type: ignore[no-untyped-def]
     """The same of a friction that remembers: its own equation solved exactly in each step, at the step's velocity."""
     m, k, c, amplitude, w, kinetic, static, _, speed, stiffness, rate, exponent = p[:12]

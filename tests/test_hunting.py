@@ -13,7 +13,7 @@ from stickslip.squeak import servo_hunting as hunting
 JOINT = {"inertia": 0.02, "kp": 18.0}
 
 
-@numba.njit
+@numba.njit(cache=True)
 def rests(loop, kinetic, static, start, dt, steps, most=np.inf, fastest=np.inf):  # type: ignore[no-untyped-def]
     """Times and places at which a loop comes to rest, by short steps in which friction takes off what it can.
 
