@@ -129,6 +129,8 @@ def common_period(frequencies: Sequence[float]) -> float:
     >>> common_period([2.0, 3.0]), common_period([2.5, 2.5 * 2**0.5])
     (1.0, inf)
     """
+    if len(frequencies) == 1:
+        return 1 / frequencies[0]
     ratios = [Fraction(frequency / frequencies[0]).limit_denominator(LONGEST) for frequency in frequencies]
     exact = [abs(f - r * frequencies[0]) <= SAME * f for f, r in zip(frequencies, ratios, strict=True)]
     if not all(exact):
