@@ -130,6 +130,56 @@ def test_a_disk_that_fills_while_the_record_is_written_leaves_the_journal(tmp_pa
     assert len(ss.read_record(tmp_path / "a.h5.journal")) == 20_000
 
 
+INTERRUPTED_TWICE = """
+import signal, sys, time
+from stickslip.bench import recording, tape
+from stickslip.cli.program import main
+
+signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background jobs are born deaf to it
+moment, written, keep = sys.argv[1], tape.write_record, tape.Tape.write
+
+def wait(word):
+    print(word, flush=True)
+    time.sleep(600)
+
+def write(record, path, **options):
+    if moment == "before":
+        wait("writing")
+    written(record, path, **options)
+    wait("written")
+
+def kept(one, block):
+    keep(one, block)
+    if block.first > 4000:
+        wait("recording")
+
+tape.write_record, tape.Tape.write = write, kept
+main(["acquire", "--device", "sim", "--output", sys.argv[2]])
+"""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows sends no SIGINT to one process alone")
+@pytest.mark.parametrize("moment", ["before", "behind"])
+def test_a_second_ctrl_c_while_the_record_is_written_loses_nothing(tmp_path: Path, moment: str) -> None:
+    """It said that nothing was written, of a record that was whole or a journal that could be made one."""
+    run = [sys.executable, "-c", INTERRUPTED_TWICE, moment, "a run.csv"]
+    with subprocess.Popen(run, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=tmp_path) as process:
+        assert process.stdout is not None
+        for word in ("recording", "writing" if moment == "before" else "written"):
+            assert process.stdout.readline() == f"{word}\n"
+            process.send_signal(signal.SIGINT)
+        _, said = process.communicate()
+    assert process.returncode == 130
+    if moment == "before":
+        command = "stickslip convert 'a run.csv.journal' 'a run.csv'"
+        assert said == f"stickslip: interrupted; a run.csv.journal holds what came: {command} makes a record of it.\n"
+        convert = ["convert", str(tmp_path / "a run.csv.journal"), str(tmp_path / "a run.csv")]
+        assert CliRunner().invoke(main, convert).exit_code == 0
+    else:
+        assert said == "stickslip: interrupted; a run.csv is whole.\n"
+    assert len(ss.read_record(tmp_path / "a run.csv")) > 4000
+
+
 def test_a_trigger_begins_it_and_what_was_before_is_kept(tmp_path: Path) -> None:
     wanted = Wanted(0.5, Trigger("x", 3e-4, before=0.25), {"base": Tone(1e-3, 2.0)})
     still = Sim(system=ss.Oscillator(mass=2.42, stiffness=2310, law=ss.laws.Coulomb(1.1)), fast=True)

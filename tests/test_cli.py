@@ -329,8 +329,53 @@ def test_bad_data_end_in_one_sentence_and_nothing_is_written(kind: str) -> None:
     arguments = damaged(kind)
     before = sorted(Path().iterdir())
     result = run("analyze", *arguments, *RIG)
-    refused(result, code=1)
+    refused(result, code=2 if kind == "missing channel" else 1)
     assert sorted(Path().iterdir()) == before
+
+
+ABSENT = [*MAP[:2], "--channels", "friction=force [N]"]
+NAMED = {  # the commands that read columns, and what each names that is not there
+    "analyze": (ABSENT, [*MAP, "--time", "clock [s]"], [*MAP, "--repair", "drift:z"]),
+    "check": (ABSENT, [*MAP, "--sensor", "z.delay=1 ms"], [*MAP, "--repair", "drift:z"]),
+    "convert": (["out.csv", *ABSENT], ["out.csv", *MAP, "--sensor", "z.delay=1 ms"]),
+    "decay": (ABSENT, [*MAP, "--channel", "v"], [*MAP, "--channel", "swing"], [*MAP, "--sensor", "z.delay=1 ms"]),
+    "fit": (ABSENT, [*MAP, *RIG, "--sensor", "z.delay=1 ms"]),
+    "impact": (ABSENT, [*MAP, "--sensor", "z.delay=1 ms"]),
+    "init": ([*ABSENT, "--yes", "--output", "new.toml"],),
+    "joint": (ABSENT, [*MAP, "--axis", "elbow"]),
+    "predict": (ABSENT,),
+    "rig join": (["run.csv", *ABSENT], ["run.csv", *MAP, "--on", "z"], ["run.csv", *MAP, "--on", "x,z"]),
+    "squeak": (ABSENT, [*MAP, "--channel", "sound"]),
+    "tribometer": (ABSENT,),
+    "wavelet": (ABSENT, [*MAP, "--channel", "a"], [*MAP, "--sensor", "z.delay=1 ms"]),
+}
+
+
+@pytest.mark.parametrize(("command", "named"), [(name, named) for name, every in NAMED.items() for named in every])
+def test_a_column_or_channel_that_is_not_there_is_wrong_use(command: str, named: list[str]) -> None:
+    """It ended with 1, as data that can not answer do; a sensor of none was read over by three commands."""
+    slide("run.csv", rows=1000)
+    Path("slider.toml").write_text('[system]\nmass = 2.0\nstiffness = 1000\n[law]\nname = "Coulomb"\nkinetic = 1.5\n')
+    law = ["slider.toml"] if command == "predict" else []
+    result = run(*command.split(), *law, "run.csv", *named)
+    refused(result, code=2)
+    assert sorted(path.name for path in Path().iterdir()) == ["run.csv", "slider.toml"]
+
+
+def test_a_column_that_a_step_s_file_does_not_have_is_wrong_use() -> None:
+    slide("run.csv", rows=1000)
+    refused(run("commission", "tap=run.csv", "--config", "absent.toml"), code=2)
+    Path("rig.toml").write_text('[channels]\na = "acceleration [g]"\n')
+    refused(run("commission", "tap=run.csv", "--config", "rig.toml"), code=2)
+    lacking = run("commission", "tap=run.csv")
+    assert (lacking.exit_code, "channel a is missing" in " ".join(lacking.stdout.split())) == (1, True)
+
+
+def test_files_of_which_none_has_the_column_are_wrong_use() -> None:
+    slide("run.csv", rows=1000)
+    slide("r2.csv", rows=1000)
+    result = run("analyze", "run.csv", "r2.csv", *ABSENT)
+    assert (result.exit_code, "none of 2 records answers" in result.stderr) == (2, True)
 
 
 @pytest.mark.parametrize(

@@ -47,8 +47,44 @@ def test_a_step_that_is_interrupted_ends_the_walk_and_is_recorded_anew(
     arguments = ["commission", "--device", "desk", "--config", str(rig), "--step", "rest", "--output", str(tmp_path)]
     done = CliRunner().invoke(main, arguments, input="y\n")
     assert done.exit_code == INTERRUPTED
-    assert not [*(tmp_path / "records").iterdir()]
+    records = tmp_path / "records"
+    stay = f"the steps before stay in {records}, and the same command goes on there"
+    assert done.stderr.endswith(f"stickslip: interrupted; {stay}.\n")
+    assert not [*records.iterdir()]
     assert not (tmp_path / "report").exists()
+    (records / "rest.h5.journal").write_bytes(b"of a second Ctrl-C")  # it kept the step from being recorded anew
+    monkeypatch.undo()
+    done = CliRunner().invoke(main, arguments, input="y\n")
+    assert done.exit_code == 0, done.output
+    assert "rest.h5.journal holds what came when it was cut short" in done.stderr
+    assert [path.name for path in records.iterdir()] == ["rest.h5"]
+
+
+def test_no_answer_at_the_prompt_is_an_interruption(tmp_path: Path) -> None:
+    """Ctrl-C there ended in `Aborted!` and code 1."""
+    ss.write_record(bench.SimulatedBench(fs=1000).record("rest"), tmp_path / "rest.csv")
+    rig = tmp_path / "rig.toml"
+    rig.write_text('[devices.desk]\nkind = "file"\npath = "rest.csv"\nfast = true\n', encoding="utf-8")
+    arguments = ["commission", "--device", "desk", "--config", str(rig), "--step", "rest"]
+    done = CliRunner().invoke(main, [*arguments, "--output", str(tmp_path)], input="")
+    assert (done.exit_code, "stickslip: interrupted; the steps before stay" in done.stderr) == (INTERRUPTED, True)
+    done = CliRunner().invoke(main, [*arguments, "--json"])
+    assert (done.exit_code, "name --output" in done.stderr) == (2, True)
+
+
+def test_a_caution_of_all_numbers_of_a_step_is_said_once(tmp_path: Path) -> None:
+    """A slip of 20 ms after a tap: the caution stood behind each of its numbers."""
+    tap = bench.SimulatedBench(fs=4000).record("tap")
+    slips = tap.with_channel("a", tap["a"] + np.where(abs(tap.time - 0.14) < 0.01, 1.5, 0.0), unit="m/s^2")
+    ss.write_record(slips, tmp_path / "tap.csv")
+    rig = tmp_path / "rig.toml"
+    rig.write_text('[devices.desk]\nkind = "file"\npath = "tap.csv"\nfast = true\n', encoding="utf-8")
+    arguments = ["commission", "--device", "desk", "--config", str(rig), "--step", "tap", "--output", str(tmp_path)]
+    done = CliRunner().invoke(main, arguments, input="y\n")
+    assert done.exit_code == 0, done.output
+    said = " ".join(done.stderr.split())
+    assert said.count("no sum of decaying oscillations") == 1
+    assert said.count("Hz (95 %:") > 1
 
 
 def test_the_picture_shows_what_a_channel_read_last() -> None:

@@ -11,6 +11,7 @@ from scipy.signal import lsim, lti
 
 import stickslip as ss
 from rigs import CASES, RIG, measured, told
+from stickslip import bench
 from stickslip.errors import EstimateError, RecordError
 from stickslip.estimate import kinds
 from stickslip.signals.response import resonance
@@ -214,8 +215,23 @@ def test_without_a_tap_or_a_second_sensor_it_says_so() -> None:
     with pytest.raises(RecordError, match="a, load"):
         ss.balance.impact_test(ss.Record.of({"x": quiet[0]}, fs=4000))
     alone = ss.balance.impact_test(ss.Record.of({"a": tap()["a"]}, fs=4000))
-    assert {resonance.name for resonance in alone.resonances} == {"seen by a"}
+    assert [resonance.name for resonance in alone.resonances] == [f"resonance seen by a, {k} of 2" for k in (1, 2)]
     assert "can not tell" in alone.resonances[0].evidence
+
+
+def test_the_largest_of_several_modes_of_a_sensor_is_its_mount() -> None:
+    """All were called its mount, and the one of the highest frequency was written into rig.toml."""
+    struck_, time = tap(), np.arange(4000) / 4000 - 0.1
+    fast = np.where(time > 0, 4 * np.exp(-120 * time) * np.sin(2 * np.pi * 700 * time), 0.0)
+    two = struck_.with_channel("a", struck_["a"] + fast[: len(struck_)], unit="m/s^2")
+    known = bench.commission(lambda step: two, steps=[bench.step_named("tap")]).known
+    numbers = known.results["tap"].estimates
+    assert [one.name for one in numbers[::2]] == [
+        *(f"frequency of the {name}" for name in TRUE),
+        "frequency of the resonance seen by a",
+    ]
+    assert known.settings()["sensors"]["a"]["mount"][0] == f"{numbers[2].value:.5g} Hz"
+    assert len({one.name for one in numbers}) == len(numbers)
 
 
 def test_what_moved_before_it_rang_is_no_tap() -> None:

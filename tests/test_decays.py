@@ -121,7 +121,7 @@ def test_every_file_that_can_not_answer_has_its_reason(release):
         (("release.csv", *READ, "--repair", "drift:x"), 2, "--repair drift of a free decay"),
         (("release.csv", "--channels", "pressure=pos [mm]"), 1, "read from x, theta, v or a"),
         (("nowhere.csv",), 2, "nowhere.csv"),
-        (("release.csv", *READ, "--channel", "v"), 1, "channel v is missing"),
+        (("release.csv", *READ, "--channel", "v"), 2, "channel v is missing"),
     ],
 )
 def test_what_can_not_be_is_one_sentence_and_a_code(release, words, code, said):

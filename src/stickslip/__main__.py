@@ -3,7 +3,7 @@
 import os
 import sys
 
-from stickslip.errors import INTERRUPTED, INTERRUPTION
+from stickslip.errors import INTERRUPTED, interruption
 
 
 def main() -> None:
@@ -14,8 +14,8 @@ def main() -> None:
         from stickslip.cli.program import main as program
 
         program(prog_name="stickslip")
-    except KeyboardInterrupt:
-        print(INTERRUPTION, file=sys.stderr)
+    except KeyboardInterrupt as error:
+        print(interruption(error), file=sys.stderr)
         sys.exit(INTERRUPTED)
 
 

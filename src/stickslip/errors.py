@@ -4,11 +4,10 @@ from __future__ import annotations
 
 MISSTATED = "delimiter"  # stated otherwise than the file has it
 TOO_SHORT = "too short"  # of a record
-ABSENT = "no such column"  # of a file: one asked for by name or number
+ABSENT = "no such column"  # of a file, or channel of a record: one asked for by name or number
 UNNAMED = "no column named"  # of a record whose columns may be recognised
 NO_RATE = "no sampling rate"  # the kind of error where nothing states one
 INTERRUPTED = 130  # exit code of a program that SIGINT ended: 128 + 2
-INTERRUPTION = "stickslip: interrupted; nothing was written."
 
 
 class StickslipError(Exception):
@@ -23,7 +22,7 @@ class StickslipError(Exception):
     next_step : str
         What the user can do now ("give a longer record").
     kind : str
-        What code asks for, where it goes on differently.
+        What code asks for, where it goes on differently; a name that is not there is wrong use.
 
     Examples
     --------
@@ -36,6 +35,8 @@ class StickslipError(Exception):
     def __init__(self, value: str, rule: str, next_step: str, *, kind: str = "") -> None:
         super().__init__(value, rule, next_step)
         self.value, self.rule, self.next_step, self.kind = value, rule, next_step, kind
+        if kind == ABSENT:
+            self.exit_code = ModelError.exit_code
 
     def __str__(self) -> str:
         sentence = "; ".join(part.strip().rstrip(".;") for part in self.args)
@@ -68,3 +69,23 @@ class ModelError(StickslipError):
 
 class SolveError(StickslipError):
     """A simulation can not go on, or can not be trusted (too many events, transitions that chase each other)."""
+
+
+def interruption(error: KeyboardInterrupt) -> str:
+    """The sentence that Ctrl-C ends in: what the interruption itself says is left, or that there is nothing.
+
+    Parameters
+    ----------
+    error : KeyboardInterrupt
+        Its argument, if any, says what stands on the disk.
+
+    Returns
+    -------
+    str
+
+    Examples
+    --------
+    >>> interruption(KeyboardInterrupt())
+    'stickslip: interrupted; nothing was written.'
+    """
+    return f"stickslip: interrupted; {str(error) or 'nothing was written'}."

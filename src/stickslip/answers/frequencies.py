@@ -18,7 +18,7 @@ from stickslip.contact.frequency_transition import Transition, transition_of
 from stickslip.contact.microslip import MicroSlips, microslips_of
 from stickslip.contact.ringing import UNTOLD, Mechanism, Ringing, checked_mass, find_ringing, mechanism_of
 from stickslip.cycle.slips import SlipRinging, slip_ringing
-from stickslip.errors import EstimateError, RecordError
+from stickslip.errors import ABSENT, EstimateError, RecordError
 from stickslip.estimate import Constant, Estimate, Result
 from stickslip.record.record import Record
 from stickslip.signals.ridges import Ridge, Spike, find_ridges, find_spikes
@@ -229,7 +229,7 @@ def _spikes_and_sticks(
 def chosen_channel(record: Record, channel: str | None) -> str:
     """The channel asked for, or the first that is usual, or else the first that is no clock."""
     if channel is not None:
-        record.require(channel, question=QUESTION)
+        record.require(channel, question=QUESTION, kind=ABSENT)
         return channel
     usual = next((name for name in CHOSEN if name in record), None)
     if usual is not None:

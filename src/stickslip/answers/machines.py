@@ -18,7 +18,7 @@ from stickslip.cycle.joint_logs import regress_joint_logs
 from stickslip.cycle.joint_onset import joint_backlash, joint_breakaway
 from stickslip.cycle.sticks import find_sticks
 from stickslip.cycle.tribometer import DEFINITIONS, friction_coefficients, static_coefficient
-from stickslip.errors import RecordError
+from stickslip.errors import ABSENT, RecordError
 from stickslip.estimate import UNTRIED, Constant, Doubt, Estimate
 from stickslip.laws.coulomb import LinearSlope
 from stickslip.laws.stribeck import Stribeck
@@ -337,6 +337,7 @@ def axis_record(record: Record, *, axis: str | None = None) -> Record:
             f"the log has the axes {names}" if axis is None else f"axis = {axis!r} fits {len(chosen)} of {names}",
             "the friction of one axis is asked for at a time",
             nearest(axis or "", axes) if axis else f"name one: --axis {axes[0]}",
+            kind="" if axis is None else ABSENT,
         )
     log = _renamed(record, [column for column in columns if column.axis == chosen[0]], chosen[0])
     require_angle(log)

@@ -15,6 +15,7 @@ from stickslip.balance.force import friction_force
 from stickslip.balance.lag import HIDDEN, REPEATS, SensorDelay, sensor_delay
 from stickslip.balance.mass import mass_and_stiffness
 from stickslip.balance.motion import is_measured
+from stickslip.errors import ABSENT
 from stickslip.estimate import UNSTATED, Doubt, Estimate, kinds
 from stickslip.files.read import read_blocks, read_record
 from stickslip.files.select import file_entry
@@ -191,6 +192,7 @@ def mend(record: Record, *, repairs: Sequence[str]) -> Record:
             record = _WHOLE[word](record)
             continue
         kind, function = _PER_CHANNEL[word]
+        record.require(*filter(None, [channel]), question=f"the repair {repair}", kind=ABSENT)
         channels = [fault.channel for fault in record.check() if fault.kind == kind and fault.channel is not None]
         for name in [channel] if channel else dict.fromkeys(channels):
             record = function(record, name)

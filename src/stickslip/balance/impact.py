@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -75,7 +76,7 @@ def impact_test(record: Record, *, mass: Constant | None = None, tapped: bool = 
 
     A mode that both sensors show, the force as large against the acceleration as the mass says and opposed to it, is
     the contact's, coupled with the mass; one that only the accelerometer shows, or shows larger than that, is its
-    mount, and one that the load cell shows is the cell's.
+    mount, and one that the load cell shows is the cell's. Of several of a kind the largest bears its name.
 
     Parameters
     ----------
@@ -278,11 +279,24 @@ def _named(modes: Sequence[_Mode], channels: Sequence[str], mass: float | None, 
     ratio = mass  # of force to acceleration in a mode of the mass on its contact
     if ratio is None and both:
         ratio = float(np.abs(both[0].amplitude[1] / both[0].amplitude[0]))
-    named = [_resonance(mode, channels, ratio, known=mass is not None) for mode in modes]
+    kinds = [_kind(mode, channels, ratio, known=mass is not None) for mode in modes]
+    names = _names(modes, [name for name, _ in kinds], channels)
     return [
-        replace(one, frequency=replace(one.frequency, status=status), damping=replace(one.damping, status=status))
-        for one in named
+        _resonance(mode, name, _shown(mode, channels), evidence, status)
+        for mode, name, (_, evidence) in zip(modes, names, kinds, strict=True)
     ]
+
+
+def _names(modes: Sequence[_Mode], kinds: Sequence[str], channels: Sequence[str]) -> list[str]:
+    """A name for each mode: the largest of a kind bears its name, the others, by number, that of what shows them."""
+    names = []
+    for mode, kind in zip(modes, kinds, strict=True):
+        at = int(kind == CELL)
+        alike = [abs(other.amplitude[at]) for other, its in zip(modes, kinds, strict=True) if its == kind]
+        largest = kind and abs(mode.amplitude[at]) == max(alike)
+        names.append(kind if largest else f"resonance seen by {' and '.join(_shown(mode, channels))}")
+    numbers = {name: itertools.count(1) for name in names if names.count(name) > 1}
+    return [f"{name}, {next(numbers[name])} of {names.count(name)}" if name in numbers else name for name in names]
 
 
 def _shown(mode: _Mode, channels: Sequence[str]) -> tuple[str, ...]:
@@ -290,28 +304,33 @@ def _shown(mode: _Mode, channels: Sequence[str]) -> tuple[str, ...]:
     return tuple(name for name, is_heard in zip(channels, heard, strict=True) if is_heard)
 
 
-def _resonance(mode: _Mode, channels: Sequence[str], ratio: float | None, *, known: bool) -> Resonance:
+def _kind(mode: _Mode, channels: Sequence[str], ratio: float | None, *, known: bool) -> tuple[str, str]:
+    """What swings in a mode, and why; "" where one sensor alone can not tell."""
     shown = _shown(mode, channels)
     if len(channels) == 1:
-        name, evidence = f"seen by {channels[0]}", "one sensor alone can not tell a contact from a mount"
-    elif len(shown) == 1:
+        return "", "one sensor alone can not tell a contact from a mount"
+    if len(shown) == 1:
         name = ACCELEROMETER if shown == ("a",) else CELL
-        evidence = f"{shown[0]} shows it and {'load' if shown == ('a',) else 'a'} does not"
-    else:
-        assert ratio is not None
-        force = -complex(mode.amplitude[1] / mode.amplitude[0])  # of m a = - f
-        turned = math.degrees(abs(np.angle(force)))
-        alike = 1 / ALIKE < abs(force) / ratio < ALIKE and abs(np.angle(force)) < math.pi / 4
-        name = COUPLED if alike else ACCELEROMETER if abs(force) < ratio else CELL
-        evidence = (
-            f"both show it, the force opposed to the acceleration but for {turned:.0f} degrees and as large as that of "
-            f"{abs(force):.3g} kg{f', the mass being {ratio:.3g} kg' if known else ''}"
-        )
-    method = "decaying oscillations of all channels after the tap, by least squares"
+        return name, f"{shown[0]} shows it and {'load' if shown == ('a',) else 'a'} does not"
+    assert ratio is not None
+    force = -complex(mode.amplitude[1] / mode.amplitude[0])  # of m a = - f
+    turned = math.degrees(abs(np.angle(force)))
+    alike = 1 / ALIKE < abs(force) / ratio < ALIKE and abs(np.angle(force)) < math.pi / 4
+    return COUPLED if alike else ACCELEROMETER if abs(force) < ratio else CELL, (
+        f"both show it, the force opposed to the acceleration but for {turned:.0f} degrees and as large as that of "
+        f"{abs(force):.3g} kg{f', the mass being {ratio:.3g} kg' if known else ''}"
+    )
+
+
+def _resonance(mode: _Mode, name: str, shown: tuple[str, ...], evidence: str, status: Status) -> Resonance:
+    more: dict[str, Any] = {
+        "method": "decaying oscillations of all channels after the tap, by least squares",
+        "status": status,
+    }
     return Resonance(
         name,
-        Estimate.normal(f"frequency of the {name}", mode.frequency, sd=mode.sd[0], unit="Hz", method=method),
-        Estimate.normal(f"damping ratio of the {name}", mode.damping, sd=mode.sd[1], unit="1", method=method).within(0),
+        Estimate.normal(f"frequency of the {name}", mode.frequency, sd=mode.sd[0], unit="Hz", **more),
+        Estimate.normal(f"damping ratio of the {name}", mode.damping, sd=mode.sd[1], unit="1", **more).within(0),
         shown,
         evidence,
     )

@@ -37,7 +37,8 @@ class Resonance(Plain):
     Attributes
     ----------
     name : str
-        "mount of the accelerometer", "mount of the load cell" or "coupled contact".
+        "mount of the accelerometer", "mount of the load cell" or "coupled contact"; "resonance seen by a" where none of
+        these, numbered where there are several.
     frequency : Estimate
         Undamped natural frequency [Hz].
     damping : Estimate

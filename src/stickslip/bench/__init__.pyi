@@ -53,6 +53,7 @@ from stickslip.bench.steps import Known as Known
 from stickslip.bench.steps import commission as commission
 from stickslip.bench.steps import step_named as step_named
 from stickslip.bench.tape import Tape as Tape
+from stickslip.bench.tape import journal_of as journal_of
 from stickslip.bench.through import SimulatedBench as SimulatedBench
 from stickslip.bench.through import Tour as Tour
 from stickslip.bench.through import sweep_of as sweep_of

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import shlex
 import threading
 import time
 from collections import deque
@@ -135,6 +136,14 @@ def acquire(
         require_writable(path)
     run = _Run(wanted, watch, progress, stop or threading.Event())
     heads = [_Head(one, path, run) for one, path in zip(every, outputs, strict=True)]
+    try:
+        return _recorded(run, heads, output)
+    except KeyboardInterrupt as again:  # while it is made a file, or before anything came
+        raise KeyboardInterrupt(_left(heads)) from again
+
+
+def _recorded(run: _Run, heads: Sequence[_Head], output: Path) -> Acquired:
+    """Record with every head, and make a file of it."""
     ended = run.all(heads)
     if not any(head.tape for head in heads):
         raise run.nothing(heads)
@@ -142,6 +151,19 @@ def acquire(
     paths = tuple(head.tape.finish() for head in heads if head.tape is not None)
     done = Acquired(paths, outcomes, ended, tuple(head.short for head in heads if head.short))
     return done if len(paths) == 1 else _together(paths, output, done)
+
+
+def _left(heads: Sequence[_Head]) -> str:
+    """What an interruption leaves, in words: the files that are whole, and how the journals become files."""
+    parts = []
+    for path in (head.path for head in heads):
+        journal = journal_of(path)
+        if path.exists():
+            parts.append(f"{path} is whole")
+        elif journal.exists():
+            command = shlex.join(["stickslip", "convert", str(journal), str(path)])
+            parts.append(f"{journal} holds what came: {command} makes a record of it")
+    return "; ".join(parts)
 
 
 def _beside(output: Path, name: str) -> Path:

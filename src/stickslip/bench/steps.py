@@ -25,7 +25,7 @@ from stickslip.bench.free import (
 )
 from stickslip.bench.response import ModalFit, modal_fit
 from stickslip.bench.rest import AtRest, DischargeTest, at_rest, discharge_test
-from stickslip.errors import EstimateError, ModelError, RecordError
+from stickslip.errors import ABSENT, EstimateError, ModelError, RecordError
 from stickslip.estimate import Estimate, Result
 from stickslip.files.expression import split_spec
 from stickslip.record.record import Record, Step
@@ -291,7 +291,9 @@ def commission(
             if record is None or any(name not in record for name in step.needs):
                 continue
             known = known.having(step.name, step.ask(_bridged(record), known))
-        except (EstimateError, RecordError) as error:  # what is asked wrongly ends all
+        except (EstimateError, RecordError) as error:
+            if error.kind == ABSENT:  # what is asked wrongly ends all
+                raise
             refused[step.name] = str(error)
         if answered is not None:
             answered(step, refused.get(step.name) or known.results[step.name])

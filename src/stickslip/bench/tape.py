@@ -199,7 +199,13 @@ class Tape:
 
 
 def journal_of(output: Path) -> Path:
-    """Where the samples of a record stand until it is whole."""
+    """Where the samples of a record stand until it is whole.
+
+    Examples
+    --------
+    >>> journal_of(Path("run.h5")).name
+    'run.h5.journal'
+    """
     return output.with_name(f"{output.name}.journal")
 
 

@@ -26,6 +26,7 @@ from stickslip.cli.records import (
     name_left_out,
     normal_option,
     reading_options,
+    require_described,
     require_fits,
     result_options,
     rig_of,
@@ -203,7 +204,7 @@ def impact(file: str, output: Output, **options: Any) -> None:
     files = files_of(file, "a tap is one")
     with progress(1) as tell:
         tell(f"reading {file}", 0)
-        record = ss.answers.read_mended(files, rig=rig)
+        record = require_described(ss.answers.read_mended(files, rig=rig))
         test = ss.balance.impact_test(record, mass=rig.mass)
     output.deliver(test, output.folder(folder_after(files[0], "impact")), record=record)
 
@@ -273,6 +274,8 @@ def fit(
     with progress(2) as tell:
         tell("reading", 0)
         records = [ss.answers.read_mended(group, rig=rig) for group in groups]
+        if len(records) == 1:
+            require_described(records[0])
         tell("fitting", 1)
         mistaken = None if curve is not None else ss.answers.stated_wrongly(records, rig=rig)
         try:

@@ -9,6 +9,7 @@ import os
 import re
 import time
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -81,9 +82,12 @@ def commission(
         chosen = [step for step in bench.STEPS if step in chosen or _kept(folder, step.name).exists()]
     if device is None and not given and not (folder and (folder / "records").is_dir()):
         raise click.UsageError("nothing measures; name a --device (sim needs no hardware), or STEP=FILE")
+    at_rig = device is not None and not isinstance(device, bench.Sim)
+    if at_rig and folder is None and any(step.name not in given for step in chosen):
+        raise click.UsageError("a device records into files; name --output")
     source, truth = _source(given, device, rig, folder, seed=options["seed"], anew=anew)
     rig = _seen_from(folder, rig, config) if folder and config else rig
-    if device is not None and not isinstance(device, bench.Sim):  # who is at the rig is asked, and no bar runs beside
+    if at_rig:  # who is there is asked, and no bar runs beside
         done = bench.commission(source, rig=rig, steps=chosen, answered=_answered)
     else:
         with progress(len(chosen)) as tell:
@@ -127,7 +131,9 @@ def _source(
 
     def source(step: BenchStep) -> Record | None:
         if step.name in given:
-            return ss.answers.read_mended([given[step.name]], rig=rig)
+            stated = ss.answers.read_mended([given[step.name]], rig=rig)
+            stated.require(*step.needs, question=f"the step {step.name}")
+            return stated
         kept = _kept(folder, step.name) if folder else None
         if kept is not None and kept.exists() and step.name not in anew:
             return ss.read_record(kept)
@@ -140,7 +146,12 @@ def _source(
             if record is not None and kept is not None:
                 ss.write_record(record, kept, overwrite=True)
             return record
-        return _asked_at_rig(device, step, kept, rig)
+        assert kept is not None
+        try:
+            return _asked_at_rig(device, step, kept, rig)
+        except (click.Abort, KeyboardInterrupt) as error:
+            stay = f"the steps before stay in {kept.parent}, and the same command goes on there"
+            raise KeyboardInterrupt("; ".join(filter(None, (str(error), stay)))) from error
 
     return source, bench_of.truth if bench_of is not None else {}
 
@@ -159,17 +170,17 @@ def _simulated(device: Device | None, rig: RigSettings, seed: int) -> SimulatedB
     return bench.SimulatedBench(system, device.rig, device.fs, seed, hand)
 
 
-def _asked_at_rig(device: Device, step: BenchStep, kept: Path | None, rig: RigSettings) -> Record | None:
+def _asked_at_rig(device: Device, step: BenchStep, kept: Path, rig: RigSettings) -> Record | None:
     """The record of a step at a real rig, once its hands are ready."""
     if any(name not in [one.name for one in device.inputs] for name in step.needs):
         return None
     say(f"{step.title}\n  {step.todo}", err=True)
+    if (left := bench.journal_of(kept)).exists():
+        say(f"  {left.name} holds what came when it was cut short; it goes when the step is recorded anew.", err=True)
     if not click.confirm(f"  Record {step.seconds:g} s now?", default=True, err=True):
         return None
-    if kept is None:
-        raise click.UsageError("a device records into files; name --output")
-    if kept.exists():
-        kept.unlink()
+    for earlier in (kept, bench.journal_of(kept)):
+        earlier.unlink(missing_ok=True)
     moved = {"base": bench.sweep_of(device.fs)} if step.drives and device.outputs else {}
     wanted = bench.Wanted(seconds=step.seconds, drive=moved, log=rig.log)
     with _picture(step.seconds) as watch:
@@ -202,7 +213,11 @@ def _picture(seconds: float) -> Iterator[Callable[[Device, bench.Block], None] |
 
 def _answered(step: BenchStep, outcome: Any) -> None:
     """What a step found, before the next one is asked; on the error stream, as the questions are."""
-    rows = [f"not answered: {outcome}"] if isinstance(outcome, str) else [*map(str, outcome.estimates)]
+    if isinstance(outcome, str):
+        rows = [f"not answered: {outcome}"]
+    else:
+        rows = [str(replace(number, status="ok")) for number in outcome.estimates]
+        rows += ss.story.doubts(outcome.estimates)
     say("\n".join(line for row in rows for line in wrapped(row, "  ")), err=True)
 
 

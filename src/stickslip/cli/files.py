@@ -18,6 +18,7 @@ from stickslip.cli.records import (
     files_of,
     groups_of,
     reading_options,
+    require_described,
     rig_of,
 )
 from stickslip.cli.terminal import aligned, complain, say, spoken, wrapped
@@ -35,9 +36,12 @@ def check(file: str, **options: Any) -> None:
     """Tell what is wrong with a record, with row numbers."""
     rig = rig_of(**options)
     refused: list[ss.StickslipError] = []
-    for group in groups_of(file):
+    groups = groups_of(file)
+    for group in groups:
         with collected(refused, group):
             record = ss.answers.read_mended(group, rig=rig)
+            if len(groups) == 1:
+                require_described(record)
             say(f"{record!r}")
             say(f"- {spoken(f'read: {record.history[0].outcome}')}")
             for fault in [str(fault) for fault in record.check()] or ["nothing wrong was found"]:
@@ -60,7 +64,8 @@ def convert(file: str, out: Path, force: bool, **options: Any) -> None:
         raise click.BadParameter(f"'{out}' is the file to be read", param_hint="OUT")
     if out.exists() and not force:
         raise click.BadParameter(f"'{out}' is there already; --force writes over it", param_hint="OUT")
-    say(ss.write_record(ss.answers.read_mended(files, rig=rig_of(**options)), out, overwrite=force))
+    record = require_described(ss.answers.read_mended(files, rig=rig_of(**options)))
+    say(ss.write_record(record, out, overwrite=force))
 
 
 @click.command()

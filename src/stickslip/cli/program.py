@@ -13,7 +13,7 @@ import click
 import stickslip as ss
 from stickslip.cli.records import RIG_FILE
 from stickslip.cli.terminal import compiling, complain, say, spoken
-from stickslip.errors import INTERRUPTED, INTERRUPTION, MISSTATED, TOO_SHORT, UNNAMED, StickslipError
+from stickslip.errors import INTERRUPTED, MISSTATED, TOO_SHORT, UNNAMED, StickslipError, interruption
 
 COMMANDS = {  # by the file that they stand in
     "analyze": ("analyze", "demo", "fit", "impact", "predict"),
@@ -45,8 +45,8 @@ class _Commands(click.Group):
         try:
             with compiling():
                 return super().invoke(ctx)
-        except KeyboardInterrupt:
-            say(INTERRUPTION, err=True)
+        except KeyboardInterrupt as error:
+            say(interruption(error), err=True)
             ctx.exit(INTERRUPTED)
         except click.UsageError as error:
             within = " ".join(filter(None, (ctx.command_path, ctx.invoked_subcommand)))

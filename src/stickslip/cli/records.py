@@ -210,7 +210,7 @@ def answers(
                 continue
             record = (reader or ss.answers.read_mended)(group, rig=rig, names=names)
             if len(groups) == 1:
-                _require_described(record)
+                require_described(record)
             tell(f"checking and analysing {name}", 2 * number + 1)
             results.append(ask(record))
     if results:
@@ -218,13 +218,17 @@ def answers(
     if len(refused) == 1:
         raise refused[0]
     name_left_out(refused)
+    shared = {error.kind for error in refused}
     raise type(refused[0])(
-        f"none of {len(refused)} records answers", "each has its own reason, told above", "mend them, or give others"
+        f"none of {len(refused)} records answers",
+        "each has its own reason, told above",
+        "mend them, or give others",
+        kind=shared.pop() if len(shared) == 1 else "",
     )
 
 
-def _require_described(record: Record) -> None:
-    """Refuse a sensor that the command line describes and the only record does not have."""
+def require_described(record: Record) -> Record:
+    """The only record of a command; refused where it lacks a sensor that the command line describes."""
     for text in click.get_current_context().params.get("sensors", ()):
         name = text.partition(".")[0]
         if name not in record:
@@ -232,6 +236,7 @@ def _require_described(record: Record) -> None:
                 f"'{name}' is no channel of the record, which has {', '.join(record)}; name one of them",
                 param_hint="--sensor",
             )
+    return record
 
 
 def answer_together(

@@ -22,6 +22,7 @@ from stickslip.cli.records import (
     normal_option,
     number_of,
     reading_options,
+    require_described,
     require_fits,
     result_options,
     rig_of,
@@ -259,4 +260,4 @@ def _told_of(parts: Iterator[Record], tell: Callable[[str, float], None]) -> Ite
     """The parts of a record, with a word on how far the map is."""
     for part in parts:
         tell(f"mapping, {part.start + part.duration:.0f} s", 1)
-        yield part
+        yield require_described(part)

@@ -10,7 +10,7 @@ import numpy as np
 
 from stickslip.arrays import Array, Mask, Rows
 from stickslip.decay.start import SEEN, Run, Swings, bounds_of, free_decays
-from stickslip.errors import UNNAMED, EstimateError, RecordError
+from stickslip.errors import ABSENT, UNNAMED, EstimateError, RecordError
 from stickslip.estimate import Status
 from stickslip.record.check import in_words
 from stickslip.record.flaws import clipped, spikes
@@ -277,8 +277,12 @@ def _prepared(record: Record, channel: str | None) -> tuple[Record, str]:
     name = present[0] if channel is None else channel
     if name not in ORDERS:
         raise RecordError(
-            f"channel {name} is not a motion", f"a free decay is read from {', '.join(ORDERS)}", "choose one of them"
+            f"channel {name} is not a motion",
+            f"a free decay is read from {', '.join(ORDERS)}",
+            "choose one of them",
+            kind=ABSENT,
         )
+    record.require(name, question=QUESTION, kind=ABSENT)
     record.require_clean(name, question=QUESTION, samples=LEAST)
     record = without_delays(record, name, question=QUESTION, samples=LEAST)
     for driven in DRIVEN:

@@ -102,7 +102,7 @@ def _write_with_beside(path: Path, beside: Path, columns: Columns, metadata: str
             _write_csv(part, columns, metadata)
             _describe(beside, metadata, {OF: checksum(part), BEFORE: before} if before else {}, replace=overwrite)
             new = not before
-    except FormatError:
+    except BaseException:
         if new:
             beside.unlink(missing_ok=True)
         raise

@@ -277,8 +277,8 @@ class Record:
         """Number of samples over the rate [s]."""
         return len(self) / self.fs
 
-    def require(self, *names: str, question: str = "this question") -> None:
-        """Refuse, in one sentence, if a channel is missing."""
+    def require(self, *names: str, question: str = "this question", kind: str = "") -> None:
+        """Refuse, in one sentence, if a channel is missing; the error is of a kind."""
         missing = [name for name in names if name not in self.samples]
         if missing:
             plural, verb = ("s", "are") if len(missing) > 1 else ("", "is")
@@ -286,6 +286,7 @@ class Record:
                 f"channel{plural} {', '.join(missing)} {verb} missing (the record has {', '.join(self.samples)})",
                 f"{question} needs {', '.join(names)}",
                 f'name the column when reading: channels={{"{missing[0]}": "COLUMN [unit]"}}',
+                kind=kind,
             )
 
     def require_clean(self, *names: str, question: str = "this question", samples: int = 1) -> None:

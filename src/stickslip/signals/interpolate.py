@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from stickslip.arrays import Array, Mask
-from stickslip.errors import EstimateError, RecordError
+from stickslip.errors import ABSENT, EstimateError, RecordError
 from stickslip.estimate import Estimate, Status
 from stickslip.record.flaws import runs_of
 from stickslip.record.record import Record, Step
@@ -402,6 +402,8 @@ def _shared_motion(a: Record, b: Record, on: str | tuple[str, str] | None) -> tu
 def _match(a: Record, b: Record, on: str | tuple[str, str] | None) -> tuple[Estimate, Estimate]:
     """Offset and rate of b's clock against a's."""
     names = _shared_motion(a, b, on)
+    for record, name in zip((a, b), names, strict=True):
+        record.require(name, question="clock_offset", kind=ABSENT)
     a.require_clean(names[0], question="clock_offset", samples=64)
     b.require_clean(names[1], question="clock_offset", samples=64)
     orders = _orders(a.channels[names[0]].unit, b.channels[names[1]].unit)

@@ -10,6 +10,7 @@ from functools import cached_property
 import numpy as np
 
 from stickslip.arrays import Array, Mask, Rows, stretches
+from stickslip.errors import ABSENT
 from stickslip.record.check import find_clipping
 from stickslip.record.record import Record
 
@@ -54,7 +55,7 @@ TONAL = 0.5  # of a stretch that tones fill
 def chosen_channel(record: Record, channel: str | None) -> str:
     """The channel asked for, or the first that is usual."""
     if channel is not None:
-        record.require(channel, question="hearing squeaks")
+        record.require(channel, question="hearing squeaks", kind=ABSENT)
         return channel
     return next((name for name in HEARD if name in record), next(iter(record)))
 

@@ -8,5 +8,6 @@ from stickslip.story.story import Line as Line
 from stickslip.story.story import Story as Story
 from stickslip.story.story import Table as Table
 from stickslip.story.words import Caution as Caution
+from stickslip.story.words import doubts as doubts
 
 __all__: list[str]

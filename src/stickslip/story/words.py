@@ -122,7 +122,23 @@ def cautions(findings: Findings, headed: Iterable[Estimate] = ()) -> list[Cautio
 
 
 def doubts(estimates: Iterable[Estimate]) -> list[Caution]:
-    """The estimates that are flagged, with the reason, each reason once."""
+    """The estimates that are flagged, with the reason, each reason once.
+
+    Parameters
+    ----------
+    estimates : iterable of Estimate
+        Those that a reader sees.
+
+    Returns
+    -------
+    list of Caution
+
+    Examples
+    --------
+    >>> late = [Estimate.normal(n, 1.0, sd=0.1, unit="s", method="", status="x is late") for n in ("one", "other")]
+    >>> doubts(late)
+    ['One, other: x is late.']
+    """
     return flags((estimate.name, estimate.status) for estimate in estimates)
 
 
