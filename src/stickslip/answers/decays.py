@@ -10,8 +10,15 @@ from typing import Any, Protocol, cast
 
 import numpy as np
 
-from stickslip.answers.findings import BY_DECREMENTS, Comparison, Findings, Inquiry, record_name, require_several
-from stickslip.answers.mistakes import mistakes_of_decay
+from stickslip.answers.findings import (
+    BY_DECREMENTS,
+    Comparison,
+    Findings,
+    Inquiry,
+    mistakes_of_decay,
+    record_name,
+    require_several,
+)
 from stickslip.decay.answer import DecayFit, rig_units
 from stickslip.decay.decrement import Decrement, decrement
 from stickslip.decay.extremes import EnvelopeDecay, extreme_decay, hilbert_decay, linear_decrement, log_decrement
@@ -435,15 +442,9 @@ def compare_decays(findings: Sequence[Findings]) -> Comparison:
     """
     require_several(findings)
     apart, log = _apart(findings), Inquiry()
-    ways = {key: [finding.settings.get(key) for finding in findings] for key in ASKED}
-    mixed = [key for key, values in ways.items() if len(set(values)) > 1]
-    joint = None
-    if mixed:
-        differ = "; ".join(f"{key} is {' and '.join(map(str, dict.fromkeys(ways[key])))}" for key in mixed)
-        log.notes.append(f"The records are not fitted together: {differ}.")
-    elif not apart and all(finding.decay.best is finding.decay.waveform for finding in findings):
-        way = {key: values[0] for key, values in ways.items()}
-        joint = log.ask("All records at once", lambda: _jointly(findings, way))
+    ways = {key: list(dict.fromkeys(finding.settings.get(key) for finding in findings)) for key in ASKED}
+    mixed = any(len(values) > 1 for values in ways.values())
+    joint = _at_once(findings, ways, log) if mixed or not apart else None
     status = f"the records differ in {' and '.join(apart)}" if apart else "ok"
     shared: dict[str, Estimate | None] = {
         name: weighted_mean(estimates, of="records", status=status) for name, estimates in _shared(findings).items()
@@ -455,6 +456,17 @@ def compare_decays(findings: Sequence[Findings]) -> Comparison:
         force = force if joint.dry_force is None else replace(joint.dry_force, name="dry friction force")
     results = {"dry_force": force, **dict.fromkeys(OF_ALL_AT_ONCE), **shared, "joint": joint, "apart": apart}
     return Comparison(tuple(findings), tuple(log.notes), results=results)
+
+
+def _at_once(findings: Sequence[Findings], ways: Mapping[str, Sequence[Any]], log: Inquiry) -> DecayFit | None:
+    """The fit to all records, where each was best told by its waveform; a note of why, where they were asked unlike."""
+    if mixed := {key: values for key, values in ways.items() if len(values) > 1}:
+        differ = "; ".join(f"{key} is {' and '.join(map(str, values))}" for key, values in mixed.items())
+        log.notes.append(f"The records are not fitted together: {differ}.")
+    elif all(finding.decay.best is finding.decay.waveform for finding in findings):
+        way = {key: values[0] for key, values in ways.items()}
+        return log.ask("All records at once", lambda: _jointly(findings, way))
+    return None
 
 
 def _jointly(findings: Sequence[Findings], way: dict[str, Any]) -> DecayFit:

@@ -91,13 +91,18 @@ def fit_records(
     """
     records = [with_sensors(record, rig) for record in records]
     curve = curve or _only_curve(records[0], has_law=bool(laws or system))
-    if curve is not None and len(records) > 1:
-        raise ModelError(f"a curve and {len(records)} records", "a curve is fitted to one", "give one of them alone")
     if curve is not None:
-        friction = _with_friction(records[0], rig)
-        return fit_curve(friction, curve=curve, contact=rig.contact, normal=_load(friction, rig)), [friction]
+        return _curve_of(records, curve, rig)
     comparison = compare_laws(records, _oscillator(rig, system), laws=laws, calibration=calibration, progress=progress)
     return _weighed(comparison, rig), list(records)
+
+
+def _curve_of(records: Sequence[Record], curve: str, rig: RigSettings) -> tuple[CurveFit, list[Record]]:
+    """The curve of one record, and the record with the friction that it was fitted to."""
+    if len(records) > 1:
+        raise ModelError(f"a curve and {len(records)} records", "a curve is fitted to one", "give one of them alone")
+    friction = _with_friction(records[0], rig)
+    return fit_curve(friction, curve=curve, contact=rig.contact, normal=_load(friction, rig)), [friction]
 
 
 def _weighed(comparison: LawComparison, rig: RigSettings) -> LawComparison:
