@@ -22,7 +22,7 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.errors import RecordError
+from stickslip.errors import RecordError, package
 from stickslip.record.channels import Channel, described
 from stickslip.record.record import Record, Step
 
@@ -242,12 +242,7 @@ def _fetched(source: Source, files: list[str]) -> tuple[Path, list[Path]]:
             "a set is fetched where its licence allows it and its address is known",
             f"get it from {source.address} and point {FOLDER_VARIABLE} at a folder that holds {source.name}/",
         )
-    try:
-        import pooch
-    except ImportError as error:
-        raise RecordError(
-            f"fetching {source.name} needs pooch", "it comes with the extra [io]", 'pip install ".[io]" in the checkout'
-        ) from error
+    pooch = package("pooch", extra="io", rule=f"fetching {source.name} needs it", error=RecordError)
     folder = Path(pooch.os_cache("stickslip")) / source.name
     registry = {file: f"sha256:{source.files[file].sha256}" for file in files}
     store = pooch.create(folder, base_url="", registry=registry, urls={file: source.files[file].url for file in files})

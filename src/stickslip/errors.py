@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import importlib
+from typing import Any
+
 MISSTATED = "delimiter"  # stated otherwise than the file has it
 TOO_SHORT = "too short"  # of a record
 ABSENT = "no such column"  # of a file, or channel of a record: one asked for by name or number
@@ -89,3 +92,40 @@ def interruption(error: KeyboardInterrupt) -> str:
     'stickslip: interrupted; nothing was written.'
     """
     return f"stickslip: interrupted; {str(error) or 'nothing was written'}."
+
+
+def package(module: str, *, extra: str, rule: str, error: type[StickslipError] = ModelError) -> Any:
+    """A module of a package that an extra brings, imported where it is used; without it an error says how to get it.
+
+    Parameters
+    ----------
+    module : str
+        Its dotted name.
+    extra : str
+        The extra of stickslip that brings it.
+    rule : str
+        What it is needed for.
+    error : type of StickslipError
+        What is raised.
+
+    Returns
+    -------
+    module
+
+    Raises
+    ------
+    StickslipError
+        The package is not installed.
+
+    Examples
+    --------
+    >>> package("no_such_package", extra="io", rule="it reads this format")
+    Traceback (most recent call last):
+    stickslip.errors.ModelError: the package no_such_package is not installed; it reads this format; install it with: \
+pip install ".[io]" in the checkout.
+    """
+    try:
+        return importlib.import_module(module)
+    except ImportError as absent:
+        value = f"the package {module.partition('.')[0]} is not installed"
+        raise error(value, rule, f'install it with: pip install ".[{extra}]" in the checkout') from absent

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-import importlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 import numpy as np
 
 from stickslip.arrays import Array
-from stickslip.errors import FormatError, StickslipError
+from stickslip.errors import FormatError, StickslipError, package
 
 Block = dict[str, Array]
 
@@ -189,13 +187,6 @@ def reading(path: Path, kind: str) -> Iterator[None]:
         ) from error
 
 
-def optional(module: str, *, extra: str = "io") -> ModuleType:
+def optional(module: str, *, extra: str = "io") -> Any:
     """Import a package that only some formats need, or say how to install it."""
-    try:
-        return importlib.import_module(module)
-    except ImportError as error:
-        raise FormatError(
-            f"the package {module} is not installed",
-            "it reads and writes this format",
-            f'install it with: pip install ".[{extra}]" in the checkout',
-        ) from error
+    return package(module, extra=extra, rule="it reads and writes this format", error=FormatError)

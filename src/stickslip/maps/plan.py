@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, Field
 
 from stickslip import __version__
-from stickslip.errors import ModelError, RecordError
+from stickslip.errors import ModelError, RecordError, package
 from stickslip.maps.grid import MOST, Axis, coordinates, placed, unit
 from stickslip.maps.measures import Measure, Variable, own_name, variables
 from stickslip.parameters import PARTS
@@ -169,18 +169,9 @@ def assemble(plan: Plan, arrays: Mapping[str, NDArray[Any]], *, status: str = "c
     return xarray.Dataset(data, coords=known, attrs=attributes)
 
 
-def required(package: str) -> Any:
+def required(module: str) -> Any:
     """A package of the extra `maps`."""
-    import importlib
-
-    try:
-        return importlib.import_module(package)
-    except ImportError as absent:
-        raise ModelError(
-            f"{package} is not installed",
-            "maps are made with the extra 'maps'",
-            'pip install ".[maps]" in the checkout',
-        ) from absent
+    return package(module, extra="maps", rule="maps are made with the extra 'maps'")
 
 
 def _named(measure: Measure) -> str:

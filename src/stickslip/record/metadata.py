@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from stickslip.arrays import Array
-from stickslip.errors import FormatError, RecordError
+from stickslip.errors import FormatError, RecordError, package
 from stickslip.record.channels import Channel
 from stickslip.units import parse_value
 
@@ -468,12 +468,4 @@ def _described(record: Record) -> str:
 
 def labelled_arrays(asker: str = "to_xarray and from_xarray") -> Any:
     """The package xarray, or a refusal that says how to get it."""
-    try:
-        import xarray
-    except ImportError as error:
-        raise FormatError(
-            "the package xarray is not installed",
-            f"{asker} need it",
-            'install it with: pip install ".[io]" in the checkout',
-        ) from error
-    return xarray
+    return package("xarray", extra="io", rule=f"{asker} need it", error=FormatError)

@@ -11,7 +11,7 @@ from typing import Any, cast
 import numpy as np
 
 from stickslip.arrays import Array
-from stickslip.errors import FormatError, RecordError
+from stickslip.errors import FormatError, RecordError, package
 from stickslip.estimate import Plain, plain
 from stickslip.record.record import Record
 from stickslip.squeak.bursts import LOWEST
@@ -233,12 +233,7 @@ def _at_needed_rate(values: Array, fs: float) -> Array:
 
 
 def _mosqito() -> ModuleType:
-    try:
-        from mosqito import sq_metrics
-    except ImportError as error:
-        raise FormatError(
-            "the package mosqito is not installed",
-            "it computes loudness, sharpness and roughness",
-            'install it with: pip install ".[sound]" in the checkout',
-        ) from error
+    package("mosqito", extra="sound", rule="it computes loudness, sharpness and roughness", error=FormatError)
+    from mosqito import sq_metrics
+
     return cast(ModuleType, sq_metrics)

@@ -19,7 +19,7 @@ import numpy as np
 from stickslip.answers.findings import Comparison, Findings, record_name
 from stickslip.answers.many import Batch, Row
 from stickslip.balance.impact import ImpactTest
-from stickslip.errors import EstimateError, ModelError, RecordError
+from stickslip.errors import EstimateError, ModelError, RecordError, package
 from stickslip.estimate import Estimate
 from stickslip.figures.friction import plates_of_batch
 from stickslip.files.write import require_form, write_record
@@ -300,15 +300,8 @@ def check_table(path: Path) -> None:
         raise ModelError(
             f"a table {path.name}", f"a table is written as {', '.join(WRITERS)}", "give a name that ends so"
         )
-    package, extra = NEEDED.get(path.suffix, ("", ""))
-    try:
-        importlib.import_module(package or "pandas")
-    except ImportError as absent:
-        raise ModelError(
-            f"{package} is not installed",
-            f"{path.suffix} is written by it",
-            f'pip install ".[{extra}]" in the checkout',
-        ) from absent
+    module, extra = NEEDED.get(path.suffix, ("pandas", "io"))
+    package(module, extra=extra, rule=f"{path.suffix} is written by it")
 
 
 def write_table(batch: Batch, path: Path) -> Path:
