@@ -1,6 +1,7 @@
 """Commission simulated rigs whose truth is known: how often does each interval hold it, and how far off is each number?
 
     python benchmarks/commission.py --rigs 100
+    python benchmarks/commission.py --rigs 100 --steps rest,gauge-x,added
 
 Every rig has mass, spring, damper, contact, gains, zeros, lags, noise, mounts and discharge of its own, at random.
 """
@@ -17,7 +18,7 @@ from collections.abc import Iterator
 import numpy as np
 
 import stickslip as ss
-from stickslip.bench import Commissioned, SimulatedBench, commission
+from stickslip.bench import STEPS, Commissioned, SimulatedBench, commission, step_named
 
 
 def random_rig(seed: int, fs: float = 4000.0) -> SimulatedBench:
@@ -91,13 +92,15 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--rigs", type=int, default=100)
     parser.add_argument("--first", type=int, default=1)
+    parser.add_argument("--steps", default=",".join(step.name for step in STEPS), metavar="NAME,NAME")
     parser.add_argument("--json", action="store_true")
     asked = parser.parse_args()
+    steps = [step_named(name) for name in asked.steps.split(",")]
     drawn, refused, missed, began = defaultdict(list), defaultdict(int), [], time.process_time()
     for seed in range(asked.first, asked.first + asked.rigs):
         bench = random_rig(seed)
         truth = bench.truth
-        done = commission(bench.step, truth=truth)
+        done = commission(bench.step, steps=steps, truth=truth)
         for name, why in done.refused.items():
             refused[name] += 1
             print(f"rig {seed}: {name} refused: {why}", flush=True)

@@ -311,6 +311,16 @@ def test_a_rate_that_is_not_the_stated_one_is_named(factor: float, told: str, tm
     assert told in ss.read_record(tape.finish()).history[-1].outcome
 
 
+def test_a_computer_that_was_too_late_tells_no_rate(tmp_path: Path) -> None:
+    """Samples that it lost while it stood still were followed by the advice to correct the device's rate."""
+    tape = Tape(Counter(), tmp_path / "run.h5")
+    for first, clock in ((0, 0.2), (10_000, 20.0), (900_000, 20.1)):
+        tape.write(Block(first, clock, counts(first, first + 10_000, 2)))
+    outcome = tape.close()
+    assert "880000 samples lost" in outcome
+    assert "clock" not in outcome
+
+
 def test_a_damaged_journal_is_read_up_to_the_damage_or_refused(tmp_path: Path) -> None:
     path = tmp_path / "run.h5.journal"
     tape = Tape(Counter(), tmp_path / "run.h5")

@@ -89,9 +89,12 @@ class Seen:
         return "; ".join(parts)
 
     def _pace(self, fs: float) -> list[str]:
-        """At which rate the samples came by this computer's clock, where that is another than the device states."""
+        """At which rate the samples came by this computer's clock, where that is another than the device states.
+
+        Where some were lost the computer was late, and its clock tells no rate.
+        """
         (first, began), (last, ended) = self.came[0], self.came[-1]
-        if ended - began < LONG_ENOUGH:
+        if self.lost or ended - began < LONG_ENOUGH:
             return []
         pace = float(f"{(last - first) / (ended - began):.3g}")
         return (
