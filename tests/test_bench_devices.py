@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 import stickslip as ss
-from stickslip.bench import Fault, Output, Sim, Tone, blocks, devices, find_device
+from stickslip.bench import Block, Fault, Output, Sim, Tone, blocks, devices, find_device
 from stickslip.bench.march import March
-from stickslip.bench.sim import air_track
+from stickslip.bench.sim import SimStream, air_track
 
 QUIET = ss.Rig.air_track()
 for _channel in ("x", "z", "a", "load"):
@@ -117,6 +117,21 @@ def test_a_unit_keeps_time_by_the_clock() -> None:
         late = stream.read()
     assert late is not None
     assert late.first >= first.after + 10_000  # older than the unit's buffer: lost, and the counter says so
+
+
+def test_a_unit_that_keeps_time_compiles_before_its_clock_begins(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its first recording on a computer lost whatever came while kernels were compiled, 20 s of it."""
+    read, times = SimStream.read, []
+
+    def noted(stream: SimStream, timeout: float = 1.0) -> Block | None:
+        times.append((stream.device.fast, stream.sent / stream.device.fs))
+        return read(stream, timeout)
+
+    monkeypatch.setattr(SimStream, "read", noted)
+    with Sim().open() as stream:
+        assert times[0] == (True, 0.0)
+        assert times[-1] == (True, pytest.approx(2.98))
+        assert (stream.sent, stream.device.fast) == (0, False)
 
 
 def test_devices_are_found_by_name() -> None:
