@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from stickslip.arrays import Array, Mask
 from stickslip.errors import ModelError
@@ -96,6 +97,11 @@ class Noise:
                 f"a band from {self.low} to {self.high} Hz", "a band has a low and a high edge", "swap them"
             )
 
+    @property
+    def level(self) -> float:
+        """Standard deviation of a sample, that of 1/f noise left out [unit of the channel]."""
+        return math.hypot(self.white, self.band)
+
     def samples(self, count: int, *, fs: float, rng: np.random.Generator) -> Array:
         """Samples of the noise.
 
@@ -123,6 +129,46 @@ class Noise:
             share = inside.sum() / max(1, len(frequency) - 1)
             total += self.band / math.sqrt(share) * _shaped(rng.standard_normal(count), inside.astype(float))
         return total
+
+
+@dataclass(frozen=True, eq=False)
+class MeasuredNoise(Noise):
+    """Gaussian noise of any colour, by its measured spectrum.
+
+    Attributes
+    ----------
+    density : ndarray, shape (m,)
+        One-sided spectral density, that of the white part in it [square of the channel's unit / Hz], at `m` evenly
+        spaced frequencies.
+    spacing : float
+        Of those frequencies [Hz], from one spacing on.
+
+    Examples
+    --------
+    >>> flat = MeasuredNoise(density=np.full(500, 2 * 3.0**2 / 1000), spacing=1.0)
+    >>> bool(abs(np.std(flat.samples(10_000, fs=1000, rng=np.random.default_rng(1))) - 3) < 0.1)
+    True
+    """
+
+    density: Array = field(default_factory=lambda: np.zeros(1))
+    spacing: float = 1.0
+
+    @property
+    def level(self) -> float:
+        """Standard deviation of a sample [unit of the channel]."""
+        return math.sqrt(self.spacing * float(np.sum(self.density)))
+
+    def at(self, frequency: ArrayLike) -> Array:
+        """Spectral density at frequencies [Hz]."""
+        own = self.spacing * np.arange(1, len(self.density) + 1)
+        return np.asarray(np.interp(frequency, own, self.density))
+
+    def samples(self, count: int, *, fs: float, rng: np.random.Generator) -> Array:
+        """Samples of the noise, as :meth:`Noise.samples`."""
+        frequency = np.fft.rfftfreq(count, 1 / fs)
+        gain = np.sqrt(fs / 2 * self.at(frequency))
+        gain[0] = 0.0
+        return _shaped(rng.standard_normal(count), gain)
 
 
 def _shaped(white: Array, gain: Array) -> Array:
@@ -267,7 +313,7 @@ class Sensor:
     @property
     def certificate(self) -> dict[str, Any]:
         """What a calibration would say of it, as :meth:`Record.with_details` takes it; of its gain it knows nothing."""
-        noise = math.hypot(self.noise.white, self.noise.band, self.digitiser.step / math.sqrt(12))
+        noise = math.hypot(self.noise.level, self.digitiser.step / math.sqrt(12))
         details: dict[str, Any] = {"delay": self.lag, "noise": noise or None}
         if self.mount:
             swings = math.isfinite(self.mount.frequency)

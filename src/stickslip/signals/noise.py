@@ -18,6 +18,8 @@ from stickslip.record.flaws import quantum
 ORDERS = (2, 3, 4, 6, 8, 10)  # of differencing, tried in turn
 BLOCK = 12  # differences per block: short against the time between two friction events
 SPAN = 5  # blocks over which a varying level is averaged
+LEAST_CYCLES = 4  # over which a spectrum is seen beside its harmonics: six lines about each
+LOG_SD = math.pi / math.sqrt(6)  # standard deviation of the logarithm of a line of a periodogram
 LEVELLED = 0.9  # the next order's answer over this one's when the motion no longer shows
 
 # A jump in acceleration has the spectrum 1/w; a displacement with jumps in its acceleration at random 1/w^3. The best
@@ -115,6 +117,52 @@ def local_noise(values: ArrayLike, fs: float) -> Array:
         return np.full(samples.size, max(level, floor))
     centres = (np.arange(len(running)) + 0.5) * BLOCK + order / 2
     return np.asarray(np.maximum(np.sqrt(np.interp(np.arange(samples.size), centres, running)), floor))
+
+
+def density_beside(values: ArrayLike, fs: float, *, frequency: float, white: float) -> tuple[Array, float] | None:
+    r"""The spectrum of a noise in which something periodic is left, which is at the harmonics alone.
+
+    Over whole cycles a harmonic is one line of the periodogram; there the noise is what it is beside it, the mean of
+    the logarithms on either side (that of a power law, too, is then right), where that stands out of white noise.
+
+    Parameters
+    ----------
+    values : array_like, shape (n,)
+        Noise, and what repeats with each cycle.
+    fs, frequency : float
+        Sampling rate, and that of the cycles [Hz].
+    white : float
+        Standard deviation of the white noise that there is at least [unit of the values].
+
+    Returns
+    -------
+    density : ndarray, shape (m,)
+        One-sided [square of the unit / Hz].
+    spacing : float
+        Of its frequencies, from one spacing on [Hz].
+
+    None is returned of fewer than four cycles, beside whose harmonics there is too little to see.
+
+    Examples
+    --------
+    >>> t, noise = np.arange(8000) / 1000, np.random.default_rng(1).standard_normal(8000)
+    >>> density, spacing = density_beside(noise + np.sin(4 * np.pi * t), 1000, frequency=2.0, white=1.0)
+    >>> bool(abs(spacing * density.sum() - 1) < 0.05)
+    True
+    """
+    samples = np.asarray(values, dtype=float)
+    cycles = math.floor(len(samples) / fs * frequency + 1e-9)
+    if cycles < LEAST_CYCLES:
+        return None
+    samples = samples[: round(cycles / frequency * fs)]
+    density = 2 / (fs * len(samples)) * np.abs(np.fft.rfft(samples)[1:]) ** 2
+    flat, harmonics = 2 * white**2 / fs, len(density) // cycles
+    rows = density[: harmonics * cycles].reshape(harmonics, cycles)  # of each the last is a harmonic
+    below = np.log(np.maximum(rows[:, :-1], np.finfo(float).tiny)).mean(axis=1)
+    beside = np.exp((below + np.append(below[1:], below[-1])) / 2 + np.euler_gamma)
+    surely = flat * math.exp(2 * LOG_SD / math.sqrt(2 * (cycles - 1)))
+    rows[:, -1] = np.where(beside > surely, beside, flat)
+    return density, fs / len(samples)
 
 
 def quantisation_step(values: ArrayLike) -> float:

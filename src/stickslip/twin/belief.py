@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stickslip.errors import StickslipError
-from stickslip.law.stretch import DriveFrom, driving
+from stickslip.law.stretch import DriveFrom, Tones, driving
 from stickslip.laws.compliant import CompliantContact
 from stickslip.laws.coulomb import Coulomb, LinearSlope
 from stickslip.laws.lugre import Dahl, LuGre
@@ -21,7 +21,8 @@ from stickslip.oscillator import Oscillator
 from stickslip.parameters import declaration
 from stickslip.record.record import Record
 from stickslip.rig.rig import Rig
-from stickslip.rig.sensor import Digitiser, Noise, Sensor
+from stickslip.rig.sensor import Digitiser, MeasuredNoise, Noise, Sensor
+from stickslip.signals.noise import density_beside
 from stickslip.solve.simulate import simulate
 from stickslip.solve.trajectory import Trajectory
 
@@ -320,6 +321,23 @@ class Belief:
                 return part
         return None
 
+    def with_measured_noise(self) -> Belief:
+        """The same, the noise of x as what is left of x is beside the drive's harmonics: slow, or with a hum.
+
+        A law or a constant that is wrong leaves what repeats with each cycle, and so nothing there. Of another drive
+        than tones the noise stays white.
+        """
+        sensor, fs = self.sensor, self.record.fs
+        white = math.hypot(sensor.noise.white, sensor.digitiser.step / 12**0.5)
+        tone = self.drive.tones[0][1] if isinstance(self.drive, Tones) else 0.0
+        beside = density_beside(self.residual, fs, frequency=tone, white=white)
+        if beside is None:
+            return self
+        density, spacing = beside
+        counts = sensor.digitiser.step**2 / (6 * fs)  # which its twins have of their own
+        noise = MeasuredNoise(sensor.noise.white, density=np.maximum(density - counts, 0.0), spacing=spacing)
+        return replace(self, rig=self.rig.having("x", noise=noise))
+
     def told_by(self, x: Array) -> Belief:
         """The rig that a twin would have been believed to be by its displacement, by the same linear fit."""
         if self.fit is None:
@@ -360,9 +378,16 @@ class Belief:
 
     @property
     def noise(self) -> float:
-        """Standard deviation of the displacement's noise and counts [m]."""
-        noise = math.hypot(self.sensor.noise.white, self.sensor.digitiser.step / 12**0.5)
-        return max(noise, TINY * float(np.std(self.record["x"])))
+        """Standard deviation of white noise as dense as the displacement's noise and counts at the drive's tone [m]."""
+        own = self.sensor.noise
+        level = own.white
+        if isinstance(own, MeasuredNoise) and isinstance(self.drive, Tones):
+            level = math.sqrt(own.at(self.drive.tones[0][1]) * self.record.fs / 2)
+        return self._with_counts(level)
+
+    def _with_counts(self, level: float) -> float:
+        """A noise and its counts [m]; never less than rounding."""
+        return max(math.hypot(level, self.sensor.digitiser.step / 12**0.5), TINY * float(np.std(self.record["x"])))
 
     @property
     def left(self) -> float:
@@ -373,7 +398,8 @@ class Belief:
     @property
     def like_noise(self) -> bool:
         """Whether it leaves no more of the displacement than its noise, and the constants within their uncertainty."""
-        return float(np.std(self.residual)) < NEAR * self.noise and self.strain < REACH
+        level = self._with_counts(self.sensor.noise.level)
+        return float(np.std(self.residual)) < NEAR * level and self.strain < REACH
 
     @property
     def start(self) -> dict[str, float]:

@@ -142,9 +142,9 @@ def believe(record: Record, *, mapped: Map = map) -> Belief:
     # where the sensor has an offset, the rest position is nearer to its mean than to its zero
     begun = min(begun, begun.at(x=values["x"] - float(record["x"].mean())), key=_left)
     led = _led(begun, [record.rows(0, samples) for samples in _horizons(record)])
-    simple = _nearest(replace(led, record=record))
+    simple = _nearest(_nearest(replace(led, record=record)).with_measured_noise())
     belief = _needed(_richer(_needed(simple, SLOPE, KINETIC), mapped), SLOPE)
-    return _with_slips(belief, simple, mapped)
+    return _with_slips(belief, simple, mapped).with_measured_noise()
 
 
 def lacking(record: Record) -> StickslipError | None:
