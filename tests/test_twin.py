@@ -34,7 +34,10 @@ DAMPED = stepped.Rig("viscous", 2.0, 800.0, 1.0, 4e-3, 3.0, slope=12.0)
 FALLS = stepped.Rig("Stribeck", 2.0, 800.0, 1.0, 4e-3, 1.6, kinetic=0.3 * PULL, static=0.45 * PULL, speed=4e-3)
 FADES = replace(FALLS, frequency=3.9, kinetic=0.1 * PULL, static=0.2 * PULL, speed=0.04)  # never stops
 YIELDS = stepped.Rig("compliant", 2.0, 800.0, 1.0, 4e-3, 2.4, kinetic=0.3 * PULL, contact=8000.0)
-SLOWLY, SLOW = 0.9, 1.2e-3 * STOPS.amplitude  # noise of a first order: its memory, and what is new of it in a sample [m]
+SLOWLY, SLOW = (
+    0.9,
+    1.2e-3 * STOPS.amplitude,
+)  # noise of a first order: its memory, and what is new of it in a sample [m]
 
 
 def test_what_a_search_sends_to_another_process_is_short() -> None:

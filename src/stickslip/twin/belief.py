@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, fields, replace
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -56,6 +56,7 @@ SLIDES = 0.2  # of the largest speed, above which friction is that of sliding: b
 FALL = 0.02  # of friction, over the speeds at which it slides
 EVENTS = 1000  # in a cycle, beyond which a rig that is tried is given up
 FOLLOWED = 1e-12  # tolerance to which curved laws are followed: the error of a difference is this over its step
+STEADY = 0.1  # of x that may be beside the harmonics: of a transient a wrong law leaves some tenth, which is no noise
 NEAR = 1.1  # times a sensor's noise, that a search may leave to have come to its end
 TINY = 1e-9  # of the motion: noise below is rounding
 FURTHEST = 30.0  # step of a logarithm: beyond it nothing is told
@@ -324,19 +325,23 @@ class Belief:
     def with_measured_noise(self) -> Belief:
         """The same, the noise of x as what is left of x is beside the drive's harmonics: slow, or with a hum.
 
-        A law or a constant that is wrong leaves what repeats with each cycle, and so nothing there. Of another drive
-        than tones the noise stays white.
+        A law or a constant that is wrong leaves what repeats with each cycle of a steady motion, and so nothing there.
+        Of a motion that is not steady the noise stays white.
         """
         sensor, fs = self.sensor, self.record.fs
-        white = math.hypot(sensor.noise.white, sensor.digitiser.step / 12**0.5)
-        tone = self.drive.tones[0][1] if isinstance(self.drive, Tones) else 0.0
-        beside = density_beside(self.residual, fs, frequency=tone, white=white)
-        if beside is None:
+        if not isinstance(self.drive, Tones):
             return self
-        density, spacing = beside
+        beside = partial(density_beside, fs=fs, frequency=self.drive.tones[0][1])
+        moved = levelled(self.moved)
+        own = beside(moved, white=0.0)
+        if own is None or own[1] * float(own[0].sum()) > STEADY**2 * float(moved.var()):
+            return self
+        noise = beside(self.residual, white=math.hypot(sensor.noise.white, sensor.digitiser.step / 12**0.5))
+        assert noise is not None
         counts = sensor.digitiser.step**2 / (6 * fs)  # which its twins have of their own
-        noise = MeasuredNoise(sensor.noise.white, density=np.maximum(density - counts, 0.0), spacing=spacing)
-        return replace(self, rig=self.rig.having("x", noise=noise))
+        density, spacing = np.maximum(noise[0] - counts, 0.0), noise[1]
+        measured = MeasuredNoise(sensor.noise.white, density=density, spacing=spacing)
+        return replace(self, rig=self.rig.having("x", noise=measured))
 
     def told_by(self, x: Array) -> Belief:
         """The rig that a twin would have been believed to be by its displacement, by the same linear fit."""
