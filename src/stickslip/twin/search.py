@@ -142,9 +142,10 @@ def believe(record: Record, *, mapped: Map = map) -> Belief:
     # where the sensor has an offset, the rest position is nearer to its mean than to its zero
     begun = min(begun, begun.at(x=values["x"] - float(record["x"].mean())), key=_left)
     led = _led(begun, [record.rows(0, samples) for samples in _horizons(record)])
-    simple = _nearest(_nearest(replace(led, record=record)).with_measured_noise())
+    simple = _nearest(replace(led, record=record))
     belief = _needed(_richer(_needed(simple, SLOPE, KINETIC), mapped), SLOPE)
-    return _with_slips(belief, simple, mapped).with_measured_noise()
+    # slow noise weighs less against what is stated of the constants
+    return _over(_with_slips(belief, simple, mapped).with_measured_noise(), record)
 
 
 def lacking(record: Record) -> StickslipError | None:
