@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import cmath
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, NamedTuple, Protocol
@@ -22,7 +22,7 @@ from stickslip.oscillator import Oscillator
 from stickslip.record.channels import Channel
 from stickslip.record.record import Record
 from stickslip.signals.derivatives import LEAST, Filter, best_bandwidth
-from stickslip.signals.noise import noise_level, quantisation_step
+from stickslip.signals.noise import density_beside, noise_level, quantisation_step
 from stickslip.signals.response import Response, leak, resonance, respond
 from stickslip.solve.sensitivity import Sensitivity
 from stickslip.solve.simulate import simulate
@@ -30,6 +30,7 @@ from stickslip.solve.trajectory import Trajectory
 
 DRIVES = {"z": "base", "force": "force"}  # channels of what moves the mass, and what each moves
 HARMONICS = 5
+SLOWLY = 0.1  # of a measured motion, that slow noise of its sensor may be
 AS_GOOD = 1.15  # times its noise that a sum of tones may stray from what was measured
 COARSE = (128, 64, 32, 16, 8, 4, 2)  # samples from knot to knot of a motion without tones, tried in turn
 NEAR = 0.3  # of its noise by which the knots may miss it
@@ -56,7 +57,10 @@ class DriveFrom(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class Tones:
-    """``sum A cos(2 pi F t + phase)``, t on the record's clock; off by a share, an angle, and turns in the record."""
+    """``sum A cos(2 pi F t + phase)``, t on the record's clock; off by a share, an angle, and turns in the record.
+
+    What was measured `beside` it is the sensor's, as its noise.
+    """
 
     tones: tuple[tuple[float, float, float], ...]
     on: str
@@ -64,6 +68,7 @@ class Tones:
     unsure: tuple[float, float, float]
     middle: float
     length: float
+    beside: Array
 
     def __call__(self, begin: float, end: float, off: ArrayLike = ()) -> Drive:
         """The drive whose time 0 is `begin`."""
@@ -144,7 +149,13 @@ def measured_drive(record: Record, given: Drive) -> DriveFrom:
     smoothed and followed as it was recorded. A record of neither is driven as `given`.
     """
     channel = driving(record)
-    return Known(given) if channel is None else _driven(record, channel, getattr(given, "contact", "ground"))
+    return Known(given) if channel is None else next(_driven(record, channel, getattr(given, "contact", "ground")))
+
+
+def possible_drives(record: Record, given: Drive) -> list[DriveFrom]:
+    """The same, and for a motion that strays from its tones the tones alone: x tells whether that was slow noise."""
+    channel = driving(record)
+    return [Known(given)] if channel is None else list(_driven(record, channel, getattr(given, "contact", "ground")))
 
 
 def driving(record: Record) -> str | None:
@@ -170,21 +181,29 @@ def face_of(given: Drive, record: Record) -> tuple[Array | float, Array | float]
     return speed * np.arange(len(record), dtype=np.float64) / record.fs, speed
 
 
-def _driven(record: Record, channel: str, contact: str) -> DriveFrom:
+def _driven(record: Record, channel: str, contact: str) -> Iterator[DriveFrom]:
     on, values, late = DRIVES[channel], record[channel], record.channels[channel].delay
     record.require_clean(channel, question="a fitted law", samples=LEAST)
     stated = record.channels[channel].noise  # before the counts, which are in what is measured
     noise = math.hypot(stated, quantisation_step(values) / 12**0.5) if stated else noise_level(values, record.fs)
     time = np.arange(len(values)) / record.fs - late
-    tones = _tones(values, time, noise)
-    share = max(SURE, noise * np.sqrt(2 / len(values)))
+    tones = _tones(values, time, AS_GOOD * noise)
+    if tones is None:
+        smoothed = Smoothed(len(values), record.fs, noise, best_bandwidth(values, record.fs))
+        knots, rate = _knots(smoothed.apply(values - values.mean()), record.fs, noise)
+        share = max(SURE, noise * np.sqrt(2 / len(values))) / (2**0.5 * float(np.std(values)))
+        yield Sampled(knots, rate, late, on, contact, (share,), smoothed)
+        tones = _tones(values, time, SLOWLY * float(np.std(values)))
     if tones is not None:
-        share, length = share / tones[0][0], time[-1] - time[0]
+        size, frequency, _ = tones[0]
+        beside = values - _fitted(values, time, frequency, len(tones))[0]
+        spectrum = density_beside(beside, record.fs, frequency=frequency, white=noise)
+        if spectrum is not None:
+            density, spacing = spectrum
+            noise = math.sqrt(float(density[round(frequency / spacing) - 1]) * record.fs / 2)
+        share, length = max(SURE, noise * np.sqrt(2 / len(values))) / size, time[-1] - time[0]
         unsure = (share, share, share * np.sqrt(12) / (2 * np.pi))
-        return Tones(tones, on, contact, unsure, float(time[0] + length / 2), length)
-    smoothed = Smoothed(len(values), record.fs, noise, best_bandwidth(values, record.fs))
-    knots, rate = _knots(smoothed.apply(values - values.mean()), record.fs, noise)
-    return Sampled(knots, rate, late, on, contact, (share / (2**0.5 * float(np.std(values))),), smoothed)
+        yield Tones(tones, on, contact, unsure, float(time[0] + length / 2), length, beside)
 
 
 def _knots(smooth: Array, fs: float, noise: float) -> tuple[Array, float]:
@@ -200,8 +219,8 @@ def _knots(smooth: Array, fs: float, noise: float) -> tuple[Array, float]:
     return smooth, fs
 
 
-def _tones(values: Array, time: Array, noise: float) -> tuple[tuple[float, float, float], ...] | None:
-    """Amplitude, frequency and phase of a tone and as many harmonics as it needs; None where they do not suffice."""
+def _tones(values: Array, time: Array, most: float) -> tuple[tuple[float, float, float], ...] | None:
+    """Amplitude, frequency and phase of a tone and as many harmonics as it needs; None where they leave too much."""
     from scipy.optimize import minimize_scalar
 
     size, span = len(values), time[-1] - time[0]
@@ -211,16 +230,16 @@ def _tones(values: Array, time: Array, noise: float) -> tuple[tuple[float, float
     if coarse * span < 1.0:
         return None
     least = 1e-6 * float(np.ptp(values))
-    allowed, found, worth = max(AS_GOOD * noise, least), None, math.inf
+    allowed, found, worth = max(most, least), None, math.inf
     for count in range(1, HARMONICS + 1):
 
         def left(frequency: float, count: int = count) -> float:
-            return _fitted(values, time, frequency, count)[1]
+            return _fitted(values, time, frequency, count)[2]
 
         best = minimize_scalar(
             left, bounds=(coarse - 0.5 / span, coarse + 0.5 / span), method="bounded", options={"xatol": 1e-9 * coarse}
         )
-        solution, rest = _fitted(values, time, float(best.x), count)
+        _, solution, rest = _fitted(values, time, float(best.x), count)
         cosines, sines = solution[1:-1:2], solution[2:-1:2]
         sizes, angles = np.hypot(cosines, sines), np.arctan2(-sines, cosines)
         # a harmonic below the noise moves the mass all the same: Schwarz's criterion tells it from noise
@@ -234,13 +253,15 @@ def _tones(values: Array, time: Array, noise: float) -> tuple[tuple[float, float
     return found
 
 
-def _fitted(values: Array, time: Array, frequency: float, count: int) -> tuple[Array, float]:
+def _fitted(values: Array, time: Array, frequency: float, count: int) -> tuple[Array, Array, float]:
+    """A tone and its harmonics on a line, their coefficients, and what they leave as a deviation."""
     waves = np.cumprod(np.tile(np.exp(2j * np.pi * frequency * time)[:, None], count), axis=1)
     columns = np.ones((len(time), 2 * count + 2))
     columns[:, 1:-1:2], columns[:, 2:-1:2] = waves.real, waves.imag
     columns[:, -1] = np.linspace(-0.5, 0.5, len(time))
     solution = np.linalg.solve(columns.T @ columns, columns.T @ values)
-    return np.asarray(solution), float(np.sqrt(np.mean((values - columns @ solution) ** 2)))
+    nearest = np.asarray(columns @ solution)
+    return nearest, np.asarray(solution), float(np.sqrt(np.mean((values - nearest) ** 2)))
 
 
 @dataclass(frozen=True, eq=False)

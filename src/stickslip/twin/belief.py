@@ -323,25 +323,29 @@ class Belief:
         return None
 
     def with_measured_noise(self) -> Belief:
-        """The same, the noise of x as what is left of x is beside the drive's harmonics: slow, or with a hum.
+        """The same, the noise of x and of its drive as what is left of them beside the harmonics: slow, or with a hum.
 
         A law or a constant that is wrong leaves what repeats with each cycle of a steady motion, and so nothing there.
         Of a motion that is not steady the noise stays white.
         """
-        sensor, fs = self.sensor, self.record.fs
         if not isinstance(self.drive, Tones):
             return self
-        beside = partial(density_beside, fs=fs, frequency=self.drive.tones[0][1])
+        beside = partial(density_beside, fs=self.record.fs, frequency=self.drive.tones[0][1])
         moved = levelled(self.moved)
         own = beside(moved, white=0.0)
         if own is None or own[1] * float(own[0].sum()) > STEADY**2 * float(moved.var()):
             return self
-        noise = beside(self.residual, white=math.hypot(sensor.noise.white, sensor.digitiser.step / 12**0.5))
-        assert noise is not None
-        counts = sensor.digitiser.step**2 / (6 * fs)  # which its twins have of their own
-        density, spacing = np.maximum(noise[0] - counts, 0.0), noise[1]
-        measured = MeasuredNoise(sensor.noise.white, density=density, spacing=spacing)
-        return replace(self, rig=self.rig.having("x", noise=measured))
+        rig = self.rig
+        left = {"x": self.residual, driving(self.record): self.drive.beside}
+        for sensor in rig.sensors:
+            if sensor.channel in left:
+                counts = sensor.digitiser.step**2 / 12  # which its twins have of their own
+                noise = beside(left[sensor.channel], white=math.sqrt(sensor.noise.white**2 + counts))
+                assert noise is not None
+                density, spacing = np.maximum(noise[0] - 2 * counts / self.record.fs, 0.0), noise[1]
+                measured = MeasuredNoise(sensor.noise.white, density=density, spacing=spacing)
+                rig = rig.having(sensor.channel, noise=measured)
+        return replace(self, rig=rig)
 
     def told_by(self, x: Array) -> Belief:
         """The rig that a twin would have been believed to be by its displacement, by the same linear fit."""

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from stickslip.balance.motion import is_measured
 from stickslip.drives.kinds import HarmonicBase
 from stickslip.errors import EstimateError, StickslipError
-from stickslip.law.stretch import DriveFrom, driving, measured_drive
+from stickslip.law.stretch import DriveFrom, driving, possible_drives
 from stickslip.laws.coulomb import LinearSlope
 from stickslip.oscillator import Oscillator
 from stickslip.record.flaws import saturated
@@ -134,18 +134,23 @@ def believe(record: Record, *, mapped: Map = map) -> Belief:
         damper=stated.damper,
         law=LinearSlope(0.0, slope=0.0),
     )
-    drive = measured_drive(record, HarmonicBase(0.0, frequency=1.0, contact=stated.contact))
-    unsure = _unsure(record, drive)
+    drives = possible_drives(record, HarmonicBase(0.0, frequency=1.0, contact=stated.contact))
+    simple = min((_linear(record, oscillator, drive) for drive in drives), key=_left)
+    belief = _needed(_richer(_needed(simple, SLOPE, KINETIC), mapped), SLOPE)
+    # slow noise weighs less against what is stated of the constants
+    return _over(_with_slips(belief, simple, mapped).with_measured_noise(), record)
+
+
+def _linear(record: Record, oscillator: Oscillator, drive: DriveFrom) -> Belief:
+    """The nearest with a friction that is linear in speed."""
+    unsure, contact = _unsure(record, drive), record.rig.contact if record.rig is not None else "ground"
     start = {"x": float(record["x"][0]), "v": float(record["v"][0])}
-    values = {**start, **dict.fromkeys(unsure, 0.0), **_sliding(record, stated.contact)}
+    values = {**start, **dict.fromkeys(unsure, 0.0), **_sliding(record, contact)}
     begun = Belief(record, oscillator, values, drive, Rig(tuple(_sensors(record))), unsure)
     # where the sensor has an offset, the rest position is nearer to its mean than to its zero
     begun = min(begun, begun.at(x=values["x"] - float(record["x"].mean())), key=_left)
     led = _led(begun, [record.rows(0, samples) for samples in _horizons(record)])
-    simple = _nearest(replace(led, record=record))
-    belief = _needed(_richer(_needed(simple, SLOPE, KINETIC), mapped), SLOPE)
-    # slow noise weighs less against what is stated of the constants
-    return _over(_with_slips(belief, simple, mapped).with_measured_noise(), record)
+    return _nearest(replace(led, record=record))
 
 
 def lacking(record: Record) -> StickslipError | None:
