@@ -21,6 +21,7 @@ import stickslip as ss
 from stickslip.answers.on_twins import _yields
 from stickslip.cli.program import main
 from stickslip.estimate import UNTRIED, kinds, stands
+from stickslip.law.stretch import Sampled, Tones
 from stickslip.twin.belief import EXCESS, GAIN, HELD, LATE, SLOPE, SPRING
 from stickslip.twin.search import _left, _linearised, _step, _towards, believe
 from stickslip.twin.trial import ASTRAY, _Misfit, try_on_twins
@@ -376,6 +377,29 @@ def test_slow_noise_that_a_short_record_can_not_show_is_no_contact_of_another_ki
     assert trial.repeats < 0.3 < 1.15 < trial.strays
     assert "as slow noise of a sensor does" in trial.doubt.words
     assert ASTRAY in kinds(ss.estimate.Status(trial.doubt))
+
+
+def test_slow_noise_of_the_base_is_no_motion_of_it() -> None:
+    """x does not follow it; taken for a motion, it had x stray nine times as far as noise explains."""
+    record, chance = stepped.record(STOPS, np.random.default_rng(11)), np.random.default_rng(4)
+    slow = lfilter([1.0], [1.0, -SLOWLY], chance.standard_normal(len(record)))
+    noisy = record.with_channel("z", record["z"] + SLOW * slow, unit="m")
+    trial = ss.tried(ss.analyze(noisy, **STOPS.stated), twins=8).trial
+    assert isinstance(trial.belief.drive, Tones)
+    assert not trial.unlike
+    assert trial.estimates["sliding friction"].includes(record.truth["sliding friction"])
+
+
+def test_a_base_that_wanders_is_followed() -> None:
+    time = np.arange(2000) / 400
+    z = 4e-3 * np.sin(2 * np.pi * 1.6 * time) + 2e-4 * np.sin(2 * np.pi * 0.43 * time)
+    drive, law = ss.drives.Recorded(z, fs=400, on="base"), ss.laws.Coulomb(0.5 * PULL)
+    slider = ss.Oscillator(mass=2.0, stiffness=800.0, damping=1.0, law=law, drive=drive)
+    rig = ss.Rig.perfect("x", "z").having("x", white=4e-6).having("z", white=4e-6)
+    record = rig.measure(ss.simulate(slider, duration=time[-1]), fs=400, rng=1)
+    belief = believe(ss.friction_force(record, mass=2.0, stiffness=800.0, damping=1.0))
+    assert isinstance(belief.drive, Sampled)
+    assert belief.kinetic == pytest.approx(0.5 * PULL, rel=0.01)
 
 
 def test_an_x_that_comes_late_is_told_and_is_no_static_friction() -> None:
