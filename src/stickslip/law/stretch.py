@@ -182,6 +182,7 @@ def face_of(given: Drive, record: Record) -> tuple[Array | float, Array | float]
 
 
 def _driven(record: Record, channel: str, contact: str) -> Iterator[DriveFrom]:
+    """What moves the mass as it was measured; then, where that is no tone with its harmonics, the nearest of these."""
     on, values, late = DRIVES[channel], record[channel], record.channels[channel].delay
     record.require_clean(channel, question="a fitted law", samples=LEAST)
     stated = record.channels[channel].noise  # before the counts, which are in what is measured
