@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from stickslip.arrays import Array, Mask
 from stickslip.errors import ModelError
@@ -157,10 +158,10 @@ class MeasuredNoise(Noise):
         """Standard deviation of a sample [unit of the channel]."""
         return math.sqrt(self.spacing * float(np.sum(self.density)))
 
-    def at(self, frequency: float | Array) -> Array:
+    def at(self, frequency: ArrayLike) -> Array:
         """Spectral density at frequencies [Hz]."""
         own = self.spacing * np.arange(1, len(self.density) + 1)
-        return np.asarray(np.interp(frequency, own, self.density))
+        return np.asarray(np.interp(np.asarray(frequency, dtype=float), own, self.density))
 
     def samples(self, count: int, *, fs: float, rng: np.random.Generator) -> Array:
         """Samples of the noise, as :meth:`Noise.samples`."""
