@@ -58,6 +58,11 @@ def test_a_step_that_is_interrupted_ends_the_walk_and_is_recorded_anew(
     assert done.exit_code == 0, done.output
     assert "rest.h5.journal holds what came when it was cut short" in done.stderr
     assert [path.name for path in records.iterdir()] == ["rest.h5"]
+    good = (records / "rest.h5").read_bytes()
+    monkeypatch.setattr(Playing, "read", until_interrupted)
+    done = CliRunner().invoke(main, [*arguments, "--again", "rest"], input="y\n")
+    assert done.exit_code == INTERRUPTED
+    assert [(path.name, path.read_bytes()) for path in records.iterdir()] == [("rest.h5", good)]
 
 
 def test_no_answer_at_the_prompt_is_an_interruption(tmp_path: Path) -> None:

@@ -179,17 +179,32 @@ def _asked_at_rig(device: Device, step: BenchStep, kept: Path, rig: RigSettings)
         say(f"  {left.name} holds what came when it was cut short; it goes when the step is recorded anew.", err=True)
     if not click.confirm(f"  Record {step.seconds:g} s now?", default=True, err=True):
         return None
-    for earlier in (kept, bench.journal_of(kept)):
-        earlier.unlink(missing_ok=True)
+    bench.journal_of(kept).unlink(missing_ok=True)
     moved = {"base": bench.sweep_of(device.fs)} if step.drives and device.outputs else {}
     wanted = bench.Wanted(seconds=step.seconds, drive=moved, log=rig.log)
-    with _picture(step.seconds) as watch:
-        done = bench.acquire(device, output=kept, wanted=wanted, watch=watch)
-    if done.ended == "interrupted":  # half a step answers nothing; those before it stay
-        kept.unlink()
-        raise KeyboardInterrupt
+    with _aside(kept):
+        with _picture(step.seconds) as watch:
+            done = bench.acquire(device, output=kept, wanted=wanted, watch=watch)
+        if done.ended == "interrupted":  # half a step answers nothing; those before it stay
+            kept.unlink()
+            raise KeyboardInterrupt
     say(f"  {done.outcomes[device.name]}", err=True)
     return ss.read_record(done.paths[0])
+
+
+@contextlib.contextmanager
+def _aside(file: Path) -> Iterator[None]:
+    """Put a file aside until another has taken its place; where none does it is back."""
+    before = file.with_stem(f"{file.stem}-before")
+    if file.exists():
+        file.replace(before)
+    try:
+        yield
+    finally:
+        if file.exists():
+            before.unlink(missing_ok=True)
+        elif before.exists():
+            before.replace(file)
 
 
 @contextlib.contextmanager
