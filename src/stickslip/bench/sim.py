@@ -16,7 +16,7 @@ from pydantic import BaseModel, Field
 
 from stickslip.bench.device import Block, Input, Output, Signal, Tone, output_of
 from stickslip.bench.march import March, Shaken
-from stickslip.compiled import meanwhile
+from stickslip.compiled import waiting
 from stickslip.drives.kinds import Drive, HarmonicBase, HarmonicForce, Release
 from stickslip.errors import ModelError
 from stickslip.laws.compliant import CompliantContact
@@ -199,10 +199,10 @@ class Sim:
         SimStream
         """
         if not self.fast:  # what compiles does so before the clock begins, and is waited for
-            meanwhile.seconds = math.inf
             rehearsal = SimStream(replace(self, fast=True))
-            while rehearsal.sent < REHEARSED * self.fs and rehearsal.read() is not None:
-                pass
+            with waiting():
+                while rehearsal.sent < REHEARSED * self.fs and rehearsal.read() is not None:
+                    pass
         return SimStream(self)
 
 
