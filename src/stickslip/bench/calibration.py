@@ -8,14 +8,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from stickslip.arrays import Array
 from stickslip.errors import EstimateError, ModelError
 from stickslip.estimate import Doubt, Estimate, Result, Status
 from stickslip.record.record import Record
 from stickslip.statistics import correlation_time, mean_uncertainty, student
-
-Array = NDArray[np.float64]
 
 QUESTION = "the sensitivity of a sensor"
 LEAST = 3  # levels

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, BeforeValidator, Field
 
+from stickslip.arrays import Array
 from stickslip.errors import ModelError, RecordError
 from stickslip.files.expression import apply_sensitivity, channel_unit, split_spec
 from stickslip.parameters import finite
@@ -30,8 +31,6 @@ DRIVERS = {"sim": "sim", "file": "replay", "sound": "sound", "ni": "ni", "ldaq":
 
 # what to install for a package; LDAQ brings a web server and more, and is no part of an extra
 INSTALLED = {"serial": "pyserial", "sounddevice": "sounddevice", "nidaqmx": "nidaqmx", "LDAQ": "LDAQ"}
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -7,8 +7,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from stickslip.arrays import Array
 from stickslip.balance.impact import COUPLED, ImpactTest, impact_test
 from stickslip.balance.lag import REPEATS, SensorDelay, sensor_delay
 from stickslip.balance.mounts import Resonance
@@ -19,8 +19,6 @@ from stickslip.errors import EstimateError, StickslipError
 from stickslip.estimate import NORMAL_95, Constant, Doubt, Estimate, Result, Status, doubts_of
 from stickslip.record.record import Record
 from stickslip.statistics import correlation_time
-
-Array = NDArray[np.float64]
 
 QUESTION, STICKS = "a free vibration", "a free vibration onto a stick"
 MOVED = 0.02  # of the whole motion: where it comes to within so much of its end for good, it has stopped

@@ -12,8 +12,8 @@ from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from stickslip.arrays import Array
 from stickslip.drives.kinds import Drive, Motion
 from stickslip.errors import ModelError
 from stickslip.laws.curved import CurvedLaw
@@ -25,8 +25,6 @@ from stickslip.solve.simulate import opening, paced, run, stops_of
 from stickslip.solve.tables import System
 from stickslip.solve.tape import tape
 from stickslip.solve.trajectory import Trajectory
-
-Array = NDArray[np.float64]
 
 LEG = 0.25  # s, at the least: a leg costs about a millisecond whatever its length, and a change of drive throws it away
 BUDGET = 100_000  # events in a period

@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from stickslip.arrays import Array
 from stickslip.balance.force import friction_force
 from stickslip.bench.device import Block, Device, Input, in_si
 from stickslip.cycle.loops import friction_loops
@@ -27,7 +28,6 @@ from stickslip.units import prefixed
 
 COLUMNS, SPAN = 40, 4.0  # letters of a trace, and the s that they hold
 HEIGHTS = "▁▂▃▄▅▆▇█"
-Array = NDArray[np.float64]
 
 NONE: Array = np.empty(0)
 SHORTEST = 16  # samples of a cycle

@@ -10,9 +10,9 @@ from pathlib import Path
 from typing import Annotated, Any, Self
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import BaseModel, Field
 
+from stickslip.arrays import Array
 from stickslip.bench.device import Block, Input, Mover, Output, Signal, Tone, Wires, inputs, output_of, vendors
 from stickslip.errors import ModelError, RecordError
 from stickslip.files.expression import apply_sensitivity
@@ -24,8 +24,6 @@ VOLTS = 10.0  # range of an input where nothing is said
 HELD = 10.0  # s of samples that the driver holds for who reads late
 BLOCK = 0.02  # s of samples that are read at a time
 TURNS = 200  # cycles of a tone that its buffer holds at the most: then a cycle need not be whole samples
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

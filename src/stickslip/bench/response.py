@@ -9,17 +9,14 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from stickslip.arrays import Array, Complex
 from stickslip.errors import EstimateError, ModelError, StickslipError
 from stickslip.estimate import Constant, Doubt, Estimate, Result, Status
 from stickslip.record.record import Record
 from stickslip.signals.interpolate import without_delays
 from stickslip.signals.noise import noise_along
 from stickslip.signals.response import derivative_spectra
-
-Array = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 QUESTION, MODAL = "a frequency response", "mass, spring and damper by a frequency response"
 SEGMENTS = 15  # half overlapping, of which the averaged spectra are made

@@ -8,15 +8,13 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from stickslip.arrays import Array, Mask
 from stickslip.errors import EstimateError
 from stickslip.estimate import NORMAL_95, Doubt, Estimate, Result, Status, plain
 from stickslip.record.record import Record
 from stickslip.signals.noise import quantisation_step
 from stickslip.statistics import correlation_time, mean_uncertainty, student
-
-Array = NDArray[np.float64]
 
 QUESTION = "what sensors read at rest"
 LEAST = 500  # samples of a record at rest
@@ -238,8 +236,6 @@ def _status(name: str, values: Array, residual: Array, worth: float, drift: Esti
     return Status(*doubts)
 
 
-Rows = NDArray[np.bool_]
-
 DISCHARGE = "a discharge test"
 BLOCKS = 300  # to which the record is reduced
 EDGE = 0.01  # of the record, after the step, left to the hand and the ringing
@@ -330,7 +326,7 @@ def _step(values: Array, size: int) -> int:
     return int(np.abs(means[size:] - means[:-size]).argmax()) + size
 
 
-def _fitted(time: Array, blocks: Array, before: Rows, after: Rows, at: float, unit: str) -> DischargeTest:
+def _fitted(time: Array, blocks: Array, before: Mask, after: Mask, at: float, unit: str) -> DischargeTest:
     from scipy.optimize import least_squares
 
     used = before | after

@@ -9,17 +9,15 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import AfterValidator, BaseModel, BeforeValidator, Field, ValidationInfo
 
+from stickslip.arrays import Array
 from stickslip.drives.kinds import HarmonicBase
 from stickslip.errors import EstimateError, ModelError, StickslipError
 from stickslip.oscillator import Oscillator
 from stickslip.rig.rig import Shaker
 from stickslip.settings import STRICT, checked, quantity, read_toml
 from stickslip.solve.simulate import simulate
-
-Array = NDArray[np.float64]
 
 SHARES = (1.0, 0.5, 0.25)  # of the largest amplitude that are tried
 FREQUENCIES = 10  # that are tried, evenly on a logarithmic scale

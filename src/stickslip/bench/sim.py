@@ -11,9 +11,9 @@ from pathlib import Path
 from typing import Annotated, Any, Literal, Self, get_args
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import BaseModel, Field
 
+from stickslip.arrays import Array, Mask
 from stickslip.bench.device import Block, Input, Output, Signal, Tone, output_of
 from stickslip.bench.march import March, Shaken
 from stickslip.compiled import waiting
@@ -37,7 +37,6 @@ RAMP = 0.25  # s in which a shaker goes over from one motion to another
 LOOSE = 30.0  # times its own noise: what a sensor picks up whose shield is off
 STRETCH = 1 << 15  # samples of coloured noise made at a time; below fs / STRETCH it is white
 
-Array = NDArray[np.float64]
 FaultKind = Literal["drop", "saturation", "cable", "noise"]
 FAULTS: tuple[str, ...] = get_args(FaultKind)
 
@@ -78,7 +77,7 @@ class Fault:
                 "correct channel=",
             )
 
-    def rows(self, times: Array) -> NDArray[np.bool_]:
+    def rows(self, times: Array) -> Mask:
         """At which instants it is there."""
         return (times >= self.at) & (times < self.at + self.duration)
 

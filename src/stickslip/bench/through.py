@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from stickslip.answers.decays import analyze_decay
 from stickslip.answers.findings import Comparison, Findings
@@ -19,6 +18,7 @@ from stickslip.answers.fits import fit_records
 from stickslip.answers.many import compare
 from stickslip.answers.questions import analyze
 from stickslip.answers.squeaks import analyze_squeaks, compare_squeaks
+from stickslip.arrays import Array
 from stickslip.bench.recording import Wanted, acquire
 from stickslip.bench.runs import Proposal, Run, next_runs, run_list
 from stickslip.bench.sim import Sim
@@ -39,8 +39,6 @@ from stickslip.rig.sensor import Sensor
 from stickslip.rig.settings import CommissionSettings, RigSettings, read_rig
 from stickslip.solve.simulate import simulate
 from stickslip.squeak.sound import HEAVY, squeak_record, squeak_rig
-
-Array = NDArray[np.float64]
 
 FS = 4000.0  # Hz of the tour's records, as the thesis's: 2 kHz tell a third of the sticks for motion
 SETTLE, SECONDS = 3.0, 8.0  # s that a run is left to itself, and that are read behind them

@@ -8,8 +8,8 @@ from dataclasses import dataclass, field, fields, replace
 from functools import cached_property, partial
 
 import numpy as np
-from numpy.typing import NDArray
 
+from stickslip.arrays import Array
 from stickslip.errors import StickslipError
 from stickslip.law.stretch import DriveFrom, Tones, driving
 from stickslip.laws.compliant import CompliantContact
@@ -26,7 +26,6 @@ from stickslip.signals.noise import density_beside
 from stickslip.solve.simulate import simulate
 from stickslip.solve.trajectory import Trajectory
 
-Array = NDArray[np.float64]
 Values = Mapping[str, float]
 
 # Names of what is believed: parts of a law, and constants that may be off.

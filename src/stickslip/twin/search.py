@@ -9,8 +9,8 @@ from dataclasses import replace
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
+from stickslip.arrays import Array
 from stickslip.balance.motion import is_measured
 from stickslip.drives.kinds import HarmonicBase
 from stickslip.errors import EstimateError, StickslipError
@@ -46,8 +46,6 @@ from stickslip.twin.belief import (
     levelled,
 )
 from stickslip.workers import Map
-
-Array = NDArray[np.float64]
 
 QUESTION = "the twin of a record"
 # How many starts, cycles and passes: by trial on the rigs of benchmarks/twins.py with Stribeck's curve, constants half

@@ -10,8 +10,8 @@ from statistics import NormalDist
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from stickslip.arrays import Array
 from stickslip.errors import EstimateError, StickslipError
 from stickslip.estimate import FEW, NORMAL_95, UNSTATED, Doubt, Estimate, Status, doubts_of, kinds
 from stickslip.record.record import Record
@@ -20,7 +20,6 @@ from stickslip.twin.belief import EXCESS, GIVE, KINETIC, RATE, SLOPE, Belief, le
 from stickslip.twin.search import CHANCE
 from stickslip.workers import Map
 
-Array = NDArray[np.float64]
 Answers = Mapping[str, Estimate]
 
 LEVEL, FALL, RATIO, GIVES = (
