@@ -1,6 +1,6 @@
 """What an analysis says of rigs by another integrator, quick and tried on its twins: how often it holds, and is true.
 
-    python benchmarks/twins.py [--draws 20] [--twins 20] [--seed 1] [--off 0.005] [--minutes 10]
+    python benchmarks/twins.py [--draws 20] [--twins 20] [--seed 1] [--off 0.005] [--slow] [--minutes 10]
 
 Each kind of contact is drawn with fresh masses, springs, dampers, motions and noise. An interval counts where its
 status carries no grave doubt; a claim of static friction counts where its interval lies above 1, of a stick where it
@@ -19,6 +19,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from scipy.signal import detrend, lfilter
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 import stepped
@@ -83,11 +84,33 @@ def counted(findings: ss.answers.Findings, rig: stepped.Rig, tally: dict[str, li
     return wrong
 
 
-def asked(kind: str, seed: np.random.SeedSequence, off: float, twins: int) -> tuple[stepped.Rig, list, list[float]]:
+def slow_noise(count: int, turn: float, rng: np.random.Generator) -> np.ndarray:
+    """Noise of unit deviation, its line taken off: 1/f, of a first order, a walk, or a hum; `turn` in rad a sample."""
+    kind, white = rng.integers(4), rng.standard_normal(count)
+    if kind == 0:
+        line = np.fft.rfft(white) / np.sqrt(np.maximum(np.arange(count // 2 + 1), 1))
+        noise = np.fft.irfft(line, count)
+    elif kind == 1:
+        noise = lfilter([1.0], [1.0, -np.exp(-turn / (2 * np.pi) / rng.uniform(0.02, 0.5))], white)
+    elif kind == 2:
+        noise = np.cumsum(white)
+    else:
+        noise = np.sin(rng.uniform(8, 30) * turn * np.arange(count) + rng.uniform(0, 2 * np.pi)) + white / 2
+    noise = detrend(noise)
+    return noise / noise.std()
+
+
+def asked(
+    kind: str, seed: np.random.SeedSequence, off: float, twins: int, *, slow: bool
+) -> tuple[stepped.Rig, list, list[float]]:
     """A rig, its answers quick and tried, and the processor time of each [s]."""
     rng = np.random.default_rng(seed)
     rig = stepped.drawn("Coulomb" if kind == BROKEN else kind, rng)
     record = stepped.record(rig, rng, noise=10 ** rng.uniform(-4, -2.3), off=off)
+    for name in "xz" if slow else "":
+        level = rig.amplitude * 10 ** rng.uniform(-3.3, -2.2)
+        noise = level * slow_noise(len(record), 2 * np.pi * rig.frequency / record.fs, rng)
+        record = record.with_channel(name, record[name] + noise, unit="m")
     stated: dict[str, float | tuple[float, float]] = dict(rig.stated)
     if off:
         record = record.with_details("x", gain_sd=off).with_details("z", gain_sd=off)
@@ -134,6 +157,7 @@ def main() -> None:
     parser.add_argument("--twins", type=int, default=20)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--off", type=float, default=0.0, help="by which gains and constants are off, as is stated")
+    parser.add_argument("--slow", action="store_true", help="with slow noise of x and z beside the white one")
     parser.add_argument("--kinds", default=",".join(KINDS))
     parser.add_argument("--minutes", type=float, default=np.inf, help="after which no rig is begun")
     options = parser.parse_args()
@@ -147,7 +171,7 @@ def main() -> None:
         try:
             with warnings.catch_warnings():
                 warnings.simplefilter("error")
-                rig, answers, times = asked(kind, seeds[kind][draw], options.off, options.twins)
+                rig, answers, times = asked(kind, seeds[kind][draw], options.off, options.twins, slow=options.slow)
         except ss.errors.StickslipError as error:
             print(f"  {kind} {draw}: {error}", flush=True)
             lost[kind] += 1
