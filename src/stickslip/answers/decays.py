@@ -10,15 +10,8 @@ from typing import Any, Protocol, cast
 
 import numpy as np
 
-from stickslip.answers.findings import (
-    BY_DECREMENTS,
-    Comparison,
-    Findings,
-    Inquiry,
-    mistakes_of_decay,
-    record_name,
-    require_several,
-)
+from stickslip.answers.findings import BY_DECREMENTS, Comparison, Findings, Inquiry, record_name, require_several
+from stickslip.answers.mistakes import mistakes_of_decay
 from stickslip.decay.answer import DecayFit, rig_units
 from stickslip.decay.decrement import Decrement, decrement
 from stickslip.decay.extremes import EnvelopeDecay, extreme_decay, hilbert_decay, linear_decrement, log_decrement

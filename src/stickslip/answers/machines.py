@@ -11,17 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.answers.findings import (
-    Comparison,
-    Findings,
-    Inquiry,
-    called,
-    flagged,
-    record_name,
-    require_angle,
-    require_several,
-    with_doubt,
-)
+from stickslip.answers.findings import Comparison, Findings, Inquiry, flagged, record_name, require_several, with_doubt
+from stickslip.answers.mistakes import called, require_angle
 from stickslip.cycle.joint import JointFriction, regress_joint
 from stickslip.cycle.joint_logs import regress_joint_logs
 from stickslip.cycle.joint_onset import joint_backlash, joint_breakaway

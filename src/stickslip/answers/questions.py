@@ -11,20 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.answers.findings import (
-    BY_FORCE,
-    NOT_TRIED,
-    ONSETS,
-    Findings,
-    Inquiry,
-    flagged,
-    missing,
-    mistakes,
-    record_name,
-    slipped,
-    untrue,
-    with_doubt,
-)
+from stickslip.answers.findings import BY_FORCE, NOT_TRIED, ONSETS, Findings, Inquiry, flagged, record_name, with_doubt
+from stickslip.answers.mistakes import missing, mistakes, slipped, untrue
 from stickslip.answers.preparation import AT_ONCE, CONSTANTS, MOTION, described, middle, normal_load, ready, unmoved
 from stickslip.balance.balance import ALONE, Balance, pulled_slider
 from stickslip.balance.force import FUSIONS, friction_force

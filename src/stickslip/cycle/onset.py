@@ -11,7 +11,7 @@ from stickslip.arrays import Array
 from stickslip.balance.balance import ALONE, Balance
 from stickslip.balance.force import FUSIONS
 from stickslip.balance.motion import FORCES, is_measured
-from stickslip.cycle.loops import Peak, unseen
+from stickslip.cycle.peak import Peak, unseen
 from stickslip.cycle.slips import FAST, Stroke, Strokes, find_strokes, ringing_of, sliding_swing
 from stickslip.errors import EstimateError
 from stickslip.estimate import UNSTATED, Doubt, Estimate, Result, Status

@@ -19,7 +19,8 @@ from stickslip.balance.motion import (
     motion_channels,
     require_fit,
 )
-from stickslip.cycle.loops import DRIVES, Peak, levels_of, sliding_parts, unseen
+from stickslip.cycle.loops import DRIVES, levels_of, sliding_parts
+from stickslip.cycle.peak import Peak, unseen
 from stickslip.cycle.slips import FALL, Cut, cut_at_reversals
 from stickslip.errors import EstimateError, ModelError, RecordError
 from stickslip.estimate import NORMAL_95, Constant, Doubt, Estimate, Result, Status

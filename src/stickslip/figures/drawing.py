@@ -48,7 +48,7 @@ DRAWN = {
     "Trajectory": "trajectory.plot_motion", "CycleBranches": "bifurcation.plot_limit_cycles",
     "Bifurcation": "bifurcation.plot_bifurcation", "Basins": "bifurcation.plot_basins",
     "Boundary": "bifurcation.plot_boundary", "Dither": "bifurcation.plot_dither", "Dataset": "drawing.of_dataset",
-    "ExperimentPlan": "law.plot_plan", "Estimate": "drawing.of_estimates", "list": "drawing.of_estimates",
+    "ExperimentPlan": "bench.plot_plan", "Estimate": "drawing.of_estimates", "list": "drawing.of_estimates",
     "tuple": "drawing.of_estimates", "Result": "drawing.of_result",
 }  # fmt: skip
 

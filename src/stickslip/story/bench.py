@@ -16,7 +16,7 @@ from stickslip.bench.runs import Proposal, run_list
 from stickslip.bench.steps import STEPS, BenchStep, Commissioned
 from stickslip.bench.through import Tour
 from stickslip.estimate import Estimate, Result, stands
-from stickslip.figures.law import plot_calibrations, plot_plan, plot_response
+from stickslip.figures.bench import plot_calibrations, plot_plan, plot_response
 from stickslip.figures.style import Plate, plate
 from stickslip.files.write import require_form, write_record
 from stickslip.laws.guessing import family_of

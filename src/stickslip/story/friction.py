@@ -8,8 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.answers.findings import Comparison, Findings, hopeless
+from stickslip.answers.findings import Comparison, Findings
 from stickslip.answers.frequencies import TimeFrequency
+from stickslip.answers.mistakes import hopeless
 from stickslip.balance.balance import Pull
 from stickslip.consistent.checks import Slip
 from stickslip.contact.ringing import UNTOLD
