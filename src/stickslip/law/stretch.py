@@ -30,6 +30,7 @@ from stickslip.solve.trajectory import Trajectory
 
 DRIVES = {"z": "base", "force": "force"}  # channels of what moves the mass, and what each moves
 HARMONICS = 5
+EXACT = 1e-6  # of a motion's range: what is left below is rounding
 SLOWLY = 0.1  # of a measured motion, that slow noise of its sensor may be
 AS_GOOD = 1.15  # times its noise that a sum of tones may stray from what was measured
 COARSE = (128, 64, 32, 16, 8, 4, 2)  # samples from knot to knot of a motion without tones, tried in turn
@@ -188,16 +189,15 @@ def _driven(record: Record, channel: str, contact: str) -> Iterator[DriveFrom]:
     stated = record.channels[channel].noise  # before the counts, which are in what is measured
     noise = math.hypot(stated, quantisation_step(values) / 12**0.5) if stated else noise_level(values, record.fs)
     time = np.arange(len(values)) / record.fs - late
-    tones = _tones(values, time, AS_GOOD * noise)
-    if tones is None:
+    tones, beside = _tones(values, time)
+    left, noisy = float(np.std(beside)), max(AS_GOOD * noise, EXACT * float(np.ptp(values)))
+    if left > noisy:
         smoothed = Smoothed(len(values), record.fs, noise, best_bandwidth(values, record.fs))
         knots, rate = _knots(smoothed.apply(values - values.mean()), record.fs, noise)
         share = max(SURE, noise * np.sqrt(2 / len(values))) / (2**0.5 * float(np.std(values)))
         yield Sampled(knots, rate, late, on, contact, (share,), smoothed)
-        tones = _tones(values, time, SLOWLY * float(np.std(values)))
-    if tones is not None:
+    if tones and left <= max(noisy, SLOWLY * float(np.std(values))):
         size, frequency, _ = tones[0]
-        beside = values - _fitted(values, time, frequency, len(tones))[0]
         spectrum = density_beside(beside, record.fs, frequency=frequency, white=noise)
         if spectrum is not None:
             density, spacing = spectrum
@@ -220,49 +220,47 @@ def _knots(smooth: Array, fs: float, noise: float) -> tuple[Array, float]:
     return smooth, fs
 
 
-def _tones(values: Array, time: Array, most: float) -> tuple[tuple[float, float, float], ...] | None:
-    """Amplitude, frequency and phase of a tone and as many harmonics as it needs; None where they leave too much."""
+def _tones(values: Array, time: Array) -> tuple[tuple[tuple[float, float, float], ...], Array]:
+    """Amplitude, frequency and phase of a tone and as many harmonics as it needs, and what they leave of the values.
+
+    No tone, and all of the values, where there is no whole cycle, or more of a drift than a sensor has.
+    """
     from scipy.optimize import minimize_scalar
 
     size, span = len(values), time[-1] - time[0]
     centred = values - values.mean()
     spectrum = np.abs(np.fft.rfft(centred * np.hanning(size), 4 * size))
     coarse = float(np.argmax(spectrum)) / (4 * size) * size / span
-    if coarse * span < 1.0:
-        return None
-    least = 1e-6 * float(np.ptp(values))
-    allowed, found, worth = max(most, least), None, math.inf
-    for count in range(1, HARMONICS + 1):
+    nearest: tuple[tuple[tuple[float, float, float], ...], Array] = ((), centred)
+    least, worth = EXACT * float(np.ptp(values)), math.inf
+    for count in range(1, HARMONICS + 1) if coarse * span >= 1.0 else ():
 
         def left(frequency: float, count: int = count) -> float:
-            return _fitted(values, time, frequency, count)[2]
+            return float(np.std(_fitted(values, time, frequency, count)[1]))
 
         best = minimize_scalar(
             left, bounds=(coarse - 0.5 / span, coarse + 0.5 / span), method="bounded", options={"xatol": 1e-9 * coarse}
         )
-        _, solution, rest = _fitted(values, time, float(best.x), count)
+        solution, beside = _fitted(values, time, float(best.x), count)
         cosines, sines = solution[1:-1:2], solution[2:-1:2]
         sizes, angles = np.hypot(cosines, sines), np.arctan2(-sines, cosines)
         # a harmonic below the noise moves the mass all the same: Schwarz's criterion tells it from noise
-        criterion = 2 * size * math.log(max(rest, least)) + 2 * count * math.log(size)
-        if rest <= allowed and abs(solution[-1]) <= DRIFT * sizes[0] and criterion < worth:
+        criterion = 2 * size * math.log(max(float(np.std(beside)), least)) + 2 * count * math.log(size)
+        if abs(solution[-1]) <= DRIFT * sizes[0] and criterion < worth:
             worth = criterion
-            found = tuple(
-                (float(a), (j + 1) * float(best.x), float(p))
-                for j, (a, p) in enumerate(zip(sizes, angles, strict=True))
-            )
-    return found
+            waves = enumerate(zip(sizes, angles, strict=True), start=1)
+            nearest = tuple((float(a), order * float(best.x), float(p)) for order, (a, p) in waves), beside
+    return nearest
 
 
-def _fitted(values: Array, time: Array, frequency: float, count: int) -> tuple[Array, Array, float]:
-    """A tone and its harmonics on a line, their coefficients, and what they leave as a deviation."""
+def _fitted(values: Array, time: Array, frequency: float, count: int) -> tuple[Array, Array]:
+    """Coefficients of a tone and its harmonics on a line, and what they leave."""
     waves = np.cumprod(np.tile(np.exp(2j * np.pi * frequency * time)[:, None], count), axis=1)
     columns = np.ones((len(time), 2 * count + 2))
     columns[:, 1:-1:2], columns[:, 2:-1:2] = waves.real, waves.imag
     columns[:, -1] = np.linspace(-0.5, 0.5, len(time))
     solution = np.linalg.solve(columns.T @ columns, columns.T @ values)
-    nearest = np.asarray(columns @ solution)
-    return nearest, np.asarray(solution), float(np.sqrt(np.mean((values - nearest) ** 2)))
+    return np.asarray(solution), np.asarray(values - columns @ solution)
 
 
 @dataclass(frozen=True, eq=False)

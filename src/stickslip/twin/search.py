@@ -135,8 +135,9 @@ def believe(record: Record, *, mapped: Map = map) -> Belief:
     drives = possible_drives(record, HarmonicBase(0.0, frequency=1.0, contact=stated.contact))
     simple = min((_linear(record, oscillator, drive) for drive in drives), key=_left)
     belief = _needed(_richer(_needed(simple, SLOPE, KINETIC), mapped), SLOPE)
-    # slow noise weighs less against what is stated of the constants
-    return _over(_with_slips(belief, simple, mapped).with_measured_noise(), record)
+    belief = _with_slips(belief, simple, mapped)
+    measured = belief.with_measured_noise()  # which, slow, weighs less against what is stated of the constants
+    return belief if measured is belief else _over(measured, record)
 
 
 def _linear(record: Record, oscillator: Oscillator, drive: DriveFrom) -> Belief:
