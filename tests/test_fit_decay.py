@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import stickslip as ss
+from null_decays import let_go
 from stickslip.decay.motions import free_decay
 from stickslip.decay.start import Search
 from stickslip.decay.waveform import Blocks, normal_equations
@@ -533,6 +534,32 @@ def test_the_same_answer_in_other_units(length: float) -> None:
     assert other.dry_displacement.interval == pytest.approx(
         [length * end for end in metres.dry_displacement.interval], rel=1e-6
     )
+
+
+def coarse(seed: int, *, rate: float, damping: float, dry: float, step: float, share: float) -> ss.Record:
+    """A decay from 1 at 1 Hz by the closed form, in counts of `step`, with noise of that share of it."""
+    rng = np.random.default_rng(seed)
+    t = np.arange(int(14 * rate)) / rate - rng.uniform(0.5, 1.5)
+    x = let_go(np.maximum(t, 0.0), 2 * math.pi, damping, dry) + rng.uniform(-1, 1)
+    return ss.Record.of({"x": step * np.round(x / step + share * rng.standard_normal(len(x)))}, fs=rate)
+
+
+@pytest.mark.parametrize("seed", [12, 20, 59])
+def test_half_cycles_are_sought_until_none_is_likelier(seed: int) -> None:
+    """Least squares of counts a fifth of the first swing begin four half cycles away."""
+    found = ss.fit_decay(coarse(seed, rate=185.5, damping=0.0197, dry=0.0096, step=0.1947, share=0.05))
+    assert found.damping_ratio.value == pytest.approx(0.0197, abs=3 * found.damping_ratio.sd)
+
+
+def test_few_counts_near_a_step_tell_their_noise_badly() -> None:
+    """Intervals hold 95 of 100 though only a few of the counts tell the noise, and the motion is fitted to them."""
+    rng, held = np.random.default_rng(78), []
+    for seed in range(2000, 2150):
+        truth = {"damping": rng.uniform(0.002, 0.07), "dry": rng.uniform(0.01, 0.08)}
+        record = coarse(seed, rate=rng.uniform(20, 30), step=rng.uniform(0.03, 0.1), share=0.05, **truth)
+        found = ss.fit_decay(record)
+        held += [found.damping_ratio.includes(truth["damping"]), found.dry_displacement.includes(truth["dry"])]
+    assert sum(held) >= 0.94 * len(held)
 
 
 def test_counts_at_a_high_rate_are_counts_still() -> None:

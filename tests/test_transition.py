@@ -142,6 +142,21 @@ def test_the_drive_under_a_clean_ring_is_no_micro_slip(kinetic: float, damping: 
     assert inside == pytest.approx(slips[lasting < 0.03].tolist(), abs=1.5e-3)
 
 
+@pytest.mark.parametrize("seed", range(2))
+def test_a_ring_cut_in_two_by_a_wrong_mode_is_one(seed: int) -> None:
+    """Two slips in each stick are one cycle apart: rings of a faster mode and a cut amid each fit nearly as well."""
+    drive = ss.drives.HarmonicBase(0.65e-3, frequency=2.5)
+    slider = ss.Oscillator(mass=MASS, stiffness=SPRING, law=compliant(1.2226, 41.29), drive=drive)
+    run = ss.simulate(slider, cycles=8)
+    clean = run.record(fs=FS).between(1.0, 3.2)["a"]
+    loud = clean + 0.003 * clean.std() * np.random.default_rng(seed).standard_normal(len(clean))
+    found = ss.contact.find_microslips(ss.Record.of({"a": loud}, fs=FS, start=1.0))
+    slips = np.array([event.time for event in run.events if event.kind == "slip"])
+    assert found.counts == (2,) * 9
+    assert found.shortest < 1e-3
+    assert max(np.abs(slips - event.time).min() for event in found.events) < 0.5e-3
+
+
 def test_an_answer_says_how_long_a_micro_slip_lasts_that_it_sees() -> None:
     quiet, loud = (ss.contact.find_microslips(noisy("two", level)) for level in (50, 30))
     assert loud.shortest > 2 * quiet.shortest, "noise hides more"

@@ -25,6 +25,7 @@ STEPS = (0.03, 0.008, 0.002)  # of the same: the search goes from coarse to fine
 FLOOR = 0.001  # of the acceleration's standard deviation: rings about the drive's slow line fit to 1e-4 without noise
 SHOWING = 0.4  # of a cycle: a ring over a line shows its mode where it lasts as long,
 RING_SAMPLES = 10  # and has as many samples
+THROUGH = 4.0  # variances that one ring through two may leave: 0.7 to 1.1 of 9 sticks of a rig, 140 through a slip
 MODE_RINGS = 24  # the longest of them that show it together
 ALIKE = (
     0.9  # of the sticks, that hold as many: of 100 rigs at each noise (benchmarks/microslips.py) false ones never did
@@ -142,14 +143,14 @@ def microslips_of(ringing: Ringing) -> MicroSlips:
             "a micro-slip interrupts a ringing that is told",
             "record at a higher rate, or give x or v beside it, that sticks are told from",
         )
-    windows, variance = _without_seams(ringing)
+    windows, pole, variance = _without_seams(ringing)
     counts = tuple(len(window.glides) for window in windows)
     events = []
     for number, window in enumerate(windows):
         for piece in window.glides:
-            begin, end = _edges(window, piece, ringing.pole / ringing.fs)
+            begin, end = _edges(window, piece, pole)
             events.append(MicroSlip(ringing.time(window, begin), (end - begin) / ringing.fs, number))
-    astray, shortest = not_one_mode(ringing), _shortest_seen(ringing, variance)
+    astray, shortest = not_one_mode(ringing), _shortest_seen(windows, pole, variance) / ringing.fs
     per_stick = mean_of_cycles(
         "micro-slips per stick",
         [float(count) for count in counts],
@@ -165,14 +166,14 @@ def microslips_of(ringing: Ringing) -> MicroSlips:
     return MicroSlips(per_stick, tuple(events), counts, shortest, UNTOLD if astray else _kind(counts), status)
 
 
-def _shortest_seen(ringing: Ringing, variance: float) -> float:
-    """How long a micro-slip in the second swing has to last [s] that the noise hides it in 2 of 100.
+def _shortest_seen(windows: Sequence[Window], pole: complex, variance: float) -> float:
+    """How many samples a micro-slip in the second swing has to last that the noise hides it in 2 of 100.
 
     A ring A cos(phi) cut off at -phi0 of its tip holds A cos(phi0) for tan(phi0)/omega, until the mass stops, and rings
     on from there: that motion is made, and what a ring over a line leaves of it weighed as the cuts are.
     """
-    pole, cycle = ringing.pole / ringing.fs, 2 * math.pi * ringing.fs / ringing.pole.imag
-    rings = [window.values[p.first : p.last] for window in ringing.windows for p in window.rings]
+    cycle = 2 * math.pi / pole.imag
+    rings = [window.values[p.first : p.last] for window in windows for p in window.rings]
     rings = [values for values in rings if len(values) > cycle / 2]
     if not rings:
         return math.nan
@@ -181,7 +182,7 @@ def _shortest_seen(ringing: Ringing, variance: float) -> float:
     for duration in LASTING * cycle:
         seen = _over_line(amplitude * _cut_off(rows, SWING[0] * cycle, duration, pole), pole, free=True)
         if float(seen @ seen) > SEEN * variance:
-            return float(SPARE * duration / ringing.fs)
+            return float(SPARE * duration)
     return math.nan
 
 
@@ -194,8 +195,8 @@ def _cut_off(rows: Array, tip: float, duration: float, pole: complex) -> Array:
     return np.asarray(np.where(rows < begin, before, np.where(rows < end, level, after)))
 
 
-def _without_seams(ringing: Ringing) -> tuple[tuple[Window, ...], float]:
-    """The windows without the glides that one ring through them makes needless, and the variance about such rings.
+def _without_seams(ringing: Ringing) -> tuple[tuple[Window, ...], complex, float]:
+    """The windows without the glides that one ring through them makes needless, their mode, the variance about rings.
 
     The cuts take a ring to swing about zero. It swings about the drive's slow acceleration of the held mass, 0.5 % of
     the ring, and in a record of little noise a cut is cheaper than that misfit. With a line under each ring, and the
@@ -206,12 +207,16 @@ def _without_seams(ringing: Ringing) -> tuple[tuple[Window, ...], float]:
     least = max(RING_SAMPLES, SHOWING * 2 * math.pi / pole.imag)
     rings = [window.values[p.first + 1 : p.last - 1] for window in windows for p in window.rings]
     long = sorted((values for values in rings if len(values) >= least), key=len)[-MODE_RINGS:]
+    if not long:  # the mode of the cuts may be a wrong one, which cuts each ring in two: one through both shows it
+        through = [w.values[b.first + 1 : a.last - 1] for w in windows for b, a in itertools.pairwise(w.rings)]
+        shown = [(values, *_refined([values], pole)) for values in through]
+        long = [values for values, _, left in shown if left <= THROUGH * variance]
     if not long:
-        return windows, variance
+        return windows, pole, variance
     pole, left = _refined(long, pole)
     variance = max(variance, left)
     joined = (_joined(window.values, list(window.pieces), pole, variance) for window in windows)
-    return tuple(replace(window, pieces=tuple(p)) for window, p in zip(windows, joined, strict=True)), variance
+    return tuple(replace(window, pieces=tuple(p)) for window, p in zip(windows, joined, strict=True)), pole, variance
 
 
 def _refined(rings: Sequence[Array], pole: complex) -> tuple[complex, float]:

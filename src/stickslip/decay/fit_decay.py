@@ -238,11 +238,10 @@ def _alone(release: Release) -> _Motion:
 def _together(releases: list[Release]) -> _Motion:
     fits = fit_together(releases)
     least = min(fit.value for fit in fits)
-    freedom = sum(release.blocks.freedom for release in releases)
     share = np.exp(-0.5 * np.array([fit.value - least for fit in fits]))
     best = fits[int(np.argmax(share))]
     covariance = np.asarray(np.linalg.pinv(best.curvature)[:6, :6], dtype=np.float64)
-    limits = ends_together(fits, least + student(freedom) ** 2, 6)
+    limits = ends_together(fits, least + student(best.freedom(releases)) ** 2, 6)
     motions = [tuple(fit.motion(k) for k in range(len(releases))) for fit in fits]
     rows = np.array([fit.p[:6] for fit in fits])
     mean = _mean(rows, share / share.sum(), covariance, limits, [fit.half_cycles for fit in fits], motions)
