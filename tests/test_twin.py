@@ -23,7 +23,8 @@ from stickslip.cli.program import main
 from stickslip.estimate import UNTRIED, kinds, stands
 from stickslip.law.stretch import Sampled, Tones
 from stickslip.twin.belief import EXCESS, GAIN, HELD, LATE, SLOPE, SPRING
-from stickslip.twin.search import _left, _linearised, _step, _towards, believe
+from stickslip.twin.descent import _step, _towards, linearised, misfit
+from stickslip.twin.search import believe
 from stickslip.twin.trial import ASTRAY, _Misfit, try_on_twins
 
 RATIO = "static over sliding friction"
@@ -270,12 +271,12 @@ def test_a_value_at_its_end_stays_and_the_search_goes_on_without_it() -> None:
     # a slope that may not fall below zero, and was drawn there, had ended the search with a step that led nowhere
     belief = bristled().trial.belief
     doubled = {EXCESS: 2 * belief.values[EXCESS], SLOPE: 0.0, HELD: 1.0}
-    far = _linearised(replace(belief.at(**doubled), held=EXCESS))
+    far = linearised(replace(belief.at(**doubled), held=EXCESS))
     step = dict(zip(far.fit.names, _towards(far, far.fit), strict=True))
     assert all(step[name] == 0 or not far.pinned(name, step[name]) for name in step)
     nearer = _step(far)
     assert nearer is not None
-    assert _left(nearer) < _left(far)
+    assert misfit(nearer) < misfit(far)
 
 
 def test_friction_that_falls_with_speed_is_found_with_its_static_level() -> None:

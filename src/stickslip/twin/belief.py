@@ -11,7 +11,7 @@ import numpy as np
 
 from stickslip.arrays import Array
 from stickslip.errors import StickslipError
-from stickslip.law.stretch import DriveFrom, Tones, driving
+from stickslip.law.stretch import DriveFrom, Sampled, Tones, driving
 from stickslip.laws.compliant import CompliantContact
 from stickslip.laws.coulomb import Coulomb, LinearSlope
 from stickslip.laws.lugre import Dahl, LuGre
@@ -23,6 +23,8 @@ from stickslip.record.record import Record
 from stickslip.rig.rig import Rig
 from stickslip.rig.sensor import Digitiser, MeasuredNoise, Noise, Sensor
 from stickslip.signals.noise import density_beside
+from stickslip.solve.curved import CurvedTrajectory
+from stickslip.solve.sensitivity import sensitivity
 from stickslip.solve.simulate import simulate
 from stickslip.solve.trajectory import Trajectory
 
@@ -359,10 +361,8 @@ class Belief:
         if sensor.mount or math.isfinite(sensor.discharge):
             quiet = replace(sensor, noise=Noise(), digitiser=Digitiser(limit=sensor.digitiser.limit), gain=self.gain)
             return np.asarray(self._written((quiet,), run, 0)["x"])
-        first = max(0.0, -self.late) - sensor.lag
-        times = np.clip(first + np.arange(len(self.record)) / self.record.fs, 0.0, run.duration)
         limit = sensor.digitiser.limit
-        return np.asarray(np.clip(self.gain * run.sample(times, ("x",))[0][0], -limit, limit))
+        return np.asarray(np.clip(self.gain * run.sample(self._instants(run), ("x",))[0][0], -limit, limit))
 
     @cached_property
     def residual(self) -> Array:
@@ -425,12 +425,51 @@ class Belief:
             begun["anchor"] = values["x"] - held / self.contact
         return begun
 
-    def _run(self) -> Trajectory:
-        """The motion, from the first instant that x or another channel shows to the last."""
+    @property
+    def _system(self) -> Oscillator:
+        """As it moves from the first instant that x or another channel shows to the last."""
         last, late = (len(self.record) - 1) / self.record.fs, self.late
         off = [self.values[name] for name in DRIVE if name in self.values]
-        moved = replace(self.oscillator, drive=self.drive(min(0.0, -late), last + max(0.0, -late), off))
-        return simulate(moved, duration=last + abs(late), start=self.start, budget=EVENTS, rtol=FOLLOWED)
+        return replace(self.oscillator, drive=self.drive(min(0.0, -late), last + max(0.0, -late), off))
+
+    def _run(self) -> Trajectory:
+        """The motion of that system."""
+        duration = (len(self.record) - 1) / self.record.fs + abs(self.late)
+        return simulate(self._system, duration=duration, start=self.start, budget=EVENTS, rtol=FOLLOWED)
+
+    def tangents(self) -> dict[str, Array]:
+        """How `moved` changes with each value, carried along the motion and through its events.
+
+        Only of laws of linear modes, read by a sensor without memory; not by the time that x is late.
+        """
+        sensor, run = self.sensor, self._run()
+        if isinstance(run, CurvedTrajectory) or sensor.mount or math.isfinite(sensor.discharge):
+            return {}
+        scaled = {DRIVE[0]: 1 / (1 + self.values[DRIVE[0]])} if isinstance(self.drive, Sampled) else {}
+        names = [name for name in self.values if name not in (LATE, GAIN, *scaled)]
+        near = [self.at(**{name: self.values[name] + NUDGE * self.size(name)}) for name in names]
+        motion = sensitivity(
+            run,
+            [belief._system for belief in near],
+            step=NUDGE,
+            starts=dict.fromkeys(self.start, 1.0),
+            scaled=list(scaled.values()),
+            outputs=("x",),
+        )
+        times = self._instants(run)
+        columns, begun = self.gain * motion.sample(times, "x"), np.array(list(self.start.values()))
+        by_start = columns[len(names) + len(scaled) :]
+        read = np.abs(self.moved) < sensor.digitiser.limit  # what is beyond its range, it does not see move
+        out = {GAIN: self.moved * read}
+        for name, belief, column in zip(names, near, columns, strict=False):
+            moved = (np.array(list(belief.start.values())) - begun) / NUDGE
+            out[name] = (column + moved @ by_start) * read / self.size(name)
+        return out | {name: column * read for name, column in zip(scaled, columns[len(names) :], strict=False)}
+
+    def _instants(self, run: Trajectory) -> Array:
+        """When x is read, on the run's clock [s]."""
+        first = max(0.0, -self.late) - self.sensor.lag
+        return np.clip(first + np.arange(len(self.record)) / self.record.fs, 0.0, run.duration)
 
     def _written(self, sensors: Iterable[Sensor], run: Trajectory, rng: int | np.random.Generator) -> Record:
         """What sensors write of the motion, x as late to the others as it is believed to be."""

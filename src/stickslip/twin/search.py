@@ -10,7 +10,6 @@ from functools import partial
 
 import numpy as np
 
-from stickslip.arrays import Array
 from stickslip.balance.motion import is_measured
 from stickslip.drives.kinds import HarmonicBase
 from stickslip.errors import EstimateError, StickslipError
@@ -22,7 +21,7 @@ from stickslip.record.record import Record
 from stickslip.rig.rig import Rig
 from stickslip.rig.sensor import Digitiser, Mount, Noise, Sensor
 from stickslip.signals.noise import noise_level, quantisation_step
-from stickslip.statistics import correlation_time, least_squares
+from stickslip.statistics import least_squares
 from stickslip.twin.belief import (
     DAMPER,
     DRIVE,
@@ -33,7 +32,6 @@ from stickslip.twin.belief import (
     KINETIC,
     LOSS,
     MASS,
-    NUDGE,
     POWER,
     RATE,
     SLIDES,
@@ -42,26 +40,21 @@ from stickslip.twin.belief import (
     SPEED,
     SPRING,
     Belief,
-    Fit,
     levelled,
 )
+from stickslip.twin.descent import QUESTION, descended, misfit, refined, slope_of
 from stickslip.workers import Map
 
-QUESTION = "the twin of a record"
 # How many starts, cycles and passes: by trial on the rigs of benchmarks/twins.py with Stribeck's curve, constants half
 # a per cent off, and with LuGre's bristles (seeds 621 and 622), of which every one but two was then led to its noise.
 STARTS = 9  # of a grid, that are led over a first cycle: some end in a valley of their own
 KEPT = 4  # of them, the nearest, that are led further; one where a value is held: its valley is the same (seed 911)
 SAME = 0.01  # of its size, by which a part may differ between two searches that came to the same end
 FAR = 2.0  # times what the best law leaves of the beginning, beyond which a law is not led over the whole record
-PASSES = 20  # of the descent: in a narrow valley; elsewhere the first two do nearly all of it
 HORIZONS = (1.0, 3.0)  # cycles over which a start is led to the record before it is over more
 STEPS = 4  # passes of it over each
 LEAST = 50  # samples
 SEARCHED = 4000  # samples in which it is searched where a law's valley lies
-HALVINGS = 6  # of a step that leads away, before the descent ends
-LEARNS = 0.5  # of what was left, that a step leaves at most where its slopes are learned from it and not taken anew
-SETTLED = 0.9999  # of what is left, from which a pass gains nothing; 0.999 stopped in bristles' valleys (seed 911)
 SENSED = ("x", "z", "force", "v", "a", "load")  # channels that a virtual rig writes
 LAWS = 3  # that are tried beside the simplest
 CLOSE = 6.6  # chi-squared by which one law leads another, one in a hundred by chance
@@ -133,7 +126,7 @@ def believe(record: Record, *, mapped: Map = map) -> Belief:
         law=LinearSlope(0.0, slope=0.0),
     )
     drives = possible_drives(record, HarmonicBase(0.0, frequency=1.0, contact=stated.contact))
-    simple = min((_linear(record, oscillator, drive) for drive in drives), key=_left)
+    simple = min((_linear(record, oscillator, drive) for drive in drives), key=misfit)
     belief = _needed(_richer(_needed(simple, SLOPE, KINETIC), mapped), SLOPE)
     belief = _with_slips(belief, simple, mapped)
     measured = belief.with_measured_noise()  # which, slow, weighs less against what is stated of the constants
@@ -147,9 +140,9 @@ def _linear(record: Record, oscillator: Oscillator, drive: DriveFrom) -> Belief:
     values = {**start, **dict.fromkeys(unsure, 0.0), **_sliding(record, contact)}
     begun = Belief(record, oscillator, values, drive, Rig(tuple(_sensors(record))), unsure)
     # where the sensor has an offset, the rest position is nearer to its mean than to its zero
-    begun = min(begun, begun.at(x=values["x"] - float(record["x"].mean())), key=_left)
+    begun = min(begun, begun.at(x=values["x"] - float(record["x"].mean())), key=misfit)
     led = _led(begun, [record.rows(0, samples) for samples in _horizons(record)])
-    return _nearest(replace(led, record=record))
+    return refined(replace(led, record=record))
 
 
 def lacking(record: Record) -> StickslipError | None:
@@ -178,7 +171,7 @@ def _needed(belief: Belief, *parts: str) -> Belief:
     """Without those parts, asked in turn, that chance would have shown too."""
     for part in parts:
         if part in belief.values and not _stands_out(belief, part):
-            belief = _nearest(belief.without(part))
+            belief = refined(belief.without(part))
     return belief
 
 
@@ -218,9 +211,9 @@ def _with_slips(belief: Belief, simple: Belief, mapped: Map) -> Belief:
     if {EXCESS, GIVE, RATE} & belief.values.keys():
         begun = [_off(simple.as_stated(), name) for name in SLIPS]
         slips += [law for law in mapped(partial(_led_beside, beside=belief), begun) if law is not None]
-    nearest = min([belief, *slips], key=_left)
+    nearest = min([belief, *slips], key=misfit)
     freedom = 0.0 if nearest.fit is None else nearest.fit.freedom
-    best = nearest if freedom * math.log(_left(belief) / _left(nearest)) > CERTAIN else belief
+    best = nearest if freedom * math.log(misfit(belief) / misfit(nearest)) > CERTAIN else belief
     rivals = (law for law in (*belief.rivals, *slips) if law is not best and _as_near(law, best))
     return replace(best, rivals=tuple(rivals))
 
@@ -236,7 +229,7 @@ def _asks_for(belief: Belief, name: str) -> bool:
     fit = belief.fit
     if name in belief.unsure or fit is None:
         return False
-    column = levelled(_slope_of(belief.at(**{name: 0.0}), name))
+    column = levelled(slope_of(belief.at(**{name: 0.0}), name))
     column -= fit.jacobian @ (fit.gain @ column)
     return float(column @ belief.residual) ** 2 > SLIPPED * float(column @ column) * fit.weight
 
@@ -251,19 +244,19 @@ def _led_by(families: list[list[Belief]], record: Record, mapped: Map) -> list[B
     families = [family[: 1 if family[0].held else KEPT] for family in families]
     families = _further(families, partial(_led_on, horizons=horizons), mapped)
     nearest = [law for family in families for law in _ends(family)]
-    least: float = min(_left(law) for law in nearest)
-    return list(mapped(partial(_over, record=record), [law for law in nearest if _left(law) <= FAR * least]))
+    least: float = min(misfit(law) for law in nearest)
+    return list(mapped(partial(_over, record=record), [law for law in nearest if misfit(law) <= FAR * least]))
 
 
 def _further(families: list[list[Belief]], step: Callable[[Belief], Belief], mapped: Map) -> list[list[Belief]]:
     """All families a step further, each with its nearest first; in one round, so that no process waits for another."""
     moved = iter(mapped(step, [begun for family in families for begun in family]))
-    return [sorted(itertools.islice(moved, len(family)), key=_left) for family in families]
+    return [sorted(itertools.islice(moved, len(family)), key=misfit) for family in families]
 
 
 def _followed(begun: Belief) -> Belief:
     """The same, with what it leaves of its record."""
-    _left(begun)
+    misfit(begun)
     return begun
 
 
@@ -284,21 +277,21 @@ def _led_beside(begun: Belief, beside: Belief) -> Belief | None:
     for samples in _horizons(beside.record):
         record = beside.record.rows(0, samples)
         begun = _tried(replace(begun, record=record), STEPS)
-        if _left(begun) > FAR * _left(replace(beside, record=record)):
+        if misfit(begun) > FAR * misfit(replace(beside, record=record)):
             return None
     return _over(begun, beside.record)
 
 
 def _simplest(laws: list[Belief]) -> Belief:
     """The law that leaves the least, where each value that it has more spares what chance would."""
-    nearest = min(laws, key=_left)
+    nearest = min(laws, key=misfit)
     freedom = nearest.fit.freedom if nearest.fit is not None else 1.0
-    return min(laws, key=lambda law: freedom * math.log(_left(law)) + CLOSE * len(law.values))
+    return min(laws, key=lambda law: freedom * math.log(misfit(law)) + CLOSE * len(law.values))
 
 
 def _as_near(law: Belief, best: Belief) -> bool:
     """Whether a law leaves no more than chance would, were it the one that wrote the record."""
-    return best.fit is not None and best.fit.freedom * math.log(_left(law) / _left(best)) < CLOSE
+    return best.fit is not None and best.fit.freedom * math.log(misfit(law) / misfit(best)) < CLOSE
 
 
 def _same(one: Belief, other: Belief) -> bool:
@@ -311,7 +304,7 @@ def _over(begun: Belief, record: Record) -> Belief:
     """The nearest over a whole record."""
     begun = replace(begun, record=record)
     try:
-        return _nearest(begun)
+        return refined(begun)
     except StickslipError:
         return begun
 
@@ -334,7 +327,7 @@ def _led(begun: Belief, horizons: list[Record]) -> Belief:
 def _tried(begun: Belief, passes: int) -> Belief:
     """Nearer, by so many passes; as it was of a law that can not be followed."""
     try:
-        return _descended(begun, passes, roughly=True)[0]
+        return descended(begun, passes, roughly=True)[0]
     except StickslipError:
         return begun
 
@@ -411,132 +404,10 @@ def _by_chance(simple: Belief, richer: Belief) -> float:
     if less is None or more is None:  # a law that could not be followed explains nothing
         return 1.0
     added = len(more.names) - len(less.names)
-    gained = _left(simple) / _left(richer) - 1
+    gained = misfit(simple) / misfit(richer) - 1
     if added < 1 or gained <= 0:
         return 1.0
     return min(1.0, LAWS * float(fdtrc(added, more.freedom, gained * more.freedom / added)))
-
-
-def _left(belief: Belief) -> float:
-    """What the simulated displacement leaves of the measured one, and constants that are off [m^2].
-
-    Infinite where the rig can not be followed.
-    """
-    try:
-        residual = belief.residual
-    except StickslipError:
-        return math.inf
-    off = sum(((belief.values[name] - middle) / sd) ** 2 for name, (middle, sd) in belief.priors.items())
-    with np.errstate(over="ignore"):  # a step that leads far away
-        return float(residual @ residual) + belief.noise**2 * off
-
-
-def _nearest(belief: Belief, passes: int = PASSES) -> Belief:
-    """The belief whose displacement is nearest to the record's, where that is near; else as it was begun."""
-    belief, fresh = _descended(belief, passes)
-    return belief if fresh else _linearised(belief)
-
-
-def _descended(belief: Belief, passes: int, *, roughly: bool = False) -> tuple[Belief, bool]:
-    """The nearest after so many passes, and whether its slopes were taken just there; roughly, noise is an end."""
-    belief, fresh, taken = _linearised(belief), True, 1
-    while not (roughly and belief.like_noise):
-        before, moved = _left(belief), _step(belief)
-        if moved is not None and _left(moved) < LEARNS * before:
-            belief, fresh = _learned(belief, moved), False
-            continue
-        ended = fresh and (moved is None or _left(moved) > SETTLED * before)
-        if moved is not None:
-            belief, fresh = moved, False
-        if ended or taken >= passes:
-            break
-        belief, fresh, taken = _linearised(belief), True, taken + 1
-    return belief, fresh
-
-
-def _step(belief: Belief) -> Belief | None:
-    """Nearer to the record by its own slopes; None where no part of that step leads nearer."""
-    fit = belief.fit
-    assert fit is not None
-    before, step = _left(belief), _towards(belief, fit)
-    moved = (belief.by(fit.names, step / 2**halving) for halving in range(HALVINGS))
-    return next((nearer for nearer in moved if _left(nearer) < before), None)
-
-
-def _towards(belief: Belief, fit: Fit) -> Array:
-    """Gauss's and Newton's step, damped as Levenberg's and Marquardt's, and within the values' reach."""
-    reach = np.array([belief.reach(name) for name in fit.names])
-    seen = fit.normal * np.outer(reach, reach)
-    pulled = seen @ ((fit.gain @ belief.residual - fit.pull) / reach)
-    damped = seen + belief.noise**2 * np.eye(len(reach))  # what x hardly tells holds the others back no more
-    step, free = np.zeros(len(reach)), np.ones(len(reach), dtype=bool)
-    while True:
-        step[free] = np.linalg.solve(damped[np.ix_(free, free)], pulled[free])
-        out = [belief.pinned(name, towards) for name, towards in zip(fit.names, step, strict=True)]
-        if not (free & out).any():
-            return np.asarray(reach * step / max(1.0, float(np.max(np.abs(step)))))
-        free &= ~np.array(out)  # a value that would leave where it may be stays, and the others go without it
-        step[~free] = 0.0
-
-
-def _learned(before: Belief, moved: Belief) -> Belief:
-    """With slopes that the step has shown, and no simulation more: Broyden's rule, each value by what it moves."""
-    fit = before.fit
-    assert fit is not None
-    scale = np.sum(fit.jacobian**2, axis=0)
-    step = np.array([moved.values[name] - before.values[name] for name in fit.names])
-    missed = before.residual - moved.residual - fit.jacobian @ step
-    return _fitted(moved, fit.names, fit.jacobian + np.outer(missed, scale * step / (scale @ step**2)))
-
-
-def _linearised(belief: Belief) -> Belief:
-    """With how its values follow from x, in their neighbourhood."""
-    residual = belief.residual
-    slopes = {name: _slope_of(belief, name) for name in belief.values}
-    # what moves nothing can not be told, and what is at its end would hold the others back
-    names = tuple(
-        name
-        for name, slope in slopes.items()
-        if slope.any() and name != belief.held and not belief.pinned(name, float(slope @ residual))
-    )
-    if not names:
-        raise EstimateError("a displacement that nothing moves", f"{QUESTION} moves as its law does", "see the record")
-    return _fitted(belief, names, levelled(np.column_stack([slopes[name] for name in names])))
-
-
-def _fitted(belief: Belief, names: tuple[str, ...], jacobian: Array) -> Belief:
-    """With what x tells of its values, by their slopes."""
-    residual = belief.residual
-    independent = len(residual) / correlation_time(residual)
-    freedom = max(1.0, independent - len(names))
-    weight = float(residual @ residual) / freedom
-    # what is known beforehand counts against the sensor's noise: a misfit must not hold values to it
-    known = [belief.priors.get(name, (0.0, math.inf)) for name in names]
-    prior = np.array([belief.noise**2 / sd**2 for _, sd in known])
-    scale = np.sqrt(np.sum(jacobian**2, axis=0) + prior)
-    unit = jacobian / scale
-    seen = unit.T @ unit
-    inverse = np.linalg.pinv(seen + np.diag(prior / scale**2))
-    covariance = inverse @ (weight * seen + np.diag(belief.noise**2 * prior / scale**2)) @ inverse
-    values, vectors = np.linalg.eigh(covariance / np.outer(scale, scale))
-    inverse /= np.outer(scale, scale)
-    pull = inverse @ (prior * [belief.values[n] - middle for n, (middle, _) in zip(names, known, strict=True)])
-    root = vectors * np.sqrt(np.maximum(values, 0.0))
-    normal = jacobian.T @ jacobian + np.diag(prior)
-    return replace(belief, fit=Fit(names, jacobian, inverse @ jacobian.T, pull, normal, root, weight, freedom))
-
-
-def _slope_of(belief: Belief, name: str) -> Array:
-    """How the displacement changes with one value, by a difference forward: a part at zero has no other side."""
-    step = NUDGE * belief.size(name)
-    if name == HELD and belief.values[name] > 0:  # the contact bears no more than all
-        step = -step
-    try:
-        moved = belief.at(**{name: belief.values[name] + step}).moved
-    except StickslipError:  # an exit that is a tangency just there
-        step /= 3
-        moved = belief.at(**{name: belief.values[name] + step}).moved
-    return np.asarray((moved - belief.moved) / step)
 
 
 def _unsure(record: Record, drive: DriveFrom) -> dict[str, float]:

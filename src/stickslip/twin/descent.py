@@ -1,0 +1,145 @@
+"""The rig nearest to a record, of one law: Gauss's and Newton's descent."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from stickslip.arrays import Array
+from stickslip.errors import EstimateError, StickslipError
+from stickslip.statistics import correlation_time
+from stickslip.twin.belief import HELD, NUDGE, Belief, Fit, levelled
+
+QUESTION = "the twin of a record"
+PASSES = 20  # of the descent: in a narrow valley; elsewhere the first two do nearly all of it
+HALVINGS = 6  # of a step that leads away, before the descent ends
+LEARNS = 0.5  # of what was left, that a step leaves at most where its slopes are learned from it and not taken anew
+SETTLED = 0.9999  # of what is left, from which a pass gains nothing; 0.999 stopped in bristles' valleys (seed 911)
+
+
+def misfit(belief: Belief) -> float:
+    """What the simulated displacement leaves of the measured one, and constants that are off [m^2].
+
+    Infinite where the rig can not be followed.
+    """
+    try:
+        residual = belief.residual
+    except StickslipError:
+        return math.inf
+    off = sum(((belief.values[name] - middle) / sd) ** 2 for name, (middle, sd) in belief.priors.items())
+    with np.errstate(over="ignore"):  # a step that leads far away
+        return float(residual @ residual) + belief.noise**2 * off
+
+
+def refined(belief: Belief, passes: int = PASSES) -> Belief:
+    """The belief whose displacement is nearest to the record's, where that is near; else as it was begun."""
+    belief, fresh = descended(belief, passes)
+    return belief if fresh else linearised(belief)
+
+
+def descended(belief: Belief, passes: int, *, roughly: bool = False) -> tuple[Belief, bool]:
+    """The nearest after so many passes, and whether its slopes were taken just there; roughly, noise is an end."""
+    belief, fresh, taken = linearised(belief), True, 1
+    while not (roughly and belief.like_noise):
+        before, moved = misfit(belief), _step(belief)
+        if moved is not None and misfit(moved) < LEARNS * before:
+            belief, fresh = _learned(belief, moved), False
+            continue
+        ended = fresh and (moved is None or misfit(moved) > SETTLED * before)
+        if moved is not None:
+            belief, fresh = moved, False
+        if ended or taken >= passes:
+            break
+        belief, fresh, taken = linearised(belief), True, taken + 1
+    return belief, fresh
+
+
+def _step(belief: Belief) -> Belief | None:
+    """Nearer to the record by its own slopes; None where no part of that step leads nearer."""
+    fit = belief.fit
+    assert fit is not None
+    before, step = misfit(belief), _towards(belief, fit)
+    moved = (belief.by(fit.names, step / 2**halving) for halving in range(HALVINGS))
+    return next((nearer for nearer in moved if misfit(nearer) < before), None)
+
+
+def _towards(belief: Belief, fit: Fit) -> Array:
+    """Gauss's and Newton's step, damped as Levenberg's and Marquardt's, and within the values' reach."""
+    reach = np.array([belief.reach(name) for name in fit.names])
+    seen = fit.normal * np.outer(reach, reach)
+    pulled = seen @ ((fit.gain @ belief.residual - fit.pull) / reach)
+    damped = seen + belief.noise**2 * np.eye(len(reach))  # what x hardly tells holds the others back no more
+    step, free = np.zeros(len(reach)), np.ones(len(reach), dtype=bool)
+    while True:
+        step[free] = np.linalg.solve(damped[np.ix_(free, free)], pulled[free])
+        out = [belief.pinned(name, towards) for name, towards in zip(fit.names, step, strict=True)]
+        if not (free & out).any():
+            return np.asarray(reach * step / max(1.0, float(np.max(np.abs(step)))))
+        free &= ~np.array(out)  # a value that would leave where it may be stays, and the others go without it
+        step[~free] = 0.0
+
+
+def _learned(before: Belief, moved: Belief) -> Belief:
+    """With slopes that the step has shown, and no simulation more: Broyden's rule, each value by what it moves."""
+    fit = before.fit
+    assert fit is not None
+    scale = np.sum(fit.jacobian**2, axis=0)
+    step = np.array([moved.values[name] - before.values[name] for name in fit.names])
+    missed = before.residual - moved.residual - fit.jacobian @ step
+    return _fitted(moved, fit.names, fit.jacobian + np.outer(missed, scale * step / (scale @ step**2)))
+
+
+def linearised(belief: Belief) -> Belief:
+    """With how its values follow from x, in their neighbourhood."""
+    residual = belief.residual
+    try:
+        slopes = belief.tangents()
+    except StickslipError:  # neighbours that are solved unlike
+        slopes = {}
+    slopes = {name: slopes[name] if name in slopes else slope_of(belief, name) for name in belief.values}
+    # what moves nothing can not be told, and what is at its end would hold the others back
+    names = tuple(
+        name
+        for name, slope in slopes.items()
+        if slope.any() and name != belief.held and not belief.pinned(name, float(slope @ residual))
+    )
+    if not names:
+        raise EstimateError("a displacement that nothing moves", f"{QUESTION} moves as its law does", "see the record")
+    return _fitted(belief, names, levelled(np.column_stack([slopes[name] for name in names])))
+
+
+def _fitted(belief: Belief, names: tuple[str, ...], jacobian: Array) -> Belief:
+    """With what x tells of its values, by their slopes."""
+    residual = belief.residual
+    independent = len(residual) / correlation_time(residual)
+    freedom = max(1.0, independent - len(names))
+    weight = float(residual @ residual) / freedom
+    # what is known beforehand counts against the sensor's noise: a misfit must not hold values to it
+    known = [belief.priors.get(name, (0.0, math.inf)) for name in names]
+    prior = np.array([belief.noise**2 / sd**2 for _, sd in known])
+    scale = np.sqrt(np.sum(jacobian**2, axis=0) + prior)
+    unit = jacobian / scale
+    seen = unit.T @ unit
+    inverse = np.linalg.pinv(seen + np.diag(prior / scale**2))
+    covariance = inverse @ (weight * seen + np.diag(belief.noise**2 * prior / scale**2)) @ inverse
+    values, vectors = np.linalg.eigh(covariance / np.outer(scale, scale))
+    inverse /= np.outer(scale, scale)
+    pull = inverse @ (prior * [belief.values[n] - middle for n, (middle, _) in zip(names, known, strict=True)])
+    root = vectors * np.sqrt(np.maximum(values, 0.0))
+    normal = jacobian.T @ jacobian + np.diag(prior)
+    return replace(belief, fit=Fit(names, jacobian, inverse @ jacobian.T, pull, normal, root, weight, freedom))
+
+
+def slope_of(belief: Belief, name: str) -> Array:
+    """How the displacement changes with one value, by a difference forward: a part at zero has no other side."""
+    step = NUDGE * belief.size(name)
+    if name == HELD and belief.values[name] > 0:  # the contact bears no more than all
+        step = -step
+    try:
+        moved = belief.at(**{name: belief.values[name] + step}).moved
+    except StickslipError:  # an exit that is a tangency just there
+        step /= 3
+        moved = belief.at(**{name: belief.values[name] + step}).moved
+    return np.asarray((moved - belief.moved) / step)
