@@ -242,7 +242,9 @@ def _led_by(families: list[list[Belief]], record: Record, mapped: Map) -> list[B
     families = _further(families, _followed, mapped)
     families = _further([family[:STARTS] for family in families], partial(_tried, passes=1), mapped)
     families = [family[: 1 if family[0].held else KEPT] for family in families]
-    families = _further(families, partial(_led_on, horizons=horizons), mapped)
+    for beginning in horizons:  # starts that have come to one valley go on as one
+        families = [_unlike(family) for family in _further(families, partial(_led_over, record=beginning), mapped)]
+    families = _further(families, _sloping, mapped)
     nearest = [law for family in families for law in _ends(family)]
     least: float = min(misfit(law) for law in nearest)
     return list(mapped(partial(_over, record=record), [law for law in nearest if misfit(law) <= FAR * least]))
@@ -260,10 +262,23 @@ def _followed(begun: Belief) -> Belief:
     return begun
 
 
-def _led_on(begun: Belief, horizons: list[Record]) -> Belief:
-    """The nearest over ever more cycles, with a slope against speed where it was led without."""
-    led = _led(begun, horizons)
+def _led_over(begun: Belief, record: Record) -> Belief:
+    """The nearest over so much of a record."""
+    return _tried(replace(begun, record=record), STEPS)
+
+
+def _sloping(led: Belief) -> Belief:
+    """With a slope against speed, where it was led without."""
     return led if SLOPE in led.values else _tried(led.at(**{SLOPE: 0.0}), STEPS)
+
+
+def _unlike(family: list[Belief]) -> list[Belief]:
+    """One of each end to which the searches of a family have come, the nearest first."""
+    apart: list[Belief] = []
+    for belief in family:
+        if not any(_same(belief, other) for other in apart):
+            apart.append(belief)
+    return apart
 
 
 def _ends(family: list[Belief]) -> list[Belief]:
@@ -276,7 +291,7 @@ def _led_beside(begun: Belief, beside: Belief) -> Belief | None:
     """The nearest over the whole record; None once it is left behind by another law."""
     for samples in _horizons(beside.record):
         record = beside.record.rows(0, samples)
-        begun = _tried(replace(begun, record=record), STEPS)
+        begun = _led_over(begun, record)
         if misfit(begun) > FAR * misfit(replace(beside, record=record)):
             return None
     return _over(begun, beside.record)
@@ -320,7 +335,7 @@ def _horizons(record: Record) -> list[int]:
 def _led(begun: Belief, horizons: list[Record]) -> Belief:
     """The nearest over a few samples, then over more: far ahead, a belief that is not near yet loses its way."""
     for record in horizons:
-        begun = _tried(replace(begun, record=record), STEPS)
+        begun = _led_over(begun, record)
     return begun
 
 
