@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, fields, replace
-from functools import cached_property, partial
+from functools import cached_property, lru_cache, partial
+from typing import NamedTuple
 
 import numpy as np
 
@@ -114,7 +115,7 @@ class Belief:
         kinetic = values.get(KINETIC, 0.0)
         static = kinetic + values[EXCESS] if EXCESS in values else None
         if RATE in values and kinetic > 0:
-            steepness = 1 / (STEEP * float(np.max(np.abs(self.record["v"]))))
+            steepness = 1 / (STEEP * _sizes(self.record).fastest)
             return StateVariable(kinetic, rate=math.exp(values[RATE]) / kinetic, steepness=steepness)
         if GIVE in values and HELD in values:
             if static is None:
@@ -237,7 +238,7 @@ class Belief:
         if name == HELD:
             return -1.0, 1.0
         if name == SPEED:
-            fastest = float(np.max(np.abs(self.record["v"])))
+            fastest = _sizes(self.record).fastest
             return math.log(FALLS[0] * fastest), math.log(FALLS[1] * fastest)
         if name == POWER:
             return POWERS
@@ -294,15 +295,15 @@ class Belief:
     def size(self, name: str) -> float:
         """About how large a value is."""
         if name in ("x", "v"):
-            return float(np.std(self.record[name]))
+            return _sizes(self.record).x if name == "x" else _sizes(self.record).v
         if name in self.unsure:
             return max(NUDGE, self.unsure[name])
         if name in (*LOGARITHMS, LOSS, HELD):
             return 1.0
         if name == LATE:
             return 1 / self.record.fs
-        friction = float(np.std(self.record["friction"]))
-        return friction / float(np.std(self.record["v"])) if name == SLOPE else friction
+        sizes = _sizes(self.record)
+        return sizes.friction / sizes.v if name == SLOPE else sizes.friction
 
     def reach(self, name: str) -> float:
         """As far as a value may be moved at once: further away its slope tells nothing."""
@@ -395,7 +396,7 @@ class Belief:
 
     def _with_counts(self, level: float) -> float:
         """A noise and its counts [m]; never less than rounding."""
-        return max(math.hypot(level, self.sensor.digitiser.step / 12**0.5), TINY * float(np.std(self.record["x"])))
+        return max(math.hypot(level, self.sensor.digitiser.step / 12**0.5), TINY * _sizes(self.record).x)
 
     @property
     def left(self) -> float:
@@ -509,6 +510,21 @@ class Belief:
             details = {"delay": known.delay, "mount": known.mount, "inertia": known.inertia}
             written = written.with_details(name, **details, discharge=known.discharge, noise=known.noise)
         return written
+
+
+class _Sizes(NamedTuple):
+    """Standard deviations of a record's displacement [m], velocity [m/s] and friction [N], and its largest speed."""
+
+    x: float
+    v: float
+    friction: float
+    fastest: float
+
+
+@lru_cache(maxsize=32)  # asked for in every step of a search, of the few beginnings over which it is led
+def _sizes(record: Record) -> _Sizes:
+    spread = (float(np.std(record[name])) for name in ("x", "v", "friction"))
+    return _Sizes(*spread, fastest=float(np.max(np.abs(record["v"]))))
 
 
 def levelled(values: Array) -> Array:
