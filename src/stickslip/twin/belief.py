@@ -523,8 +523,8 @@ class _Sizes(NamedTuple):
 
 @lru_cache(maxsize=32)  # asked for in every step of a search, of the few beginnings over which it is led
 def _sizes(record: Record) -> _Sizes:
-    spread = (float(np.std(record[name])) for name in ("x", "v", "friction"))
-    return _Sizes(*spread, fastest=float(np.max(np.abs(record["v"]))))
+    x, v, friction = (float(np.std(record[name])) for name in ("x", "v", "friction"))
+    return _Sizes(x, v, friction, fastest=float(np.max(np.abs(record["v"]))))
 
 
 def levelled(values: Array) -> Array:
