@@ -567,6 +567,16 @@ def test_a_torque_that_comes_late_is_no_friction_of_the_load(seed: int) -> None:
     assert not is_late(regress_joint(record.with_details("force", delay=0.015)).delay)
 
 
+@pytest.mark.parametrize(("seed", "late"), [(773097, 0.03), (773002, 0.003)])
+def test_a_delay_is_told_where_no_load_part_settles_beside_it(seed: int, late: float) -> None:
+    """None was told, and viscous friction stood 3 to 6 deviations off, as if the torque came in time."""
+    joint = joints.drawn(seed, torque=True)
+    found = regress_joint(joints.delayed(joint, late))
+    assert found.delay is not None
+    assert found.delay.includes(late)
+    assert found.viscous.includes(joint.truth["viscous"])
+
+
 def test_a_torque_that_comes_in_time_is_not_told_to_be_late() -> None:
     for seed in (70100, 70109, 70119):
         joint = joints.drawn(seed, torque=True)

@@ -258,17 +258,25 @@ def delay_of(data: JointData) -> Estimate | None:
     if any(log.torque is None for log in data.logs):
         return None
     fs = data.logs[0].sliding.window.fs
-    bare, terms = tuple(term for term in data.terms if term not in RICHER), (*data.terms, "late")
+    bare = tuple(term for term in data.terms if term not in RICHER)
     most = int(LATEST * fs)
     counts = [0, *(sign * 2**k for k in range(most.bit_length()) for sign in (1, -1))]
 
     def left(count: int) -> float:
         return float(np.linalg.norm(about_load(data.earlier(count / fs), bare)[0].residual))
 
+    def beside(late: float) -> tuple[LeastSquares, tuple[str, ...]]:
+        """The balance with what is left of a delay: without a load part where that does not settle beside it."""
+        there = data.earlier(late)
+        try:
+            return about_load(there, (*data.terms, "late"))[0], (*data.terms, "late")
+        except EstimateError:
+            return about_load(there, (*bare, "late"))[0], (*bare, "late")
+
     try:
         late = min(counts, key=left) / fs
         for _ in range(NEARER):
-            fit, _ = about_load(data.earlier(late), terms)
+            fit, terms = beside(late)
             step = coefficient(fit, terms, "late")
             late += min(max(step, -LATEST), LATEST)
             if abs(step) < NEAR / fs:
