@@ -321,6 +321,8 @@ def _require_directions(contacts: Sequence[Contact], size: int) -> None:
 
 def _require_determined(contacts: Sequence[Contact]) -> None:
     """Refuse rigid contacts that hold one motion twice: how they share its force is not told."""
+    if len(contacts) < 2:
+        return
     rigid = [contact.tangent for contact in contacts if any(m.friction is None for m in contact.modes())]
     if rigid and np.linalg.matrix_rank(np.array(rigid)) < len(rigid):
         raise ModelError(

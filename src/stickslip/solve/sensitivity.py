@@ -174,6 +174,23 @@ class _Changes:
 
 
 @compiled(**OPTIONS)
+def _next_term(flow, change, scale, term):
+    """The next term of the Taylor series of a state and its derivatives in place of that in ``term[0]``."""
+    count, n = term.shape[1:]
+    for p in range(count):
+        for i in range(n):
+            total = 0.0
+            for j in range(n):
+                total += flow[i, j] * term[0, p, j]
+                if p > 0:
+                    total += change[p - 1, i, j] * term[0, 0, j]
+            term[1, p, i] = total * scale
+    for p in range(count):
+        for i in range(n):
+            term[0, p, i] = term[1, p, i]
+
+
+@compiled(**OPTIONS)
 def grow(flow, change, time, both, term):
     """Carry a state and its derivatives through a time within one cell: `both` is (1 + K, N), the state first."""
     count, n = both.shape
@@ -181,20 +198,12 @@ def grow(flow, change, time, both, term):
         for i in range(n):
             term[0, p, i] = both[p, i]
     for k in range(1, TERMS):
-        scale, small = time / k, True
+        _next_term(flow, change, time / k, term)
+        small = True
         for p in range(count):
             for i in range(n):
-                total = 0.0
-                for j in range(n):
-                    total += flow[i, j] * term[0, p, j]
-                    if p > 0:
-                        total += change[p - 1, i, j] * term[0, 0, j]
-                term[1, p, i] = total * scale
-        for p in range(count):
-            for i in range(n):
-                term[0, p, i] = term[1, p, i]
                 before = both[p, i]
-                both[p, i] += term[1, p, i]
+                both[p, i] += term[0, p, i]
                 small = small and both[p, i] == before
         if small and k > 4:
             break
@@ -323,19 +332,11 @@ def _polynomial(flow, change, cell, both, row, moved, series, term):
             for i in range(n):
                 total += row[i] * term[0, p, i] + moved[p - 1, i] * term[0, 0, i]
             series[k, p] = total
-        small, scale = True, cell / (k + 1)
+        _next_term(flow, change, cell / (k + 1), term)
+        small = True
         for p in range(count):
             for i in range(n):
-                total = 0.0
-                for j in range(n):
-                    total += flow[i, j] * term[0, p, j]
-                    if p > 0:
-                        total += change[p - 1, i, j] * term[0, 0, j]
-                term[1, p, i] = total * scale
-                small = small and both[p, i] + term[1, p, i] == both[p, i]
-        for p in range(count):
-            for i in range(n):
-                term[0, p, i] = term[1, p, i]
+                small = small and both[p, i] + term[0, p, i] == both[p, i]
         if small and k > 4:
             return k + 1
     return series.shape[0]
