@@ -42,6 +42,19 @@ def test_a_structure_of_one_mass_is_the_oscillator() -> None:
     np.testing.assert_allclose(abs(orbits[0].multipliers), abs(orbits[1].multipliers), atol=1e-7)
 
 
+@pytest.mark.parametrize("law", ["aging", "slip"])
+def test_rate_and_state_in_a_structure_on_a_belt_is_as_under_one_mass(law: str) -> None:
+    """The mass goes with the belt but for a slip 1e10 times slower, of which friction takes the logarithm."""
+    rock, belt = laws.RateState(1.8, 0.6, 0.01, 0.015, distance=1e-6, reference=1e-3, law=law), drives.Belt(0.01)
+    one = ss.simulate(ss.Oscillator(1.0, 3000.0, rock, belt, 1.0), duration=0.3)
+    contact, still = ss.Contact(rock, [1.0, 0.0]), np.diag([1.0, 0.0])
+    two = ss.simulate(ss.Structure(np.eye(2), still, np.diag([3000.0, 1.0]), [contact], belt), duration=0.3)
+    times = np.linspace(0, 0.3, 301)
+    x = one.sample(times, ("x",))[0][0]
+    assert np.ptp(x) > 2e-4
+    np.testing.assert_allclose(two.sample(times, ("x",))[0][0], x, atol=1e-9 * np.ptp(x))
+
+
 def _slid(rates: Callable[[float, Array], list[float]], start: list[float], side: Callable[[Array], float], end: float):  # type: ignore[no-untyped-def]
     """Radau's method through the slips of a system, to where `side` no longer has its sign."""
 

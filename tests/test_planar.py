@@ -171,6 +171,39 @@ def test_it_comes_to_rest_when_and_where_the_closed_form_says(angle: float) -> N
     assert run.status == "at rest"
 
 
+@pytest.mark.parametrize(("speed", "slip"), [(0.0, 1e-6), (1.0, 1e-6), (10.0, 1e-4), (100.0, 1e-4)])
+def test_a_force_just_below_friction_lets_a_slow_slip_end_where_the_closed_form_says(speed: float, slip: float) -> None:
+    """What turns the slip into the force's direction is then 1e4 times faster than what slows it down; the velocity
+    beside a belt's is known to its tolerance only."""
+    friction, force, angle = 1.0, 1.0 - slip, 0.5
+    belt = Belt(speed) if speed else Release()
+    block = PlanarOscillator(1.0, 0.0, Coulomb(friction), drives=(belt, constant(force, 2.0)))
+    start = {"v1": speed + slip * math.sin(angle), "v2": slip * math.cos(angle)}
+    run = ss.simulate(block, duration=2.0, start=start)
+    (stop,) = run.events
+    expected = slip * (friction + force * math.cos(angle)) / (friction**2 - force**2)
+    assert stop.kind == "stick"
+    assert stop.time == pytest.approx(expected, rel=1e-9 * (1 + speed / slip))
+
+
+def test_a_slip_that_drifts_to_rest_on_a_shaken_face_keeps_its_energy() -> None:
+    """Its last stop comes while the push is 1e-6 below friction: no step of a series is short enough to turn."""
+    tones = [(2.63163927281472e-4, 9.472139754297343, 0.0), (1.7926542751055396e-4, 13.395628482742373, 1.0)]
+    law = Coulomb(4.479647897702187)
+    plate = PlanarOscillator(
+        0.17818205661449332,
+        (24988.91147005161, 91199.34109886865),
+        law,
+        drives=(MultiTone(tones, on="face"), Release()),
+        damping=1.3345524550636887,
+    )
+    start = {"x1": 4.1943451514795044e-4, "x2": -4.721263256699014e-4, "v1": 0.11697155716, "v2": 0.01126142289}
+    run = ss.simulate(plate, duration=0.2, start=start)
+    assert run.event_counts()["stick"] >= 4
+    assert len(run.steps.starts) < 2000
+    assert ss.solve.energy(run).residual < 1e-11
+
+
 @pytest.mark.parametrize("off", [0.3, 1e-2, 1e-4, 1e-6])
 def test_a_near_miss_turns_and_does_not_stick(off: float) -> None:
     """Thrown nearly straight up a slope steeper than friction: the speed all but vanishes, below static friction."""

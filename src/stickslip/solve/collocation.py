@@ -59,15 +59,13 @@ class Model(NamedTuple):
 
 
 class Implicit(NamedTuple):
-    """A curved system as leaps read it: also code of the rates alone, the method, the counter-face's velocity and the
-    entry that follows it (-1: none alone), degrees of freedom, and entries that are no signals."""
+    """A curved system as leaps read it: also code of the rates alone, the method, for each degree of freedom
+    the velocity that goes with the counter-face, and entries that are no signals."""
 
     model: Model
     rates: int
     scheme: Scheme
-    face: Array
-    follows: int
-    degrees: int
+    faces: Array
     physical: int
 
 
@@ -154,15 +152,13 @@ def _slopes(implicit, mode, i, big, stages):
         value[j] = work[2 * j + 1]
     for j in range(len(every)):
         every[j] = work[2 * j]
-    speed = _faced(implicit.face, stage) if implicit.follows >= 0 else 0.0
+    degrees = len(implicit.faces)
     for j in range(len(stage)):
         moved[j] = stage[j]
     for d in range(physical):
-        # friction may follow the logarithm of the velocity against the counter-face
-        if d == implicit.follows:
-            step = 1e-7 * abs(stage[d] - speed) + 1e-13 * big[d]
-        elif implicit.degrees <= d < 2 * implicit.degrees:
-            step = 1e-7 * abs(stage[d]) + 1e-13 * big[d]
+        # friction may follow the logarithm of the velocity against the counter-face, or its direction
+        if degrees <= d < 2 * degrees:
+            step = 1e-7 * abs(stage[d] - _faced(implicit.faces[d - degrees], stage)) + 1e-13 * big[d]
         else:
             step = 1e-7 * abs(stage[d]) + 1e-10 * big[d]
         if step == 0.0:
@@ -275,8 +271,9 @@ def leap(implicit, mode, unit, state, big, h, poly, work):
         for j in range(implicit.physical):
             stages.values[i, j] = state[j]
         # the slip of now, however fast the counter-face: friction may follow the logarithm of it
-        if implicit.follows >= 0:
-            stages.values[i, implicit.follows] += _faced(implicit.face, stages.values[i]) - _faced(implicit.face, state)
+        for j in range(len(implicit.faces)):
+            face = implicit.faces[j]
+            stages.values[i, len(implicit.faces) + j] += _faced(face, stages.values[i]) - _faced(face, state)
     change = settle(implicit, mode, state, h, big, stages)
     if change == math.inf:
         return 0.0

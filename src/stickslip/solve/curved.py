@@ -135,9 +135,8 @@ def model_of(table: Tape, rtol: float) -> Model:
 def implicit_of(table: Tape, model: Model) -> Implicit:
     """The system as leaps read it."""
     rates, _ = _code(table, 1)
-    follows = 1 if isinstance(table.system, Oscillator) else -1
-    face = table.outputs["face_rate"]
-    return Implicit(model, rates, collocation.method(), face, follows, table.degrees, table.physical)
+    faces = np.ascontiguousarray(table.opening[table.degrees : 2 * table.degrees])
+    return Implicit(model, rates, collocation.method(), faces, table.physical)
 
 
 def run_curved(

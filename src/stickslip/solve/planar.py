@@ -12,7 +12,8 @@ smooth but for u = 0, where two things happen that no series knows of. Both are 
   where P has just reached it. The direction of u is that of w, which is smooth: w is found by collocation.
 
 Where |P| > F a slip that slows down turns and goes on, and is followed through its least speed; it is at rest only
-where it runs straight against P.
+where it runs straight against P. Where |P| is F but for a thousandth, so slow a slip turns into P at once and drifts
+along it, m s' = |P| - F in its speed s, to its end or until it is faster again.
 """
 
 from __future__ import annotations
@@ -31,7 +32,7 @@ from stickslip.arrays import Array, Index
 from stickslip.laws.curved import CurvedMode, symbol
 from stickslip.oscillator import PlanarOscillator
 from stickslip.solve import march
-from stickslip.solve.collocation import STAGES, WIDTH
+from stickslip.solve.collocation import STAGES, WIDTH, method
 from stickslip.solve.curved import CurvedTrajectory, implicit_of, model_of, run_curved
 from stickslip.solve.march import FULL, HALT, REACH, STALL, STEADY, STIFF, TRY, Leaps, Steps, Work
 from stickslip.solve.operations import Form, Operations, combined, flat, guards_of, sums_of
@@ -45,6 +46,7 @@ STOPPED, RELEASED, SPED, FAINT = range(4)  # exits: out of slip, out of stick, a
 MODES = ("slip", "slip", 0, symbol("f")), ("stuck", "stick", 0, None), ("slow", "slip", 0, symbol("f"))
 NEAR = 1e-9  # of the speed that friction gives in a period: there a slip ends, its force as good as constant
 BRIEF = 1e-6  # of a period: the longest that such an end may take
+DRIFT = NEAR / BRIEF  # of the friction: an end takes longer only where P is as close to it
 REST = 1e-4  # of the speed at which a slip ends: a slip so slow is none, whatever pushes; far above the rounding of u
 STRAIGHT = 1e-12  # of the largest speed: a slip so little beside P runs straight against it
 LEVEL = 1e-12  # of the friction: P that exceeds it by no more is on the disc, for a run does not tell them apart
@@ -256,6 +258,12 @@ def _copied(modes: list[Operations]) -> list[Operations]:
     return copies
 
 
+def _crossed(series: Polynomial) -> list[float]:
+    """Where a polynomial over -1 to 1 is zero, behind its begin."""
+    roots = series.roots()
+    return [float(root.real) for root in roots if abs(root.imag) < 1e-12 and -1 < root.real <= 1]
+
+
 class _Basis(NamedTuple):
     """Polynomials of a begin of slip with u = t^p w, over a time of 1: degree STAGES - 1 - p in w.
 
@@ -330,6 +338,9 @@ class _March:
         spare = Steps._make(column[:-2] for column in steps)
         leaps = work._replace(leaps=Leaps._make(column[:-2] for column in work.leaps))
         while place.row < len(spare.laps) and place.leapt < len(leaps.leaps.reach):
+            if mode == SLOW and place.drifts:
+                mode = place.drifted()
+                continue
             rest = (clock, state, big, mode, until, spare, place.row)
             if self.stiff:
                 outcome, place.row, place.leapt, mode = march.strides(self.implicit, *rest, place.leapt, leaps)
@@ -378,6 +389,16 @@ class _Place:
         """What pushes the mass against the counter-face [N]."""
         return np.asarray(self.plane.push @ self.state)
 
+    @property
+    def remaining(self) -> float:
+        """Time to the end of the march [s]."""
+        return float(march.remaining_of(self.clock, self.until, self.own.model.period))
+
+    @property
+    def drifts(self) -> bool:
+        """Whether a slow slip goes along a push that is as good as its friction."""
+        return self.remaining > 0.0 and bool(abs(np.hypot(*self.push) - self.own.rest) <= DRIFT * self.own.rest)
+
     def opened(self) -> int:
         """The mode in which a run starts."""
         if not self.slow:
@@ -421,6 +442,43 @@ class _Place:
         self.still()
         return self.rested()
 
+    def drifted(self) -> int:
+        """The mode behind a slow slip along P, which ends, or is slow no more: put down as far as a series reaches."""
+        slip, push, near = self.slip, self.push, self.plane.near
+        force, system = np.hypot(*push), self.plane.system
+        speed = (self.own.rest * np.hypot(*slip) + push @ slip) / (self.own.rest + force)  # what turning leaves of it
+        rates = self._held()
+        spring, damper = (np.diag(-self.plane.push[:, part]) for part in (slice(0, 2), slice(2, 4)))
+        spring, damper = ((push / force) ** 2 @ part for part in (spring, damper))
+        scheme, damper = method(), damper + self.own.slope.at(v=0.0)
+        time = min(self.remaining, TURN / self.plane.rate if self.plane.rate else self.remaining)
+        while True:
+            pushes = np.vander(scheme.points * time, WIDTH, increasing=True) @ (rates @ self.plane.push.T)
+            forces, sums = np.hypot(*pushes.T), time * scheme.matrix
+            moved = np.eye(STAGES) + sums @ (damper * np.eye(STAGES) + spring * sums) / system.mass
+            speeds = np.linalg.solve(moved, speed + sums @ (forces - self.own.rest) / system.mass)
+            series = Polynomial(scheme.fit @ (speeds - speed)) + speed
+            ends = [root for level in (0.0, 2 * near) for root in _crossed(series - level)]
+            if not ends or min(ends) > 1 - 1e-9:
+                break
+            time *= (min(ends) + 1) / 2
+        slips = (speeds / forces)[:, None] * pushes
+        first = speed / force * push
+        powers = (scheme.fit @ (slips - first)).T
+        powers[:, 0] += first
+        stopped = bool(ends) and speeds[-1] < near
+        if not self.lay(powers, (scheme.fit @ (sums @ slips)).T, time, STOPPED if stopped else -1) or not stopped:
+            return SLOW if speeds[-1] < near else SLIP
+        self.still()
+        return self.rested()
+
+    def _held(self) -> Array:
+        """Powers of the time of a state that goes with the counter-face from now on."""
+        rates = [self.state.copy()]
+        for k in range(1, WIDTH):
+            rates.append(self.plane.held @ rates[-1] / k)
+        return np.array(rates)
+
     def freed(self) -> int:
         """The mode behind a stick."""
         if not self.row:  # due where a chunk begins: its event needs a step of its own
@@ -431,13 +489,10 @@ class _Place:
 
     def released(self) -> int:
         """Slip: its begin from rest, along what pushes, put down up to where a series can go on."""
-        remaining = march.remaining_of(self.clock, self.until, self.own.model.period)
+        remaining = self.remaining
         if not remaining > 0.0:
             return SLIP
-        rates = [self.state.copy()]
-        for k in range(1, WIDTH):
-            rates.append(self.plane.held @ rates[-1] / k)
-        pushes = np.array(rates) @ self.plane.push.T
+        pushes = self._held() @ self.plane.push.T
         along = pushes[0] / np.hypot(*pushes[0])
         p, most = self._power(pushes @ along)
         for k in range(p - 1):  # what is as good as none, is none
@@ -496,7 +551,7 @@ class _Place:
     def lay(self, speeds: Array, ways: Array, time: float, leaving: int) -> bool:
         """Put down a slip whose velocity against the counter-face is a polynomial, and go to its end; whether the run
         has not ended before."""
-        remaining = march.remaining_of(self.clock, self.until, self.own.model.period)
+        remaining = self.remaining
         whole, ahead, term = time <= remaining, min(time, remaining), self.state
         powers = [term]
         for k in range(1, WIDTH):
