@@ -147,3 +147,25 @@ def test_a_series_that_ends_in_no_number_has_no_length() -> None:
     """It passed for a short step, and the refusal spoke of "x = nan"."""
     series = np.array([1.0, 1.0, math.nan, 1.0])
     assert math.isnan(taylor.length(series, 3, np.ones(1), 1e-12))
+
+
+@pytest.mark.parametrize("law", ["aging", "slip"])
+def test_friction_between_the_points_of_a_leap_balances_the_forces(law: str) -> None:
+    """Where the mass goes with a shaken face its acceleration is the face's, and friction what that takes of it; the
+    slip, of which the law takes the logarithm, is there far below the tolerance of the velocity."""
+    rock = ss.laws.RateState(122.0, 0.6, 0.0235, 0.0299, distance=1.6e-3, reference=5.6e-4, law=law)
+    face = ss.drives.MultiTone([(0.0528, 3.2333, 0.0)], on="face")
+    system = ss.Oscillator(6.209, 2047.1, rock, face, damping=22.55)
+    structure = ss.Structure(6.209, 22.55, 2047.1, [ss.Contact(rock, [1.0])], face)
+    for made in (system, structure):
+        run = ss.simulate(made, duration=1.5)
+        times = np.linspace(0, 1.5, 6001)[1:]
+        x, v, a, friction, slip = run.sample(times, ("x", "v", "a", "friction", "slip"))[0]
+        carried = np.abs(slip) < 1e-10
+        assert np.mean(carried & (np.abs(slip) > 1e-12)) > 0.02
+        omega = 2 * math.pi * 3.2333
+        expected = -(omega**2) * 0.0528 * np.cos(omega * times)
+        assert a[carried] == pytest.approx(expected[carried], abs=1e-5)
+        balance = -6.209 * a - 22.55 * v - 2047.1 * x
+        assert friction == pytest.approx(balance, abs=1e-9)
+        assert ss.solve.energy(run).residual < 1e-10

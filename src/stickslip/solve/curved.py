@@ -19,9 +19,9 @@ from stickslip.arrays import Array, Index
 from stickslip.compiled import compiled
 from stickslip.errors import ModelError, SolveError
 from stickslip.laws.base import Rigid, Row
-from stickslip.laws.curved import CurvedMode, lifted, symbol
+from stickslip.laws.curved import Creeping, CurvedMode, lifted, symbol
 from stickslip.laws.stribeck import DELAYED, TimeDelay
-from stickslip.oscillator import Oscillator
+from stickslip.oscillator import Oscillator, Structure
 from stickslip.solve import collocation, march, taylor
 from stickslip.solve.collocation import Implicit, Model
 from stickslip.solve.march import DONE, DUE, LAPS, TIME, TRY, Dense, Leaps, Shown, Steps, Work
@@ -84,12 +84,54 @@ class CurvedTrajectory(Trajectory):
                     f"no output is called '{name}'", f"there are {', '.join(table.places)}", "name one of them"
                 )
         nodes = np.concatenate([table.places[name] for name in outputs], axis=1)
+        out, step = self._told(times, nodes)
+        if self._crept and {"a", "friction"} & set(outputs):
+            self._balance(times, step, outputs, out)
+        piece = np.searchsorted(self.starts, self.steps.starts[step], side="right") - 1
+        return out, piece
+
+    def _told(self, times: Array, nodes: Index) -> tuple[Array, Index]:
+        """Values of nodes (by mode) at increasing instants, and the step that each one falls in."""
+        table: Any = self.table
         out, step = np.empty((nodes.shape[1], len(times))), np.empty(len(times), dtype=np.int64)
         count = table.watched.most
         work = np.empty(count * (self.order + 1)), np.empty(self.steps.states.shape[1]), np.empty(count)
         march.sample(_shown(table, self.order), self.steps, times, nodes, out, step, work)
-        piece = np.searchsorted(self.starts, self.steps.starts[step], side="right") - 1
-        return out, piece
+        return out, step
+
+    @cached_property
+    def _crept(self) -> bool:
+        """Whether leaps went through creep."""
+        whole: Any = self.system
+        contacts = whole.contacts if isinstance(whole, Structure) else (whole,)
+        return bool(np.any(self.steps.leaps >= 0)) and any(isinstance(own.law, Creeping) for own in contacts)
+
+    def _balance(self, times: Array, step: Index, outputs: tuple[str, ...], out: Array) -> None:
+        """The acceleration in a leap as its polynomials have it, and the friction that balances it.
+
+        Of creep the law knows neither between the points of a leap: friction is the logarithm of a slip that is below
+        the tolerance of the velocity.
+        """
+        steps, whole = self.steps, self.system
+        table: Any = self.table
+        n, parts = table.degrees, [getattr(mode, "parts", (mode,)) for mode in table.modes]
+        slides = np.array([all(part.friction is not None for part in own) for own in parts])
+        own = np.flatnonzero((steps.leaps[step] >= 0) & slides[steps.modes[step]])
+        leaps, begun = steps.leaps[step[own]], steps.starts[step[own]]
+        reach = steps.reach[leaps]
+        w = 2 * np.minimum(times[own] - begun, steps.lengths[step[own]]) / reach - 1
+        powers = np.vander(w, collocation.STAGES, increasing=True) * np.arange(1, collocation.WIDTH)
+        rate = 2 / reach * np.einsum("pik,pk->ip", steps.polys[leaps, n : 2 * n, 1:], powers)
+        less = self._told(times[own], table.places["a"])[0] - rate
+        mass = np.asarray(whole.mass, dtype=np.float64).reshape(n, n)
+        across = np.linalg.pinv(whole.tangents.T if isinstance(whole, Structure) else np.eye(n))
+        change = {"a": -less, "friction": across @ mass @ less}
+        row = 0
+        for name in outputs:
+            count = table.places[name].shape[1]
+            if name in change:
+                out[row : row + count, own] += change[name]
+            row += count
 
     def labels(self, name: str) -> tuple[str, ...]:
         """What the rows of an output are called: the name alone where there is one, else name1, name2 ..."""

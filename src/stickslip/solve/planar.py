@@ -260,7 +260,7 @@ def _copied(modes: list[Operations]) -> list[Operations]:
 
 def _crossed(series: Polynomial) -> list[float]:
     """Where a polynomial over -1 to 1 is zero, behind its begin."""
-    roots = series.roots()
+    roots: Any = series.roots()
     return [float(root.real) for root in roots if abs(root.imag) < 1e-12 and -1 < root.real <= 1]
 
 
@@ -445,18 +445,18 @@ class _Place:
     def drifted(self) -> int:
         """The mode behind a slow slip along P, which ends, or is slow no more: put down as far as a series reaches."""
         slip, push, near = self.slip, self.push, self.plane.near
-        force, system = np.hypot(*push), self.plane.system
+        force = float(np.hypot(*push))
         speed = (self.own.rest * np.hypot(*slip) + push @ slip) / (self.own.rest + force)  # what turning leaves of it
         rates = self._held()
-        spring, damper = (np.diag(-self.plane.push[:, part]) for part in (slice(0, 2), slice(2, 4)))
-        spring, damper = ((push / force) ** 2 @ part for part in (spring, damper))
-        scheme, damper = method(), damper + self.own.slope.at(v=0.0)
+        along, scheme = (push / force) ** 2, method()
+        spring = -along @ np.diag(self.plane.push[:, :2])
+        damper = self.own.slope.at(v=0.0) - along @ np.diag(self.plane.push[:, 2:4])
         time = min(self.remaining, TURN / self.plane.rate if self.plane.rate else self.remaining)
         while True:
             pushes = np.vander(scheme.points * time, WIDTH, increasing=True) @ (rates @ self.plane.push.T)
             forces, sums = np.hypot(*pushes.T), time * scheme.matrix
-            moved = np.eye(STAGES) + sums @ (damper * np.eye(STAGES) + spring * sums) / system.mass
-            speeds = np.linalg.solve(moved, speed + sums @ (forces - self.own.rest) / system.mass)
+            moved = np.eye(STAGES) + sums @ (damper * np.eye(STAGES) + spring * sums) / self.mass
+            speeds = np.linalg.solve(moved, speed + sums @ (forces - self.own.rest) / self.mass)
             series = Polynomial(scheme.fit @ (speeds - speed)) + speed
             ends = [root for level in (0.0, 2 * near) for root in _crossed(series - level)]
             if not ends or min(ends) > 1 - 1e-9:
