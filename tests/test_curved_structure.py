@@ -157,6 +157,25 @@ def test_laws_that_remember_in_series_keep_their_balance(law: Any, damping: floa
     np.testing.assert_allclose(force, told, atol=1e-7)  # the slider has no mass: its friction is the spring's force
 
 
+@pytest.mark.parametrize(
+    ("mass", "stiffness", "law"),
+    [
+        (0.3586819, 161.041, laws.InSeries(laws.Dahl(0.144853479, 4730.717), 874.8763, 7.600167)),
+        (0.2, 5000.0, laws.InSeries(laws.Dahl(0.3002404, 1044615.5), 125865.0, 9.084868)),
+        (1.0, 1000.0, laws.InSeries(laws.Dahl(1.0, 5000.0), 2000.0, 10.0)),
+        (1.0, 1000.0, laws.InSeries(laws.Dahl(1.0, 50000.0), 2000.0, 30.0)),
+    ],
+)
+def test_a_decay_behind_a_compliant_contact_dies_out(mass: float, stiffness: float, law: Any) -> None:
+    """In the end the slider turns by rounding alone: to and fro without time, if each turn is believed."""
+    system = ss.Oscillator(mass, stiffness, law, damping=0.2 * math.sqrt(mass * stiffness))
+    run = ss.simulate(system, cycles=60, start={"x": 3 * law.law.kinetic / stiffness})
+    last = run.sample(np.linspace(0.8, 1.0, 50) * run.duration, ("x", "v"))[0]
+    assert np.ptp(last[0]) < 1e-14 * law.law.kinetic
+    assert np.abs(last[1]).max() < 1e-11 * law.law.kinetic / math.sqrt(mass * stiffness)
+    assert ss.solve.energy(run).residual < 1e-11
+
+
 def test_what_would_jump_is_refused() -> None:
     steep = laws.Stribeck(0.3, 0.45, speed=0.01)
     with pytest.raises(ss.errors.ModelError, match=r"raise damping= above 12\.\d N s/m"):

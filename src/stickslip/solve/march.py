@@ -108,8 +108,26 @@ def _polish(model, node, mode, h, state, step):
     return total
 
 
+@compiled(**EXACT)
+def _rounds(model, node, mode, h, state, big, step):
+    """Whether rounding of the state tells the sign of a node's rate: two modes may then send it to and fro."""
+    series = coded(model.series)  # by itself, as above
+    s = step.s
+    at, before, change = node * (step.order + 1) + 1, step.before, 0.0
+    series(model.numbers, mode, state, h, s)
+    rate = s[at]
+    for i in range(len(state)):
+        before[i] = state[i]
+    for i in range(len(state)):
+        before[i] = state[i] + NOISE * big[i]
+        series(model.numbers, mode, before, h, s)
+        change += abs(s[at] - rate)
+        before[i] = state[i]
+    return abs(rate) <= change
+
+
 @compiled(**EXACT, forceinline=True)
-def _explicit(model, mode, h, u, big, step):
+def _explicit(model, mode, h, u, big, ignored, step):
     """The Taylor step, shortened to where a function wakes or an exit ends the mode, and that exit (-1: none).
 
     A negative length: a root could neither be found nor excluded.
@@ -125,6 +143,8 @@ def _explicit(model, mode, h, u, big, step):
             if u < 0.0:
                 return u, leaving
     for e in range(exits.first[mode], exits.first[mode + 1]):
+        if e == ignored:
+            continue
         i, factor = exits.node[e], exits.factor[e]
         far = i < size and factor * s[i * width] < -abs(factor) * safe * big[i]
         if far and surely_below(s, i * width, order, factor, 0.0, u):
@@ -218,6 +238,7 @@ def march(model, clock, state, big, mode, until, steps, row, step):
     mode. STIFF where after many steps without event a leap is due, see :func:`strides`; HALT where an exit leads to no
     mode (a negative number): what follows is no linear form of the state, and whoever marches goes on from there."""
     series, exits, chain = coded(model.series), model.exits, 0
+    ignored = -1
     while True:
         # Due: what is left, the series of a step, and how far it holds.
         remaining = remaining_of(clock, until, model.period)
@@ -242,23 +263,26 @@ def march(model, clock, state, big, mode, until, steps, row, step):
         if leaving < 0:
             if clock[STEADY] >= clock[DUE]:
                 return STIFF, row, mode
-            u, leaving = _explicit(model, mode, h, min(full, remaining / h), big, step)
+            u, leaving = _explicit(model, mode, h, min(full, remaining / h), big, ignored, step)
             if u < 0.0:
                 return UNPROVED, row, mode
             ahead = u * h
             clock[STEADY] += 1.0
         # Step: write it down and carry the state on.
         if ahead > 0.0:
-            chain = 0
+            chain, ignored = 0, -1
             write(steps, row, clock, state, mode, ahead, leaving, -1)
             advance(step.s, step.order, ahead / h, state)
             clock[TRY] = full * h
             passed(model, clock, until, remaining, ahead, leaving, steps.states[row], state, big)
             row += 1
         else:
+            chain += 1
+            if 2 * chain > CHAIN and _rounds(model, exits.node[leaving], mode, h, state, big, step):
+                ignored = leaving  # a motion that dies out: either mode is as good
+                continue
             if row > 0 and steps.ends[row - 1] < 0:
                 steps.ends[row - 1] = leaving
-            chain += 1
             if chain > CHAIN:
                 return CHATTER, row, mode
         if leaving >= 0:
