@@ -39,6 +39,20 @@ def test_a_run_goes_on_from_what_was_kept_of_it(system: ss.Oscillator, share: fl
     np.testing.assert_allclose(x, y, atol=1e-9)
 
 
+def test_a_mass_that_is_held_on_a_shaken_face_goes_on_from_every_instant() -> None:
+    """The velocity of a face of two tones is a sum, and rounds as it is added: no slip in a mode that holds."""
+    face = drives.MultiTone([(0.7, 0.31, 0.4), (0.8, 0.4384, 0.0)], on="face")
+    system = ss.Oscillator(1.0, 1.0, laws.LinearSlope(3.0, slope=0.1), face, 0.05)
+    whole = ss.simulate(system, duration=60.0)
+    times = np.linspace(1.0, 59.0, 200)
+    held = times[whole.modes[whole.sample(times, ("x",))[1]] == whole.table.index("stuck")]
+    assert len(held) > 10
+    for time in held.tolist():
+        later = system.having(drive=drives.Later(face, time))
+        rest = ss.simulate(later, duration=60.0 - time, start=whole.restart(time))
+        assert rest.state(60.0 - time)["x"] == pytest.approx(whole.state(60.0)["x"], abs=1e-9)
+
+
 def test_crossings_of_a_free_motion() -> None:
     """x = cos 2 t crosses 1/2 wherever 2 t is pi/3 from a whole turn, and touches 1 without crossing it."""
     run = ss.simulate(ss.Oscillator(1.0, 4.0, laws.Coulomb(0.0)), duration=10.0, start={"x": 1.0})

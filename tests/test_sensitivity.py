@@ -109,6 +109,23 @@ def test_rate_and_state_moves_with_its_distance_as_its_neighbours_do() -> None:
         assert np.allclose(told, place, atol=1e-6 * np.abs(place).max(), rtol=0)
 
 
+@pytest.mark.parametrize("law", ["aging", "slip"])
+def test_a_motion_that_turns_under_rate_and_state_changes_as_its_neighbours_differ(law: str) -> None:
+    """Where the slip turns friction is the logarithm of nothing: no step is short enough for a derivative."""
+    rock = ss.laws.RateState(1.54, 0.6, 0.0141, 0.012, distance=5.83e-4, reference=7.7e-3, law=law)
+    system = ss.Oscillator(1.1, 31.0, rock, ss.drives.HarmonicForce(1.99, 0.9081, 0.73), damping=0.1)
+    run = ss.simulate(system, duration=4.0)
+    assert run.event_counts()["reversal"] > 4
+    times = np.array([1.1, 2.39, 3.2, 3.9])
+    for name, own in zip(
+        ("stiffness", "mass"), ss.solve.sensitivities(run, "stiffness", "mass").sample(times), strict=True
+    ):
+        step = 1e-6 * getattr(system, name)
+        near = [ss.simulate(system.having(**{name: getattr(system, name) + s}), duration=4.0) for s in (step, -step)]
+        x = [one.sample(times, ("x",))[0][0] for one in near]
+        assert own == pytest.approx((x[0] - x[1]) / (2 * step), rel=2e-5)
+
+
 def test_a_curve_without_a_fall_changes_as_coulomb_friction_does() -> None:
     """One is carried by collocation, the other by closed forms."""
     laws = [ss.laws.Stribeck(0.95, 0.95, speed=0.01), ss.laws.Coulomb(0.95)]

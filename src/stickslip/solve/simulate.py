@@ -218,9 +218,10 @@ def opening(table: Tables | Tape, start: Mapping[str, float | str]) -> tuple[Arr
 def _require_fit(table: Tables | Tape, state: Array, mode: int) -> None:
     """Refuse the rigid contact of one mass that starts held while it slides, or slides against its mode."""
     part = table.modes[mode]
-    slip = float(np.max(table.outputs["slip"] @ state)) if getattr(table, "degrees", 1) == 1 else 0.0
+    row = np.atleast_2d(table.outputs["slip"])[0] if getattr(table, "degrees", 1) == 1 else np.zeros(len(state))
+    slip = float(row @ state)
     slides = part.friction is None or (len(set(table.entry)) > 1 and part.side * slip < 0)
-    if slip != 0.0 and slides:
+    if abs(slip) > NOISE * (np.abs(row) @ np.abs(state)) and slides:
         raise ModelError(
             f"start has a slip of {slip:g} m/s in the mode '{part.name}'",
             "a contact that holds does not slip, and one that slips does so to the mode's side",

@@ -17,6 +17,7 @@ from numpy.polynomial import Legendre
 from numpy.typing import NDArray
 
 from stickslip.arrays import Array, Index
+from stickslip.laws.curved import Creeping
 from stickslip.oscillator import Oscillator
 from stickslip.solve.curved import CurvedTrajectory
 from stickslip.solve.tape import Tape, tape
@@ -37,6 +38,7 @@ from stickslip.solve.taylor import (
 POINTS = 10  # of Gauss in a step, exact to order 20: the motion's own steps are of order 14 or 18
 ASIDE = 1e-30  # a step along the imaginary axis: the derivative is exact, since no difference is taken
 BATCH = 256  # steps whose stages are solved at once: some 20 MB
+BRIEF = 1e-9  # of a natural period: as long before and behind a turn of creep nothing but the slip changes
 ROUNDED = 1e-13  # of an entry of the start, within which it is as the system opens by itself
 
 
@@ -252,19 +254,47 @@ def variation(run: CurvedTrajectory, neighbours: Sequence[Oscillator], *, step: 
     motion.begun[0] = opening_moved(np.array([one.opening for one in motion.tapes]), signals, steps.states[0], step)
     passage, own = _passages(motion, np.arange(len(steps.starts)), steps.lengths)
     pieces = {int(row): j for j, row in enumerate(np.searchsorted(steps.starts, run.starts)) if j}
+    behind = range(1)
     for s in range(1, len(steps.starts)):
-        tangent = passage[s - 1] @ motion.begun[s - 1] + own[s - 1]
         if s in pieces:
-            tangent, motion.later[pieces[s]] = _through(motion, pieces[s], s, tangent)
-        motion.begun[s] = tangent
+            row, behind = _at_once(run, s, pieces[s])
+            if row == s:
+                state = _states(run, np.nextafter(steps.starts[s : s + 1], 0))
+                tangent = passage[s - 1] @ motion.begun[s - 1] + own[s - 1]
+            else:
+                state, tangent = steps.states[row][:, None], motion.begun[row]
+            for b in behind:
+                after = steps.states[b][:, None]
+                motion.begun[b], motion.later[pieces[s]] = _through(motion, pieces[s], (state, after), tangent)
+        elif s not in behind:
+            motion.begun[s] = passage[s - 1] @ motion.begun[s - 1] + own[s - 1]
     return motion
 
 
-def _through(motion: Variation, piece: int, s: int, tangent: Array) -> tuple[Array, Array]:
-    """Derivatives of the state behind the event that begins a piece, and of its instant, by those before it."""
-    run, table = motion.run, motion.tapes[0]
+def _at_once(run: CurvedTrajectory, s: int, piece: int) -> tuple[int, range]:
+    """The step from whose start derivatives go through the event that begins a piece at step s, and the steps to whose
+    starts: s and s alone, from its very end, but for creep.
+
+    Friction that is a logarithm of the slip changes without end while the slip goes to nothing, and the slip is known
+    to the tolerance of the velocity only. All that changes on so short a way is the slip: its derivative goes with its
+    rate.
+    """
+    table, starts = run.table, run.steps.starts
+    if not isinstance(getattr(run.system, "law", None), Creeping) or table.modes[run.modes[piece - 1]].friction is None:
+        return s, range(s, s + 1)
+    near = BRIEF / run.system.frequency if run.system.frequency else BRIEF * run.duration
+    edges = np.append(run.starts, run.duration)
+    begin, end = max(edges[piece] - near, edges[piece - 1]), min(edges[piece] + near, edges[piece + 1])
+    first = min(int(np.searchsorted(starts, begin)), s - 1)
+    held = table.modes[run.modes[piece]].friction is None
+    return first, range(s, s + 1 if held else max(s + 1, int(np.searchsorted(starts, end))))
+
+
+def _through(motion: Variation, piece: int, states: tuple[Array, Array], tangent: Array) -> tuple[Array, Array]:
+    """Derivatives of the state behind the event that begins a piece, and of its instant, by those before it; `states`
+    are those on either side."""
+    run, table, (state, after) = motion.run, motion.tapes[0], states
     mode, following, e = int(run.modes[piece - 1]), int(run.modes[piece]), int(run.exits[piece - 1])
-    state, after = _states(run, np.nextafter(run.starts[piece : piece + 1], 0)), run.steps.states[s][:, None]
     before, behind = motion.rates(mode, state).value, motion.rates(following, after).value
     quantity = motion.along(
         [[(int(one.exits.node[e]), float(one.exits.factor[e]))] for one in motion.tapes], mode, state
