@@ -62,6 +62,28 @@ def test_a_zero_that_is_off_stays_in_the_mean_of_a_cycle_alone() -> None:
     assert shifted.by_cycle.value > 1.3 * plain.by_cycle.value
 
 
+def test_the_plateau_is_past_where_friction_turns_round() -> None:
+    """What turns round is below the level in every cycle alike: none of 20 intervals held 0.3."""
+    held = [
+        friction_coefficients(strokes(noise=noise, seed=seed), normal=LOAD).plateau.includes(0.3)
+        for seed, noise in enumerate(np.geomspace(0.003, 0.1, 20))
+    ]
+    assert sum(held) >= 17  # fewer are there of 20 at 95 % in 2 of 1,000
+
+
+@pytest.mark.parametrize("size", [-2.0, 3.0])
+def test_a_zero_that_drifts_is_no_wear_in(size: float) -> None:
+    """Between a stroke forward and the next one back it moves on, and less and less so."""
+    record = strokes()
+    drift = size * np.exp(-np.arange(len(record)) / (0.1 * len(record)))
+    drifting = ss.Record.of({"x": record["x"], "friction": record["friction"] + drift}, fs=FS)
+    coefficients = friction_coefficients(drifting, normal=LOAD)
+    assert coefficients.wear_in is None
+    for name in ("plateau", "by_stroke", "by_energy"):
+        plain = getattr(friction_coefficients(record, normal=LOAD), name)
+        assert getattr(coefficients, name).value == pytest.approx(plain.value, abs=2 * plain.sd), name
+
+
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_a_force_without_its_sign_is_refused(sign: float) -> None:
     """Its plateau was told as 0.00001, without a doubt."""
@@ -128,6 +150,13 @@ def test_wear_in_is_told_and_left_behind() -> None:
     assert coefficients.plateau.value == pytest.approx(0.3, rel=0.01)  # of the cycles after it: 0.31 of all
     still = friction_coefficients(strokes(60, 0.3 + 0.1 * np.exp(-np.arange(60) / 40)), normal=LOAD)
     assert "still wearing in" in still.plateau.status
+
+
+def test_no_stroke_is_parted_between_two_cycles_of_a_wear_in() -> None:
+    """The median of two halves, a cycle apart, is that of either: the change was 3 % too small."""
+    wear_in = friction_coefficients(strokes(120, 0.3 + 0.1 * np.exp(-np.arange(120) / 8)), normal=LOAD).wear_in
+    assert wear_in.change.value == pytest.approx(0.1, rel=5e-3)
+    assert wear_in.cycles.value == pytest.approx(8, rel=5e-3)
 
 
 def test_a_wear_in_knows_what_its_load_is_known_to() -> None:

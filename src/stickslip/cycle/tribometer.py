@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from stickslip.arrays import Array, Rows
+from stickslip.arrays import Array, Mask, Rows
 from stickslip.balance.motion import (
     Cycles,
     Motion,
@@ -45,6 +45,7 @@ DEFINITIONS = {  # of the coefficient, beside what each is of a cycle
 }
 ALIKE, DIPS = 0.3, 0.5  # of the mean magnitude: an offset that leaves less than ALIKE keeps the force above 1 - ALIKE
 LIFTED = 0.05  # of the load: what friction a contact pressed by less has, its ratio does not tell
+AMPLE = 1.1  # times the way over which friction turns round: noise, and samples, pass half of it a little early
 STATIC, NAME = "the static coefficient", "coefficient of friction, static"
 AUDIBLE = 5.0  # deviations of its noise, by which a peak's fall is seen
 NEAR = 0.5  # of the sliding friction: the static one's peak is looked for from here on
@@ -131,8 +132,8 @@ def friction_coefficients(
 
     Of each cycle, with the load N of that cycle (of the plateau that of each sample, where it was measured):
 
-    * plateau: the median of f while the contact slides, every sample weighed by its way, over N (where friction turns
-      round over a tenth of the stroke, it lies .14 standard deviations of the noise below the level);
+    * plateau: the median of f while the contact slides, past the way over which it turns round, every sample weighed
+      by its way, over N;
     * by stroke: :math:`(\bar f_\text{forward} - \bar f_\text{back}) / 2N`, means of whole strokes, so that an offset of
       the force is not in it, and a rounded corner at the reversal is;
     * by cycle: :math:`\overline{|f|} / N` of all samples, where an offset stays (ASTM G133 asks for a mean like this);
@@ -182,15 +183,18 @@ def friction_coefficients(
     record = without_delays(record, *names, question=QUESTION)
     motion = contact_motion(record, contact="ground", question=QUESTION)
     require_fit(record, "friction", length="m", question=QUESTION)
-    cycles = find_cycles(record, motion, frequency=frequency)
+    cycles = _from_turns(find_cycles(record, motion, frequency=frequency))
     label = cycles.labels(len(record))
     load, loads = _load(record, normal, label)
-    friction = record["friction"]
+    friction = _without_drift(record["friction"], motion, cycles, label)
     forces = _forces(friction, motion, cycles, label)
-    _refuse_magnitudes(friction, forces, label)
+    forces["by_cycle"] = _mean_magnitudes(record["friction"], label)
+    _refuse_magnitudes(record["friction"], forces, label)
     even = friction
     if load.method != "stated":
-        even = _under_mean_load(friction, record["normal"], loads, label, _levels(friction, motion, cycles, label))
+        for _ in range(2):  # the zero, too, is told under one load
+            levels = _levels(even, motion, cycles, label)
+            even = _under_mean_load(friction, record["normal"], loads, label, levels)
         forces["plateau"] = np.asarray(sum(_levels(even, motion, cycles, label)) / 2)
     of_cycles = {name: values / loads for name, values in forces.items()}
     wear_in = fit_wear_in(of_cycles["plateau"])
@@ -219,6 +223,19 @@ def friction_coefficients(
         steady=steady,
         status=status,
     )
+
+
+def _from_turns(cycles: Cycles) -> Cycles:
+    """The cycles from where the motion turns forward on, so that each has one whole stroke either way.
+
+    A median of two halves, a cycle apart, of a friction that wears is that of either of them.
+    """
+    if cycles.turns is not None:  # these begin there
+        return cycles
+    lengths = np.diff(cycles.edges)
+    edges = cycles.edges - np.append(lengths, lengths[-1]) / 4
+    inside = edges >= -0.5  # samples: a record may begin at a turn
+    return replace(cycles, edges=edges[inside]) if np.sum(inside) > 1 else cycles
 
 
 def _called(name: str) -> str:
@@ -256,7 +273,6 @@ def _forces(friction: Array, motion: Motion, cycles: Cycles, label: Rows) -> dic
     for sign in (1.0, -1.0):
         stroke = (label >= 0) & (sign * motion.velocity > 0)
         means.append(np.bincount(label[stroke], friction[stroke], count) / np.bincount(label[stroke], minlength=count))
-    whole = label >= 0
     way, middle = np.diff(motion.displacement), (friction[1:] + friction[:-1]) / 2
     work, length = (np.concatenate([[0.0], np.cumsum(steps)]) for steps in (middle * way, np.abs(way)))
     at = np.arange(len(work))
@@ -264,16 +280,59 @@ def _forces(friction: Array, motion: Motion, cycles: Cycles, label: Rows) -> dic
     return {
         "plateau": np.asarray(sum(_levels(friction, motion, cycles, label)) / 2),
         "by_stroke": (means[0] - means[1]) / 2,
-        "by_cycle": np.bincount(label[whole], np.abs(friction[whole]), count) / np.bincount(label[whole]),
         "by_energy": per_cycle[0] / per_cycle[1],
     }
 
 
+def _mean_magnitudes(friction: Array, label: Rows) -> Array:
+    """The mean magnitude of every cycle [N]."""
+    whole = label >= 0
+    return np.asarray(np.bincount(label[whole], np.abs(friction[whole])) / np.bincount(label[whole]))
+
+
 def _levels(friction: Array, motion: Motion, cycles: Cycles, label: Rows) -> tuple[Array, Array]:
-    """The median of the friction of every cycle while it slides, forward and back [N]."""
+    """The median of the friction of every cycle while it slides past where it turns round, forward and back [N]."""
     slides, count = sliding_parts(motion, cycles) & (label >= 0), len(cycles.edges) - 1
-    forward, back = (levels_of(sign, friction, motion, slides, label, count) for sign in (1.0, -1.0))
-    return forward, back
+
+    def medians(chosen: Mask) -> tuple[Array, Array]:
+        forward, back = (levels_of(sign, friction, motion, chosen, label, count) for sign in (1.0, -1.0))
+        return forward, back
+
+    levels = medians(slides)
+    past = slides & _turned(friction, motion, label, *levels)
+    return medians(past) if past.sum() > slides.sum() / 2 else levels
+
+
+def _turned(friction: Array, motion: Motion, label: Rows, forward: Array, back: Array) -> Mask:
+    """Where the friction has turned round, which takes as much way as contact and holder give way by.
+
+    What is still below the level there moves the median by its share of the way, in every cycle alike. A spring that
+    gives way passes half of the level at three quarters of that way.
+    """
+    whole, way, count = label >= 0, motion.displacement, len(forward)
+    low, high, passed = np.full(count, np.inf), np.full(count, -np.inf), np.full((2, count), np.inf)
+    np.minimum.at(low, label[whole], way[whole])
+    np.maximum.at(high, label[whole], way[whole])
+    ahead = motion.velocity > 0
+    gone = np.where(ahead, way - low[label], high[label] - way)
+    bears = np.where(ahead, 1.0, -1.0) * (friction - ((forward - back) / 2)[label])
+    half = whole & (bears >= ((forward + back) / 4)[label])
+    np.minimum.at(passed, (ahead[half].astype(int), label[half]), gone[half])
+    return np.asarray(gone > AMPLE * float(np.median(passed)) / 0.75)
+
+
+def _without_drift(friction: Array, motion: Motion, cycles: Cycles, label: Rows) -> Array:
+    """The friction with its zero as it is in the mean: a zero that moves on from a stroke to the next looks like more
+    friction, or less."""
+    forward, back = _levels(friction, motion, cycles, label)
+    zero, middle = (forward - back) / 2, (cycles.edges[1:] + cycles.edges[:-1]) / 2
+    zero, middle = zero[np.isfinite(zero)], middle[np.isfinite(zero)]
+    if len(zero) < FEW_CYCLES:
+        return friction
+    from scipy.interpolate import make_interp_spline
+
+    moved = make_interp_spline(middle, zero, k=3)(np.arange(len(friction)))
+    return np.asarray(friction - moved + zero.mean())
 
 
 def _under_mean_load(friction: Array, normal: Array, loads: Array, label: Rows, levels: tuple[Array, Array]) -> Array:
