@@ -198,8 +198,8 @@ def test_a_contact_that_gives_way_is_found_with_its_stiffness() -> None:
     stiffness = tried.presliding.stiffness
     assert stiffness.includes(YIELDS.contact)
     assert stiffness.value == pytest.approx(YIELDS.contact, rel=0.01)
-    # as wide as it is between a contact without damping and one with the damping that x leaves possible
-    assert stiffness.interval[1] - stiffness.interval[0] < 0.25 * YIELDS.contact
+    # as wide as x leaves it beside a damping of the contact, which nobody has stated
+    assert stiffness.interval[1] - stiffness.interval[0] < 0.35 * YIELDS.contact
     assert tried.loops.level.value == pytest.approx(YIELDS.kinetic, rel=1e-3)
 
 
@@ -211,6 +211,17 @@ def test_a_friction_that_lags_is_no_contact_that_gives_way() -> None:
     assert not tried.trial.unlike
     assert tried.loops.level.includes(0.96)
     assert tried.presliding is None or tried.presliding.verdict != "gives way"
+
+
+def test_a_contact_is_no_surer_than_the_laws_that_explain_x_as_well() -> None:
+    """A spring was told to a thousandth, and bristles that fit as well leave it a twentieth: 5225 to 5958 for 6079."""
+    rng = np.random.default_rng(np.random.SeedSequence([281129, 4]).spawn(1)[0])
+    rig = stepped.drawn("LuGre", rng)
+    record = stepped.record(rig, rng, noise=10 ** rng.uniform(-4, -2.3))
+    tried = ss.tried(ss.analyze(record, **rig.stated), twins=8)
+    stiffness = next(estimate for estimate in tried.estimates if estimate.name == "presliding stiffness")
+    assert stiffness.includes(rig.contact)
+    assert stiffness.interval[0] > rig.contact / 2
 
 
 @cache

@@ -386,7 +386,8 @@ def _softer(give: Belief) -> list[list[Belief]]:
 
 def _falling(give: Belief) -> list[list[Belief]]:
     """The same as bristles whose friction falls by so much: x hardly tells it, but their stiffness follows from it."""
-    return [[replace(begun, held=EXCESS) for begun in _bristles(give, excess)] for excess in EXCESSES[2:]]
+    speeds = SPEEDS[1:3]  # from beyond these the search of one rig ended where friction hardly falls (seed 281129)
+    return [[replace(begun, held=EXCESS) for begun in _bristles(give, excess, speeds)] for excess in EXCESSES[2:]]
 
 
 def _slid(give: Belief) -> Belief:
@@ -394,14 +395,14 @@ def _slid(give: Belief) -> Belief:
     return give.as_stated().without(SLOPE).at(**{HELD: float(np.sign(give.record["v"][0]))})
 
 
-def _bristles(give: Belief, excess: float) -> list[Belief]:
+def _bristles(give: Belief, excess: float, speeds: tuple[float, ...] = SPEEDS) -> list[Belief]:
     """Beginnings with so much more static friction, that falls at ever higher speeds."""
     fastest = float(np.max(np.abs(give.record["v"])))
     levels = [part * give.values[KINETIC] for part in LEVELS]
     return [
         _slid(give).at(**{KINETIC: level, EXCESS: excess * level, SPEED: math.log(share * fastest)})
         for level in levels
-        for share in SPEEDS
+        for share in speeds
     ]
 
 

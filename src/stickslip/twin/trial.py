@@ -16,6 +16,7 @@ from stickslip.errors import EstimateError, StickslipError
 from stickslip.estimate import FEW, NORMAL_95, UNSTATED, Doubt, Estimate, Status, doubts_of, kinds
 from stickslip.record.record import Record
 from stickslip.statistics import BINS, repeating, student
+from stickslip.twin import descent
 from stickslip.twin.belief import EXCESS, GIVE, KINETIC, RATE, SLOPE, Belief, levelled
 from stickslip.twin.search import CHANCE
 from stickslip.workers import Map
@@ -52,6 +53,7 @@ ASKED = (*DIRECTIONS, OFFSET, ENERGY, SHARE, STOPS)
 # What moves an answer where the zero of a sensor, and no friction, sets the directions apart: so many times the offset.
 ZERO = {OFFSET: -1.0, STATIC[0]: 1.0, STATIC[1]: -1.0}  # of sliding, it is the level then
 SIZES = tuple(1e-4 * 1.4**step for step in range(30))  # of friction, or of the motion: parts looked for, to two fifths
+LITTLE = 0.01  # of a standard deviation: a step so small that a value is linear in it
 STICKS = ("stick", "microstick")  # kinds of event
 ANSWERED = 0.5  # of the twins, that must answer a question for the record's answer to be tried on them
 STRAINED = 4.0  # standard deviations by which a constant may be off before that is said
@@ -384,8 +386,31 @@ def _reach(belief: Belief, part: str, value: Callable[[Belief], float]) -> float
 
 
 def _apart(belief: Belief, value: Callable[[Belief], float]) -> list[float]:
-    """By how much other laws that the record leaves possible would answer more."""
-    return [value(rival) - value(belief) for rival in belief.rivals]
+    """By how much other laws that the record leaves possible would answer more: the ends of what x leaves each of them.
+
+    They lie where it leaves as much more of x than the nearest law as chance would once in twenty.
+    """
+    left, ends = {rig: descent.misfit(rig) for rig in (belief, *belief.rivals)}, list[float]()
+    low, high = _reached(belief, value, NORMAL_95)
+    for rig in belief.rivals:
+        further = rig.fit.freedom * math.log(left[rig] / min(left.values())) if rig.fit is not None else math.inf
+        least, most = _reached(rig, value, math.sqrt(max(0.0, NORMAL_95**2 - further)))
+        more = value(rig) - value(belief)
+        ends += [min(more, least - low), max(more, most - high)]
+    return ends
+
+
+def _reached(belief: Belief, value: Callable[[Belief], float], deviations: float) -> tuple[float, float]:
+    """The ends of a value of rigs so many standard deviations of the linear fit away, the way that tells the most."""
+    middle, fit = value(belief), belief.fit
+    if fit is None or not math.isfinite(middle) or not deviations:
+        return middle, middle
+    slopes = np.array([value(belief.by(fit.names, LITTLE * step)) - middle for step in fit.root.T])
+    if not slopes.any():
+        return middle, middle
+    step = deviations * fit.root @ (slopes / np.linalg.norm(slopes))
+    ends = sorted(value(belief.by(fit.names, side * step)) for side in (-1, 1))
+    return ends[0], ends[1]
 
 
 def _counted(belief: Belief, frequency: float) -> dict[str, list[float]]:
