@@ -406,9 +406,9 @@ def _reached(belief: Belief, value: Callable[[Belief], float], deviations: float
     if fit is None or not math.isfinite(middle) or not deviations:
         return middle, middle
     slopes = np.array([value(belief.by(fit.names, LITTLE * step)) - middle for step in fit.root.T])
-    if not slopes.any():
+    if not (norm := float(np.linalg.norm(slopes))) > 0:  # what is not moved at all, or undefined nearby
         return middle, middle
-    step = deviations * fit.root @ (slopes / np.linalg.norm(slopes))
+    step = deviations * fit.root @ (slopes / norm)
     ends = sorted(value(belief.by(fit.names, side * step)) for side in (-1, 1))
     return ends[0], ends[1]
 
