@@ -47,6 +47,7 @@ MODES = ("slip", "slip", 0, symbol("f")), ("stuck", "stick", 0, None), ("slow", 
 NEAR = 1e-9  # of the speed that friction gives in a period: there a slip ends, its force as good as constant
 BRIEF = 1e-6  # of a period: the longest that such an end may take
 DRIFT = NEAR / BRIEF  # of the friction: an end takes longer only where P is as close to it
+SHORTER = 50  # looks at a drift at most, each over the time up to where the one before has it end
 REST = 1e-4  # of the speed at which a slip ends: a slip so slow is none, whatever pushes; far above the rounding of u
 STRAIGHT = 1e-12  # of the largest speed: a slip so little beside P runs straight against it
 LEVEL = 1e-12  # of the friction: P that exceeds it by no more is on the disc, for a run does not tell them apart
@@ -452,7 +453,7 @@ class _Place:
         spring = -along @ np.diag(self.plane.push[:, :2])
         damper = self.own.slope.at(v=0.0) - along @ np.diag(self.plane.push[:, 2:4])
         time = min(self.remaining, TURN / self.plane.rate if self.plane.rate else self.remaining)
-        while True:
+        for _ in range(SHORTER):
             pushes = np.vander(scheme.points * time, WIDTH, increasing=True) @ (rates @ self.plane.push.T)
             forces, sums = np.hypot(*pushes.T), time * scheme.matrix
             moved = np.eye(STAGES) + sums @ (damper * np.eye(STAGES) + spring * sums) / self.mass
