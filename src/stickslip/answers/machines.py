@@ -16,8 +16,9 @@ from stickslip.answers.mistakes import called, require_angle
 from stickslip.cycle.joint import JointFriction, regress_joint
 from stickslip.cycle.joint_logs import regress_joint_logs
 from stickslip.cycle.joint_onset import joint_backlash, joint_breakaway
+from stickslip.cycle.static_peak import static_coefficient
 from stickslip.cycle.sticks import find_sticks
-from stickslip.cycle.tribometer import DEFINITIONS, friction_coefficients, static_coefficient
+from stickslip.cycle.tribometer import DEFINITIONS, friction_coefficients
 from stickslip.errors import ABSENT, RecordError
 from stickslip.estimate import UNTRIED, Constant, Doubt, Estimate
 from stickslip.laws.coulomb import LinearSlope

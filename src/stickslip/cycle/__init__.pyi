@@ -18,12 +18,12 @@ from stickslip.cycle.parts import overlapping as overlapping
 from stickslip.cycle.regression import regress_friction as regress_friction
 from stickslip.cycle.slips import SlipRinging as SlipRinging
 from stickslip.cycle.slips import slip_ringing as slip_ringing
+from stickslip.cycle.static_peak import StaticCoefficient as StaticCoefficient
+from stickslip.cycle.static_peak import static_coefficient as static_coefficient
 from stickslip.cycle.sticks import StickEvent as StickEvent
 from stickslip.cycle.sticks import Sticks as Sticks
 from stickslip.cycle.tribometer import Coefficients as Coefficients
-from stickslip.cycle.tribometer import StaticCoefficient as StaticCoefficient
 from stickslip.cycle.tribometer import WearIn as WearIn
 from stickslip.cycle.tribometer import friction_coefficients as friction_coefficients
-from stickslip.cycle.tribometer import static_coefficient as static_coefficient
 
 __all__: list[str]
