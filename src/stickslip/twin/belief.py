@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property, lru_cache, partial
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -129,6 +129,10 @@ class Belief:
             speed, exponent = math.exp(values[SPEED]), math.exp(values[POWER])
             return Stribeck(kinetic, static or kinetic, speed=speed, exponent=exponent)
         return LinearSlope(kinetic, slope=self.slope, static=static)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Without its motion: what one process sends another is short."""
+        return {name: value for name, value in vars(self).items() if name != "_motion"}
 
     def __str__(self) -> str:
         law = self.law
@@ -358,7 +362,7 @@ class Belief:
     @cached_property
     def moved(self) -> Array:
         """The displacement x that its sensor would read without noise and counts [m]."""
-        sensor, run = self.sensor, self._run()
+        sensor, run = self.sensor, self._motion
         if sensor.mount or math.isfinite(sensor.discharge):
             quiet = replace(sensor, noise=Noise(), digitiser=Digitiser(limit=sensor.digitiser.limit), gain=self.gain)
             return np.asarray(self._written((quiet,), run, 0)["x"])
@@ -433,8 +437,9 @@ class Belief:
         off = [self.values[name] for name in DRIVE if name in self.values]
         return replace(self.oscillator, drive=self.drive(min(0.0, -late), last + max(0.0, -late), off))
 
-    def _run(self) -> Trajectory:
-        """The motion of that system."""
+    @cached_property
+    def _motion(self) -> Trajectory:
+        """Of that system."""
         duration = (len(self.record) - 1) / self.record.fs + abs(self.late)
         return simulate(self._system, duration=duration, start=self.start, budget=EVENTS, rtol=FOLLOWED)
 
@@ -443,7 +448,7 @@ class Belief:
 
         Only of laws of linear modes, read by a sensor without memory; not by the time that x is late.
         """
-        sensor, run = self.sensor, self._run()
+        sensor, run = self.sensor, self._motion
         if isinstance(run, CurvedTrajectory) or sensor.mount or math.isfinite(sensor.discharge):
             return {}
         scaled = {DRIVE[0]: 1 / (1 + self.values[DRIVE[0]])} if isinstance(self.drive, Sampled) else {}
@@ -481,7 +486,7 @@ class Belief:
     def work(self, duration: float) -> float:
         """Work of the friction in so long a time [J]."""
         times = np.linspace(0.0, duration, round(duration * self.record.fs * FINELY) + 1)
-        run = self._run()
+        run = self._motion
         (friction, slip), _ = run.sample(np.minimum(times, run.duration), ("friction", "slip"))
         if not isinstance(self.law, LinearSlope):  # the slope is with the damper then
             friction = friction + self.slope * slip
@@ -504,7 +509,7 @@ class Belief:
         if (moves := driving(self.record)) is not None:  # what it wrote, it writes again
             gains[moves] = 1 / (1 + self.values.get(DRIVE[0], 0.0))
         sensors = (replace(s, gain=gains.get(s.channel, 1.0)) for s in self.rig.sensors)
-        written = self._written(sensors, self._run(), rng)
+        written = self._written(sensors, self._motion, rng)
         for name in written:
             known = channels[name]
             details = {"delay": known.delay, "mount": known.mount, "inertia": known.inertia}
