@@ -551,6 +551,24 @@ def test_half_cycles_are_sought_until_none_is_likelier(seed: int) -> None:
     assert found.damping_ratio.value == pytest.approx(0.0197, abs=3 * found.damping_ratio.sd)
 
 
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_noise_that_hides_turns_leads_to_no_other_valley(seed: int) -> None:
+    """A motion that grows beside much dry friction is no answer where noise hides half of the turns."""
+    found = ss.fit_decay(coarse(seed, rate=50, damping=0.004, dry=0.004, step=0.17, share=1.0))
+    assert found.damping_ratio.value == pytest.approx(0.004, abs=3 * found.damping_ratio.sd)
+    assert found.dry_displacement.value == pytest.approx(0.004, abs=3 * found.dry_displacement.sd)
+
+
+@pytest.mark.parametrize("seed", [2, 3, 24])
+def test_the_bent_ridge_between_damping_and_frequency_is_followed(seed: int) -> None:
+    """The half period is known whatever the damping: where that is not, the natural frequency bends with it."""
+    rng, t = np.random.default_rng(seed), np.arange(400) / 20
+    x = np.cos(2 * math.pi * np.maximum(t - rng.uniform(0.3, 0.5), 0)) + 0.01 * rng.standard_normal(len(t))
+    found = ss.fit_decay(ss.Record.of({"x": x}, fs=20.0))
+    assert found.frequency.includes(1.0)
+    assert found.damping_ratio.includes(0.0)
+
+
 def test_few_counts_near_a_step_tell_their_noise_badly() -> None:
     """Intervals hold 95 of 100 though only a few of the counts tell the noise, and the motion is fitted to them."""
     rng, held = np.random.default_rng(78), []

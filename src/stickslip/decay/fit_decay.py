@@ -175,7 +175,8 @@ def _described(ring_down: RingDown, record: Record) -> RingDown:
     first = round((ring_down.first - record.start) * record.fs)
     before = min(first, round(record.fs / ring_down.frequency))
     samples = np.concatenate([record[ring_down.channel][first - before : first], ring_down.samples])
-    return replace(ring_down, first=ring_down.first - before / record.fs, samples=samples)
+    turns = ring_down.turns + before
+    return replace(ring_down, first=ring_down.first - before / record.fs, samples=samples, turns=turns)
 
 
 def _from(ring_down: RingDown, first: int) -> RingDown:
@@ -203,7 +204,7 @@ def _release(ring_down: RingDown, noise: str | None) -> Release:
     samples = np.ascontiguousarray(ring_down.samples)
     search = Search()
     blocks = search.blocks(samples, 1 / ring_down.fs, ring_down.order)
-    fits = search.candidates(blocks) if blocks else np.empty((0, 9))
+    fits = search.candidates(blocks, ring_down.turns) if blocks else np.empty((0, 9))
     if blocks is None or not len(fits):
         raise EstimateError(
             f"channel {ring_down.channel} shows no oscillation that decays",

@@ -22,7 +22,7 @@ import numpy as np
 
 from stickslip.arrays import Array
 from stickslip.compiled import FAST, compiled
-from stickslip.decay.profile import log_determinant
+from stickslip.decay.profile import log_determinant, moved
 from stickslip.decay.profile import solve as cholesky
 from stickslip.decay.start import variance
 from stickslip.decay.waveform import Blocks, normal_equations, sample_motion
@@ -42,6 +42,7 @@ Objective = Callable[[Array], tuple[float, Array, Array]]
 
 CLOSE = 1e-4  # what minus twice the log likelihood may still fall
 STEPS = 60
+LEAP = 10.0  # times what lies between best and level: a step that goes so far beyond it is halved
 PATIENCE = 10  # steps after which an end should be near
 
 
@@ -332,15 +333,16 @@ def solve(curvature: Array, right: Array, extra: float = 0.0) -> Array:
 
 def minimise(objective: Objective, start: Array, farthest: Array) -> tuple[Array, float, Array]:
     """Parameters, value and curvature at the minimum, from `start` in steps no longer than `farthest` each."""
-    p, extra = start.copy(), 0.0
+    p, trial, extra = start.copy(), start.copy(), 0.0
     value, slope, curvature = objective(p)
     for _ in range(STEPS):
         step = solve(curvature, slope, extra)
         step *= min(1.0, float(np.min(farthest / np.maximum(np.abs(step), 1e-300))))
         fall = float(step @ slope)
-        now, next_slope, next_curvature = objective(p + step)
+        moved(p, step, 1.0, trial)
+        now, next_slope, next_curvature = objective(trial)
         if now <= value:
-            p = p + step
+            p = trial.copy()
             value, slope, curvature, extra = now, next_slope, next_curvature, 0.1 * extra if extra > 1e-3 else 0.0
             if fall < CLOSE:
                 break
@@ -353,18 +355,22 @@ def minimise(objective: Objective, start: Array, farthest: Array) -> tuple[Array
 
 def extreme(objective: Objective, best: Array, value: float, which: int, side: int, level: float) -> Array | None:
     """Where a parameter is extreme (`side` +1, -1) among all that reach `level`; None if that is not found."""
-    p = best.copy()
+    p, last = best.copy(), best
     aim = np.zeros(len(p))
     aim[which] = 1.0
     for count in range(STEPS):
         now, slope, curvature = objective(p)
+        if not now - level <= LEAP * (level - value):
+            p = (p + last) / 2
+            continue
+        last = p.copy()
         step, across = solve(curvature, slope), solve(curvature, aim)
         room = max(level - now + float(step @ slope), 0.0)
         whole = np.sqrt((level - value) * across[which])
         step = step + side * np.sqrt(room / across[which]) * across
         move = abs(step[which])
         shorter = 1.0 / (1 + count // 6)  # lest it jump about
-        p = p + step * min(shorter, 2 * whole / max(move, 1e-300))
+        moved(p, step, min(shorter, 2 * whole / max(move, 1e-300)), p)
         if not np.all(np.isfinite(p)) or (count >= PATIENCE and now - level > level - value):
             return None
         if move < 5e-3 * whole and abs(now - level) < 0.05 * (level - value):

@@ -65,6 +65,21 @@ def last_swing(p, n):
 
 
 @compiled(**FAST)
+def moved(p, step, share, trial):
+    """`trial` = p and a share of a step, along which the half period changes evenly and not the natural frequency.
+
+    The record tells the half period whatever the damping: in the natural frequency the likelihood's ridge is bent.
+    """
+    here, there = 1.0 - p[DAMPING] ** 2, 1.0 - (p[DAMPING] + share * step[DAMPING]) ** 2
+    rate = p[RATE] + share * step[RATE]
+    if min(here, there) > 0.0:
+        rate = (rate - share * step[DAMPING] * p[RATE] * p[DAMPING] / here) * math.sqrt(here / there)
+    for k in range(p.shape[0]):
+        trial[k] = p[k] + share * step[k]
+    trial[RATE] = rate
+
+
+@compiled(**FAST)
 def _possible(p, before):
     """Whether trial parameters are those of an oscillation, near enough the ones before for the steps to be trusted."""
     return (
@@ -95,8 +110,8 @@ def minimise(p, n, blocks, hessian, gradient, work):
             continue
         fall = 0.0
         for k in range(6):
-            trial[k] = p[k] + step[k]
             fall += step[k] * gradient[k]
+        moved(p, step, 1.0, trial)
         if _possible(trial, p):
             if fall <= CLOSE * squares / freedom:
                 for k in range(6):
@@ -140,8 +155,7 @@ def extreme(p, n, which, side, level, least, blocks, hessian, gradient, work):
         move = abs(step[which])
         if move > 2.0 * whole:
             share = 2.0 * whole / move
-        for k in range(6):
-            p[k] += share * step[k]
+        moved(p, step, share, p)
         if not abs(p[DAMPING]) < STEEPEST or not p[RATE] > 0.0:
             return False
         if move < 2e-3 * whole and abs(squares - level) < 0.05 * (level - least):
@@ -167,7 +181,7 @@ def over_half_cycles(start, first, blocks, fits, work):
             squares = minimise(p, n, blocks, hessian, gradient, work[:8])
             limit = best * worse
             possible = last_swing(p, n)[0] > 0.0
-            if possible and squares <= limit:
+            if possible and squares < math.inf and squares <= limit:
                 if squares < best:
                     best = squares
                     kept = _keep(fits, kept, best * worse)

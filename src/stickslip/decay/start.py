@@ -14,7 +14,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from stickslip.arrays import Array, Mask, stretches
+from stickslip.arrays import Array, Mask, Rows, stretches
 from stickslip.compiled import FAST, compiled
 from stickslip.decay.profile import intervals, over_half_cycles, solve
 from stickslip.decay.waveform import AMPLITUDE, DAMPING, DRY, RATE, RELEASE, REST, Blocks, normal_equations
@@ -27,6 +27,7 @@ FIRST_SWINGS = 0.25  # of the range: what counts as a swing before the noise is 
 LATER_SWINGS = 0.05
 NOISES = 12.0  # standard deviations of the noise that a swing is larger than
 
+NO_TURNS: Rows = np.empty(0, dtype=np.intp)
 ROUNDING = 1e-9  # of the range
 AT_ONCE = 0.1  # samples after the first one, within which a turn is before it
 CANDIDATES = 40  # numbers of half cycles kept
@@ -74,7 +75,9 @@ def passages(values, rows, count, times):
     """
     for k in range(count - 1):
         top, bottom = values[rows[k]], values[rows[k + 1]]
-        area = 0.0
+        times[k], area = 0.5 * (rows[k] + rows[k + 1]), 0.0
+        if top == bottom:
+            continue
         for j in range(rows[k], rows[k + 1]):
             area += values[j] - bottom
         times[k] = rows[k] + area / (top - bottom)
@@ -117,19 +120,24 @@ def linear_step(p, n, blocks, hessian, gradient, work):
 
 
 @compiled(**FAST)
-def guess(blocks, rows, times, p, work):
-    """First parameters of the motion in `p`; the number of half cycles seen, 0 where there are fewer than two."""
+def guess(blocks, turns, rows, times, p, work):
+    """First parameters of the motion in `p`; its number of half cycles, 0 where fewer than two are seen.
+
+    It turns where the block means do, or at the blocks `turns` where noise hides some of these.
+    """
     means, size, _, dt, order = blocks
     low, high = means[0], means[0]
     for j in range(means.shape[0]):
         low, high = min(low, means[j]), max(high, means[j])
     hessian, gradient, trial = work[8, :6], work[9, 0], work[9, 1]
     count = turning_points(means, max(LATER_SWINGS * (high - low), NOISES * roughness(means)), rows)
+    if turns.shape[0] > count:
+        count, rows = turns.shape[0], turns
     passages(means, rows, count, times)
     spacing, first = half_period(means, rows, times, count)
     if spacing <= 0.0:
         return 0
-    best, step = math.inf, size * dt
+    best, likeliest, step = math.inf, 0, size * dt
     half = spacing * step
     for shift in range(-4, 5 if order == 0 else 9, 4 if order == 0 else 1):  # quarters of a half period, backwards
         release = (first + 0.5) * step - (0.5 + 0.25 * shift) * half - 0.5 * dt
@@ -141,10 +149,10 @@ def guess(blocks, rows, times, p, work):
             n = max(1, count - 1 + shift // 4)
             squares = linear_step(trial, n, blocks, hessian, gradient, work)
             if squares < best and trial[AMPLITUDE] != 0.0:
-                best = squares
+                best, likeliest = squares, n
                 for k in range(6):
                     p[k] = trial[k]
-    return count - 1
+    return likeliest
 
 
 @compiled(**FAST)
@@ -179,9 +187,13 @@ class Search:
         block_means(samples, size, means)
         return Blocks(means, size, len(samples), dt, order)
 
-    def candidates(self, blocks: Blocks) -> Array:
-        """For each number of half cycles that may be: it, the sum of squares, log det J'J, and six parameters."""
-        first = guess(blocks, self.rows, self.times, self.start, self.work)
+    def candidates(self, blocks: Blocks, turns: Rows = NO_TURNS) -> Array:
+        """For each number of half cycles that may be: it, the sum of squares, log det J'J, and six parameters.
+
+        `turns` are the samples at which the motion is known to turn.
+        """
+        seen = np.minimum(turns[: len(self.rows)] // blocks.size, len(blocks.means) - 1)
+        first = guess(blocks, seen, self.rows, self.times, self.start, self.work)
         kept = over_half_cycles(self.start, first, blocks, self.fits, self.work) if first else 0
         fits = np.array(self.fits[:kept])
         for row in fits:
