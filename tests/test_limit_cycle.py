@@ -8,8 +8,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
+from tests.two_blocks import TwoBlocks
 
 import stickslip as ss
+
+START = {"x1": 0.1, "x2": -0.2}
 
 
 def sticking(speed: float, damping: float = 0.0) -> ss.Oscillator:
@@ -255,3 +259,71 @@ def test_what_has_no_answer_is_refused(call: Any, words: str) -> None:
     with pytest.raises(ss.errors.ModelError) as refused:
         call()
     assert words in str(refused.value)
+
+
+def test_the_end_of_one_blocks_stick_does_not_tell_where_the_other_is() -> None:
+    """The second block's place comes nearer from return to return, by a factor that scipy's motion tells."""
+    blocks = TwoBlocks(1.2, kinetic=(0.8, 1.0), static=(1.0, 1.25), speed=0.02)
+    *_, (before, sooner), (_, later) = list(blocks.returns(240.0))
+    orbit = ss.steady_state(blocks.system, start=START)
+    assert orbit.status == "unique"
+    assert abs(orbit.multipliers[0]) == pytest.approx((later - sooner) / (sooner - before), rel=1e-3)
+    assert np.allclose(orbit.multipliers[1:], 0.0, atol=1e-9), "but for that one, the stick forgets"
+    exponent = ss.solve.lyapunov(blocks.system, cycles=400, start=START)
+    low, high = (bound * orbit.period for bound in exponent.interval)
+    assert low < math.log(abs(orbit.multipliers[0])) < high
+
+
+def test_chaos_on_a_belt_has_its_exponent() -> None:
+    """Two blocks that differ, as in Huang and Turcotte (1990), against neighbours that scipy follows."""
+    blocks = TwoBlocks(3.0, kinetic=(0.8, 1.0), static=(1.0, 1.25), speed=0.02)
+    exponent = ss.solve.lyapunov(blocks.system, cycles=100, transient=20, start=START)
+    assert exponent.value == pytest.approx(blocks.exponent(laps=100, before=20), abs=2e-3)
+    assert exponent.value > 0.01
+    motion = ss.steady_state(blocks.system, start=START)
+    assert motion.status == "chaotic"
+    assert motion.exponent is not None
+    assert motion.exponent.interval[0] > 0
+
+
+def test_a_block_alone_on_a_belt_forgets_all_but_its_phase() -> None:
+    assert ss.solve.lyapunov(sticking(0.5), cycles=25).value == -math.inf
+    law = ss.laws.FrictionCurve(lambda v: 0.4 - 0.225 * (v / 0.5 - (v / 0.5) ** 3 / 3))
+    block = ss.Oscillator(1.0, 1.0, law, ss.drives.Belt(0.42), damping=0.1)
+    orbit = ss.steady_state(block)
+    exponent = ss.solve.lyapunov(block, cycles=300, transient=40)
+    assert exponent.value == pytest.approx(math.log(abs(orbit.multipliers[0])) / orbit.period, rel=1e-2)
+
+
+def test_nothing_lasts_where_nothing_drives() -> None:
+    with pytest.raises(ss.errors.SolveError, match="or a belt"):
+        ss.solve.lyapunov(ss.Oscillator(1.0, 1.0, ss.laws.Coulomb(1.0), ss.drives.Release()))
+
+
+def test_bristles_on_a_belt_may_turn_several_times_before_they_repeat() -> None:
+    """Two turns that differ, by scipy's Radau with the law written out."""
+    kinetic, static, stribeck, stiffness, damping, belt = 1.0, 1.5, 0.05, 100.0, 1.0, 0.2
+    law = ss.laws.LuGre(kinetic, static, speed=stribeck, stiffness=stiffness, damping=damping)
+    block = ss.Oscillator(1.0, 1.0, law, ss.drives.Belt(belt), damping=0.02)
+    orbit = ss.steady_state(block)
+    assert orbit.status == "unique"
+
+    def rates(_: float, y: Any) -> list[float]:
+        slip = y[1] - belt
+        level = kinetic + (static - kinetic) * math.exp(-((slip / stribeck) ** 2))
+        bristle = slip - stiffness * abs(slip) * y[2] / level
+        return [y[1], -y[0] - 0.02 * y[1] - stiffness * y[2] - damping * bristle, bristle]
+
+    def turns(_: float, y: Any) -> float:
+        return float(y[1])
+
+    turns.direction = 1.0  # type: ignore[attr-defined]
+    start = [orbit.orbit.states[0][orbit.orbit.table.names.index(name)] for name in ("x", "v", "bristle")]
+    peer = solve_ivp(rates, (0.0, orbit.period), start, "Radau", rtol=1e-10, atol=1e-12, events=turns)
+    assert np.allclose(peer.y[:, -1], start, rtol=0, atol=1e-6)
+    places = [y[0] for t, y in zip(peer.t_events[0], peer.y_events[0], strict=True) if 0.1 < t < orbit.period - 0.1]
+    assert len(places) == 1
+    assert abs(places[0] - start[0]) > 0.01
+    exponent = ss.solve.lyapunov(block, cycles=100, transient=40)
+    low, high = (bound * orbit.period for bound in exponent.interval)
+    assert low < math.log(abs(orbit.multipliers[0])) < high

@@ -55,7 +55,7 @@ def aperiodic(system: System, table: Table, state: Array, mode: int) -> SteadySt
     answer = SteadyState("not periodic", math.nan, 0, orbit, none)
     count = COUNTED_CURVED if isinstance(table, Tape) else COUNTED
     exponent = growth(system, table, state, mode, cycles=count)
-    parted = exponent.value * count * beat(table)
+    parted = exponent.value * count * beat(system, table)
     if parted > PARTED and exponent.interval[0] > 0:
         return replace(answer, status="chaotic", exponent=exponent)
     known = tuple(omega / (2 * math.pi) for _, _, omega, _ in table.motion.tones)
@@ -63,11 +63,11 @@ def aperiodic(system: System, table: Table, state: Array, mode: int) -> SteadySt
     if parted < -PARTED and not tonal:
         return replace(answer, exponent=exponent)
     lines, again = [], (state, mode)
-    for _ in range(1 if tonal else 2):
+    for _ in range(2 if len(known) == 1 else 1):
         motion = beats(system, table, *again, LOOKED)
         again = carried_on(motion)
-        lines.append(spectrum(motion, max(known)))
-    basic = known if tonal else (*known, *_own(lines, known[0], 1 / motion.duration))
+        lines.append(spectrum(motion, max(known, default=1 / beat(system, table))))
+    basic = (*known, *_own(lines, known[0], 1 / motion.duration)) if len(known) == 1 else known
     status = "quasi-periodic" if len(basic) > 1 else "not periodic"
     return replace(answer, status=status, exponent=exponent, lines=lines[-1], frequencies=basic)
 
@@ -100,7 +100,7 @@ def _returned(
     system: System, table: Table, before: tuple[Array, int], motion: Trajectory, count: int
 ) -> SteadyState | None:
     """The orbit that ends a motion of so many beats, where it is now what it was some beats ago."""
-    times = np.arange(count + 1) * beat(table)
+    times = np.arange(count + 1) * beat(system, table)
     points = motion.sample(np.minimum(times, motion.duration), ("state",))[0][: table.physical]
     size = extent(motion)
     gaps = np.max(np.abs(points - points[:, -1:]) / np.where(size > 0, size, 1.0)[:, None], axis=0)
@@ -218,9 +218,10 @@ def steady_state(
             "correct them",
         )
     orbit, passed = settled_on(system, start or {}, transient=transient, orders=orders, patience=patience)
-    if orbit.status != "not periodic" or not math.isfinite(orbit.orbit.table.motion.period):
+    table = orbit.orbit.table
+    if orbit.status != "not periodic" or not math.isfinite(beat(system, table)) or _is_tonal(table):
         return orbit
-    motion = aperiodic(system, orbit.orbit.table, orbit.orbit.states[0], int(orbit.orbit.modes[0]))
+    motion = aperiodic(system, table, *carried_on(orbit.orbit))
     return passed if passed is not None and motion.status == "not periodic" else motion
 
 
@@ -232,9 +233,9 @@ def settled_on(
     Beside it an unstable orbit, which Newton's method closes where a motion only passes.
     """
     table = tables(system)
+    if _is_tonal(table):
+        return tonal(system, table, start, (transient, patience)), None
     if not math.isfinite(table.motion.period):
-        if table.motion.tones and table.motion.knots is None and not table.motion.base.get("way"):
-            return tonal(system, table, start, (transient, patience)), None
         return self_excited(system, table, start, transient), None
     state, mode = opening(table, start)
     laps, sizes, first = 0, [], _iterate(system, table, state, mode, 1)[2]
@@ -262,6 +263,14 @@ def settled_on(
     if growing:
         return passed or SteadyState("unbounded", math.nan, 0, lap(system, table, state, mode, 1), none), passed
     return SteadyState("not periodic", math.nan, 0, beats(system, table, state, mode, 1), none), passed
+
+
+def _is_tonal(table: Table) -> bool:
+    """Whether tones without a common period are all that moves what does not stay where it is."""
+    motion = table.motion
+    return (
+        bool(motion.tones) and not math.isfinite(motion.period) and motion.knots is None and not motion.base.get("way")
+    )
 
 
 def attractors(

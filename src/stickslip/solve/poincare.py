@@ -320,17 +320,30 @@ def lap(system: System, table: Table, state: Array, mode: int, laps: int) -> Tra
     return stretch(system, table, state, mode, span=(float(laps), 0.0))
 
 
-def beat(table: Table) -> float:
-    """Time from look to look [s]: the drive's period; of tones without one, that of the slowest; else infinite."""
-    if np.isfinite(table.motion.period) or not table.motion.tones:
-        return table.motion.period
-    return max(2 * np.pi / omega for _, _, omega, _ in table.motion.tones)
+def beat(system: System, table: Table) -> float:
+    """Time from look to look [s]: the drive's period; of tones without one, that of the slowest; else the natural one.
+
+    Infinite where nothing lasts: under a pulse, or without a drive or a spring.
+    """
+    motion = table.motion
+    if np.isfinite(motion.period):
+        return motion.period
+    if motion.tones:
+        return max(2 * np.pi / omega for _, _, omega, _ in motion.tones)
+    return 1 / system.frequency if motion.rates and motion.knots is None and system.frequency else math.inf
+
+
+def is_self_excited(table: Table) -> bool:
+    """Whether nothing but the motion itself gives it a period."""
+    return not math.isfinite(table.motion.period) and not table.motion.tones
 
 
 def beats(system: System, table: Table, state: Array, mode: int, count: int) -> Trajectory:
     """The motion over so many beats, from a state that holds where the drive's signals are."""
     whole = np.isfinite(table.motion.period)
-    return stretch(system, table, state, mode, span=(float(count), 0.0) if whole else (0.0, count * beat(table)))
+    return stretch(
+        system, table, state, mode, span=(float(count), 0.0) if whole else (0.0, count * beat(system, table))
+    )
 
 
 def carried_on(orbit: Trajectory) -> tuple[Array, int]:
@@ -437,7 +450,7 @@ def lyapunov(
 
     The largest Lyapunov exponent that differs from the neutral one of time: the growth rate of a small difference of
     the state at fixed phase of the drive, carried along the exact motion, saltation at events included; of a curved
-    law, by central differences of the map.
+    law, by central differences of the map. A self-excited motion is looked at from natural period to natural period.
 
     A stick forgets the velocity and with it one direction; a rigid contact that sticks in every period may forget
     everything, and the exponent is minus infinity.
@@ -445,9 +458,10 @@ def lyapunov(
     Parameters
     ----------
     system : Oscillator or Structure
-        What moves, with a periodic drive or one of several tones.
+        What moves: with a periodic drive, one of several tones, or on a belt.
     cycles : int
-        Periods over which the growth is averaged; of tones without a common one, those of the slowest.
+        Periods over which the growth is averaged; of tones without a common one those of the slowest, on a belt the
+        natural ones.
     transient : int
         Periods before that.
     start : mapping, optional
@@ -461,7 +475,7 @@ def lyapunov(
     Raises
     ------
     SolveError
-        The drive has neither period nor tones.
+        The drive has neither period nor tones, and is no belt.
 
     Examples
     --------
@@ -476,45 +490,57 @@ def lyapunov(
     if cycles < BATCHES or transient < 0:
         raise ModelError(f"cycles = {cycles}", f"the interval needs {BATCHES} cycles at least", "raise cycles=")
     table = tables(system)
-    if not math.isfinite(beat(table)):
-        raise SolveError("the drive has no period", "growth is counted from period to period", "use a periodic drive")
+    if not math.isfinite(beat(system, table)):
+        raise SolveError(
+            "the drive has no period", "growth is counted from period to period", "use a periodic drive, or a belt"
+        )
     return growth(system, table, *opening(table, start or {}), cycles=cycles, transient=transient)
 
 
 def growth(system: System, table: Table, state: Array, mode: int, *, cycles: int, transient: int = 0) -> Estimate:
-    """The largest Lyapunov exponent [1/s] of the motion from a state on."""
-    period = beat(table)
-    difference = np.linspace(1.0, 0.5, table.physical)
-    weights = np.ones(table.physical)
-    grown: list[float] = []
+    """The largest Lyapunov exponent [1/s] of the motion from a state on, but for the neutral one of time.
+
+    A difference along a self-excited motion neither grows nor fades: its exponent, of all the one nearest to zero, is
+    told from the others by carrying them all (Benettin et al., Meccanica 15, 1980).
+    """
+    free, period = is_self_excited(table), beat(system, table)
     how = "differences of the map" if isinstance(table, Tape) else "exact tangent"
+    orbit = beats(system, table, state, mode, 1)
+    weights = _weights(system, orbit)[:, None]
+    fresh = (np.eye(table.physical) if free else np.linspace(1.0, 0.5, table.physical)[:, None]) / weights
+    differences, rows = fresh, list[Array]()
     for number in range(transient + cycles):
-        orbit = beats(system, table, state, mode, 1)
+        if number:
+            orbit = beats(system, table, state, mode, 1)
         state, mode = carried_on(orbit)
-        if number == 0:
-            weights = _weights(system, orbit)
-            difference /= weights
-        difference = carried(orbit, mode, difference)
-        length = float(np.linalg.norm(difference * weights))
-        if length == 0.0:
-            return Estimate(
-                "Lyapunov exponent",
-                -math.inf,
-                (-math.inf, -math.inf),
-                0.0,
-                "1/s",
-                how,
-                checks=(f"every difference was forgotten in lap {number}",),
-            )
-        difference /= length
-        if number >= transient:
-            grown.append(math.log(length) / period)
-    batches = np.array([np.mean(part) for part in np.array_split(grown, BATCHES)])
+        slope = derivative(orbit, mode)[0] if free else None
+        differences = carried(orbit, mode, differences[:, 0])[:, None] if slope is None else slope @ differences
+        directions, sizes = np.linalg.qr(differences * weights)
+        lengths = np.abs(np.diag(sizes))
+        kept = lengths > FORGOTTEN * np.max(lengths) if free else lengths > 0
+        left = np.count_nonzero(kept) > free
+        differences = (directions / weights)[:, kept]
+        if number < transient:
+            differences = differences if left else fresh  # a beginning may stick where later nothing is held
+            continue
+        if not left:
+            forgotten = f"every difference was forgotten in lap {number}"
+            none = (-math.inf, -math.inf)
+            return Estimate("Lyapunov exponent", -math.inf, none, 0.0, "1/s", how, checks=(forgotten,))
+        rows = rows if kept.all() else [row[kept] for row in rows]
+        rows.append(np.log(lengths[kept]) / period)
+    return _largest(np.array(rows), f"{how} over {cycles} periods, scatter of {BATCHES} batches", neutral=free)
+
+
+def _largest(grown: Array, method: str, *, neutral: bool) -> Estimate:
+    """Of growths by lap and direction the largest, where `neutral` but for the one of time."""
+    means = grown.mean(axis=0)
+    others = np.delete(np.arange(len(means)), np.argmin(np.abs(means))) if neutral else np.arange(len(means))
+    largest = grown[:, others[np.argmax(means[others])]]
+    batches = np.array([np.mean(part) for part in np.array_split(largest, BATCHES)])
     spread = float(np.std(batches, ddof=1) / math.sqrt(BATCHES))
-    method = f"{how} over {cycles} periods, scatter of {BATCHES} batches"
-    return Estimate.normal(
-        "Lyapunov exponent", float(np.mean(grown)), sd=spread, unit="1/s", method=method, quantile=STUDENT
-    )
+    value = float(np.mean(largest))
+    return Estimate.normal("Lyapunov exponent", value, sd=spread, unit="1/s", method=method, quantile=STUDENT)
 
 
 def _weights(system: System, orbit: Trajectory) -> Array:
@@ -525,6 +551,6 @@ def _weights(system: System, orbit: Trajectory) -> Array:
     table = orbit.table
     weights = np.ones(table.physical)
     weights[table.degrees : 2 * table.degrees] = (
-        1 / system.frequency / (2 * math.pi) if system.frequency else beat(table)
+        1 / system.frequency / (2 * math.pi) if system.frequency else beat(system, table)
     )
     return weights

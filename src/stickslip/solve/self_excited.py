@@ -163,7 +163,7 @@ def self_excited(system: System, table: Table, start: Mapping[str, float | str],
             own = slice(0, table.physical if isinstance(table, Tape) else 2 * table.degrees)
             gap = np.abs(motion.states[last, own] - motion.states[first, own])
             if np.all(gap <= 1e-9 * np.max(np.abs(motion.states[first : last + 1, own]), axis=0)):
-                return _between(motion, first, last)
+                return _between(motion, first, last, _multipliers(motion, first, last))
         if not ends or motion.starts[ends[-1]] < duration / 2:
             orbit = _slid_on(motion) or _without_sticks(motion)
             if orbit is not None:
@@ -205,7 +205,7 @@ def _without_sticks(motion: Trajectory) -> SteadyState | None:
 
 
 def _between_turns(system: System, table: Tape, state: Array, mode: int, duration: float) -> SteadyState:
-    """The orbit of a law that never holds the mass, from one turn of the mass to the next."""
+    """The orbit of a law that never holds the mass, from one turn of the mass to the first that is alike."""
     physical = table.physical
     for _ in range(TRANSIENTS):
         motion = stretch(system, table, state, mode, span=(0.0, duration))
@@ -216,33 +216,47 @@ def _between_turns(system: System, table: Tape, state: Array, mode: int, duratio
         if len(turns) < 2 or table.motion.base or table.motion.tones:
             break
         values, pieces = motion.sample(turns, ("state",))
-        state, mode = state.copy(), int(motion.modes[pieces[1]])
-        state[:physical] = values[:, 1]
+        state, mode = state.copy(), int(motion.modes[pieces[-1]])
+        state[:physical] = values[:, -1]
         sizes = np.max(np.abs(motion.steps.states[motion.steps.starts > turns[0], :physical]), axis=0)
-        if np.all(np.abs(values[:, 1] - values[:, 0]) <= 1e-9 * sizes):
-            period = turns[1] - turns[0]
+        gaps = np.abs(values[:, :-1] - values[:, -1:])
+        alike = np.flatnonzero(np.all(gaps <= 1e-9 * sizes[:, None], axis=0))
+        if len(alike):
+            period = turns[-1] - turns[alike[-1]]
             orbit = stretch(system, table, state, mode, span=(0.0, period))
-            multipliers = np.linalg.eigvals(derivative(orbit, mode)[0]).astype(np.complex128)
-            multipliers[np.argmin(np.abs(multipliers - 1))] = 0.0  # along the orbit nothing grows: its phase is free
-            multipliers = multipliers[np.argsort(-np.abs(multipliers))]
+            multipliers = _phase_free(orbit)
             return SteadyState("unique" if abs(multipliers[0]) < 1 else "unstable", period, 1, orbit, multipliers)
     none = np.full(physical, np.nan, dtype=np.complex128)
     return SteadyState("not periodic", math.nan, 0, motion, none)
 
 
 def _turns(motion: CurvedTrajectory) -> list[float]:
-    """The last two instants at which the velocity rises through zero."""
+    """The last instants at which the velocity rises through zero, in order."""
     from scipy.optimize import brentq
 
     v, ends = motion.steps.states[:, 1], motion.steps.starts
-    rises = np.flatnonzero((v[:-1] < 0) & (v[1:] >= 0))[-2:]
+    rises = np.flatnonzero((v[:-1] < 0) & (v[1:] >= 0))[-MOST - 1 :]
     return [
         float(brentq(lambda t: motion.sample([t], ("v",))[0][0, 0], ends[j], ends[j + 1], xtol=1e-15 * ends[j + 1]))
         for j in rises
     ]
 
 
-def _between(motion: Trajectory, first: int, last: int) -> SteadyState:
+def _multipliers(motion: Trajectory, first: int, last: int) -> Complex:
+    """Multipliers of the orbit from the end of a stick to the next, largest first."""
+    table = motion.table
+    if getattr(table, "degrees", 1) == 1:  # its stick ends in one state alone: whatever came before is forgotten
+        return np.zeros(table.physical, dtype=np.complex128)
+    begin = motion.starts[first] + motion.durations[first] / 2
+    return _phase_free(_from(motion, begin, motion.starts[last] - motion.starts[first]))
+
+
+def _phase_free(orbit: Trajectory) -> Complex:
+    """All multipliers of a closed orbit, largest first; along it nothing grows, for its phase is free."""
+    return np.append(_across(derivative(orbit, int(orbit.modes[0]))[0]), 0.0)
+
+
+def _between(motion: Trajectory, first: int, last: int, multipliers: Complex) -> SteadyState:
     """The orbit from one piece to another where it begins anew."""
     part, begin, end = slice(first, last), motion.starts[first], motion.starts[last]
     own: dict[str, Any] = {}
@@ -263,8 +277,15 @@ def _between(motion: Trajectory, first: int, last: int) -> SteadyState:
         status="complete",
         **own,
     )
-    # a stick ends in one state alone: whatever came before is forgotten
-    return SteadyState("unique", orbit.duration, 1, orbit, np.zeros(motion.table.physical, dtype=np.complex128))
+    return SteadyState("unique", orbit.duration, 1, orbit, multipliers)
+
+
+def _from(motion: Trajectory, begin: float, duration: float) -> Trajectory:
+    """The motion anew from an instant on, so long."""
+    state, _ = opening(motion.table, {})
+    values, piece = motion.sample([begin], ("state",))
+    state[: motion.table.physical] = values[:, 0]
+    return stretch(motion.system, motion.table, state, int(motion.modes[piece[0]]), span=(0.0, duration))
 
 
 def settled_cycle(motion: Trajectory, shortest: float) -> tuple[Trajectory, Complex] | None:
