@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import time
 from dataclasses import replace
 from itertools import pairwise
 
@@ -132,6 +133,13 @@ def test_a_unit_that_keeps_time_compiles_before_its_clock_begins(monkeypatch: py
         assert times[0] == (True, 0.0)
         assert times[-1] == (True, pytest.approx(2.98))
         assert (stream.sent, stream.device.fast) == (0, False)
+        times.clear()
+        opened = time.monotonic()
+        stream.drive("base", Tone(0.5e-3, 5.61))
+        driven = time.monotonic()
+        stream.read()
+        assert [times[0], times[-2]] == [(True, 0.0), (True, pytest.approx(2.98))]
+        assert opened < stream.began < driven
 
 
 def test_devices_are_found_by_name() -> None:

@@ -15,6 +15,7 @@ from stickslip import bench
 from stickslip.bench.calibration import find_holds
 from stickslip.bench.free import damper_of
 from stickslip.estimate import kinds
+from stickslip.story.words import value_of
 
 NOISE = np.random.default_rng(7)
 
@@ -112,6 +113,14 @@ def test_levels_of_unequal_length_are_found() -> None:
     assert [round(hold.level, 1) for hold in holds] == list(levels)
     ends = list(itertools.accumulate(lengths))
     assert all(hold.last < end / 1000 for hold, end in zip(holds, ends, strict=True))
+
+
+def test_a_bend_is_said_in_per_cent_of_the_range() -> None:
+    levels = np.array([0.0, 1.0, 2.0, 3.0, 4.0])
+    read = np.repeat(levels + 0.01 * (levels - 2) ** 2, 2000) + 1e-5 * NOISE.standard_normal(10_000)
+    bend = bench.calibrate(of("load", read), channel="load", reference=levels).nonlinearity
+    assert value_of(bend) == "0.500 %"  # a parabola over five levels: 0.02 N beside its line, of 4 N
+    assert bend.name == "nonlinearity of load, share of its range"
 
 
 @pytest.mark.parametrize(

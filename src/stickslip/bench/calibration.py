@@ -35,8 +35,8 @@ class Calibration(Result):
         Reading over truth; 1 where the stated sensitivity is right.
     zero : Estimate or None
         Reading at the value zero [unit of the channel]; None where it leaks away.
-    linearity : Estimate
-        Largest deviation from the straight line, as a part of the range.
+    nonlinearity : Estimate
+        Largest deviation from the straight line, as a share of the range.
     reference, levels : ndarray (n,)
         The known values and what was read [unit of the channel]; of a leaking sensor with the leak put back.
     status : str
@@ -46,7 +46,7 @@ class Calibration(Result):
     channel: str
     gain: Estimate
     zero: Estimate | None
-    linearity: Estimate
+    nonlinearity: Estimate
     reference: Array
     levels: Array
     status: str
@@ -127,15 +127,15 @@ def calibrate(
         else Estimate.normal(f"zero of {channel}", fit[1], sd=sd[1], unit=unit, method=method, quantile=quantile)
     )
     largest = float(np.abs(residual).max() / np.ptp(fit[0] * values))
-    linearity = Estimate.normal(
-        f"deviation of {channel} from a straight line",
+    nonlinearity = Estimate.normal(
+        f"nonlinearity of {channel}, share of its range",
         largest,
         sd=float(level_sd.max() / np.ptp(fit[0] * values)),
         unit="1",
         method=method,
     ).within(0.0)
     bent = [Doubt(f"{channel} is off a straight line by {100 * largest:.2g} % of the range", "bent")]
-    return Calibration(channel, gain, zero, linearity, values, read, Status(*bent * (largest > BENT)))
+    return Calibration(channel, gain, zero, nonlinearity, values, read, Status(*bent * (largest > BENT)))
 
 
 def _require_reference(values: Array, sd: float) -> None:
@@ -251,7 +251,7 @@ def spring_by_weights(
         part / compliance.value,
         "N/m",
         f"displacement under {len(calibration.levels)} weights",
-        checks=(f"off a straight line by {100 * calibration.linearity.value:.2g} %",),
+        checks=(f"off a straight line by {100 * calibration.nonlinearity.value:.2g} %",),
     )
     return SpringByWeights(
         replace(stiffness, status=calibration.status), calibration.reference, calibration.levels, calibration.status

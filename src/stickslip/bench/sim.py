@@ -197,12 +197,18 @@ class Sim:
         -------
         SimStream
         """
-        if not self.fast:  # what compiles does so before the clock begins, and is waited for
-            rehearsal = SimStream(replace(self, fast=True))
-            with waiting():
-                while rehearsal.sent < REHEARSED * self.fs and rehearsal.read() is not None:
-                    pass
+        if not self.fast:
+            self.rehearse({})
         return SimStream(self)
+
+    def rehearse(self, drive: Mapping[str, Signal]) -> None:
+        """Compile what its motion needs, moved as in `drive`, and wait for it."""
+        rehearsal = SimStream(replace(self, fast=True))
+        with waiting():
+            for output, signal in drive.items():
+                rehearsal.drive(output, signal)
+            while rehearsal.sent < REHEARSED * self.fs and rehearsal.read() is not None:
+                pass
 
 
 def _input(sensor: Sensor, unit: str, stated: bool) -> Input:
@@ -256,8 +262,8 @@ class SimStream:
     def drive(self, output: str, signal: Signal) -> None:
         """Move the base or the mass otherwise from the next sample on; it goes over smoothly, in `RAMP` seconds.
 
-        Samples are moved to from where the base stands, begin when it is there, and the last one is held. See
-        :class:`Stream`.
+        Before anything was read the clock begins anew, once all is compiled. Samples are moved to from where the base
+        stands, begin when it is there, and the last one is held. See :class:`Stream`.
         """
         device = self.device
         output_of(device, output).require(signal, fs=device.fs)
@@ -268,6 +274,9 @@ class SimStream:
                 "stop it first",
             )
         self.moving = output if signal is not None else ""
+        if not (device.fast or self.sent):
+            device.rehearse({output: signal})
+            self.began = time.monotonic()
         now, label = float(self._time(self.sent)), {"base": "z", "force": "force"}[output]
         self.march.ahead(now + RAMP)
         times = np.arange(round(RAMP * device.fs) + 1) / device.fs
