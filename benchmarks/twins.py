@@ -1,22 +1,24 @@
 """What an analysis says of rigs by another integrator, quick and tried on its twins: how often it holds, and is true.
 
-    python benchmarks/twins.py [--draws 20] [--twins 20] [--seed 1] [--off 0.005] [--slow] [--minutes 10]
+    python benchmarks/twins.py [--draws 20] [--twins 20] [--seed 1] [--off 0.005] [--slow] [--minutes 10] [--keep FILE]
 
 Each kind of contact is drawn with fresh masses, springs, dampers, motions and noise. An interval counts where its
 status carries no grave doubt; a claim of static friction counts where its interval lies above 1, of a stick where it
-lies above 0.
+lies above 0. With ``--keep FILE`` each rig is written down as it is done, and a second call goes on from there.
 """
 
 from __future__ import annotations
 
 import argparse
 import itertools
+import json
 import sys
 import time
 import warnings
 from collections import defaultdict
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from scipy.signal import detrend, lfilter
@@ -43,6 +45,7 @@ UNTOLD = {  # what has no true value of its own
 ROWS = (*NAMES, *(f"claim: {what}" for what in CLAIMS))
 BROKEN = "broken sensors"
 KINDS = (*stepped.KINDS, BROKEN)
+CONDITIONS = ("seed", "off", "slow", "twins")
 
 
 def truths(findings: ss.answers.Findings, rig: stepped.Rig) -> dict[str, float]:
@@ -61,7 +64,7 @@ def counted(findings: ss.answers.Findings, rig: stepped.Rig, tally: dict[str, li
     truth, wrong = truths(findings, rig), []
 
     def note(name: str, right: bool, estimate: ss.Estimate) -> None:
-        tally[name].append(right)
+        tally[name].append(bool(right))
         if not right:
             wrong.append(f"{name}: {estimate}, in truth {truth.get(estimate.name)}")
 
@@ -150,9 +153,27 @@ def broken(record: ss.Record, stated: dict, rng: np.random.Generator) -> tuple[s
     return record, stated
 
 
+def told(kind: str, draw: int, options: argparse.Namespace) -> dict[str, Any]:
+    """What is said of one rig, as plain data: of each interval and claim whether it holds, quick and tried."""
+    line: dict[str, Any] = {"kind": kind, "draw": draw, **{name: getattr(options, name) for name in CONDITIONS}}
+    seed = np.random.SeedSequence([options.seed, KINDS.index(kind)]).spawn(draw + 1)[draw]
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            rig, answers, times = asked(kind, seed, options.off, options.twins, slow=options.slow)
+    except ss.errors.StickslipError as error:
+        return {**line, "refused": str(error)}
+    tallies: list[dict[str, list[bool]]] = [defaultdict(list), defaultdict(list)]
+    wrong = [counted(answer, rig, tally) for answer, tally in zip(answers, tallies, strict=True)]
+    return {
+        **line, "seconds": times, "unlike": bool(answers[1].trial.unlike), "quick": tallies[0], "tried": tallies[1],
+        "wrong": wrong[1],
+    }  # fmt: skip
+
+
 def main() -> None:
     """Draw, ask, and print: of each draw one rig a kind, so that what there was time for is told of all alike."""
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--draws", type=int, default=20, help="of each kind")
     parser.add_argument("--twins", type=int, default=20)
     parser.add_argument("--seed", type=int, default=1)
@@ -160,40 +181,50 @@ def main() -> None:
     parser.add_argument("--slow", action="store_true", help="with slow noise of x and z beside the white one")
     parser.add_argument("--kinds", default=",".join(KINDS))
     parser.add_argument("--minutes", type=float, default=np.inf, help="after which no rig is begun")
+    parser.add_argument("--keep", type=Path, help="file of rigs asked before, to go on from, and all under it are told")
     options = parser.parse_args()
     kinds, ends = options.kinds.split(","), time.monotonic() + 60 * options.minutes
-    tallies = {kind: (defaultdict(list), defaultdict(list)) for kind in kinds}
-    lost, unlike, spent = defaultdict(int), defaultdict(int), defaultdict(list)
-    seeds = {kind: np.random.SeedSequence([options.seed, KINDS.index(kind)]).spawn(options.draws) for kind in kinds}
+    lines = kept(options)
+    done = {(line["kind"], line["draw"]) for line in lines}
     for draw, kind in itertools.product(range(options.draws), kinds):
         if time.monotonic() > ends:
             break
-        try:
-            with warnings.catch_warnings():
-                warnings.simplefilter("error")
-                rig, answers, times = asked(kind, seeds[kind][draw], options.off, options.twins, slow=options.slow)
-        except ss.errors.StickslipError as error:
-            print(f"  {kind} {draw}: {error}", flush=True)
-            lost[kind] += 1
+        if (kind, draw) in done:
             continue
-        spent[kind].append(times)
-        unlike[kind] += answers[1].trial.unlike
-        counted(answers[0], rig, tallies[kind][0])
-        for words in counted(answers[1], rig, tallies[kind][1]):
+        lines.append(told(kind, draw, options))
+        for words in filter(None, (lines[-1].get("refused"), *lines[-1].get("wrong", ()))):
             print(f"  {kind} {draw}: {words}", flush=True)
+        if options.keep:
+            with options.keep.open("a", encoding="utf-8") as file:
+                file.write(json.dumps(lines[-1]) + "\n")
     for kind in kinds:
-        told = f"{len(spent[kind])} rigs, {lost[kind]} refused, {unlike[kind]} unlike their twins"
-        print(f"{kind}: {told}; {np.round(np.mean(spent[kind] or [[0.0, 0.0]], axis=0), 2)} s quick and on twins")
-        table(*tallies[kind])
+        own = [line for line in lines if line["kind"] == kind]
+        answered = [line for line in own if "refused" not in line]
+        spent = np.round(np.mean([line["seconds"] for line in answered] or [[0.0, 0.0]], axis=0), 2)
+        unlike = sum(line["unlike"] for line in answered)
+        refused = len(own) - len(answered)
+        print(
+            f"{kind}: {len(answered)} rigs, {refused} refused, {unlike} unlike their twins; {spent} s quick, on twins"
+        )
+        table(answered)
     print("all kinds")
-    table(*({name: [held for kind in kinds for held in tallies[kind][way][name]] for name in ROWS} for way in (0, 1)))
+    table([line for line in lines if line["kind"] in kinds and "refused" not in line])
 
 
-def table(quick: dict[str, list[bool]], tried: dict[str, list[bool]]) -> None:
-    """How many there were, and how many held."""
+def kept(options: argparse.Namespace) -> list[dict[str, Any]]:
+    """What was asked before under these conditions."""
+    if options.keep is None or not options.keep.exists():
+        return []
+    lines = [json.loads(line) for line in options.keep.read_text(encoding="utf-8").splitlines()]
+    return [line for line in lines if all(line[name] == getattr(options, name) for name in CONDITIONS)]
+
+
+def table(lines: list[dict[str, Any]]) -> None:
+    """How many intervals and claims there were, and how many held."""
     for name in ROWS:
-        if quick[name] or tried[name]:
-            rows = [f"{sum(way[name]):3d} of {len(way[name]):3d}" for way in (quick, tried)]
+        quick, tried = ([held for line in lines for held in line[way].get(name, ())] for way in ("quick", "tried"))
+        if quick or tried:
+            rows = [f"{sum(way):3d} of {len(way):3d}" for way in (quick, tried)]
             print(f"    {name:34s} quick {rows[0]}   tried {rows[1]}", flush=True)
 
 
