@@ -12,6 +12,7 @@ from click.testing import CliRunner
 import stickslip as ss
 from stickslip import bench
 from stickslip.cli.program import main
+from stickslip.figures.bench import plot_calibrations
 
 RIG = ss.Rig().having("x", gain=1.02, offset=3e-5).having("load", gain=0.97, offset=0.02)
 BENCH = bench.SimulatedBench(rig=RIG, fs=1000, seed=4)
@@ -103,6 +104,18 @@ def test_the_story_says_the_constants_first_and_the_truth_beside(done: bench.Com
     assert story.lines[0].true is not None
     assert next(table.title for table in story.tables) == "What was done"
     assert {plate.name for plate in story.plates} == {"calibration"}
+    assert story.settings["sensors.a.noise"] == f"{done.known.settings()['sensors']['a']['noise']}"
+    assert not any("{" in value for value in story.settings.values())
+
+
+@pytest.mark.figures
+def test_a_sensor_without_a_zero_is_drawn_about_its_line() -> None:
+    record, known = BENCH.record("weigh"), BENCH.hand.weights
+    calibration = bench.calibrate(record, channel="load", reference=known, leaks=True)
+    assert calibration.zero is None
+    [ax] = plot_calibrations({"load": calibration}).axes
+    drawn = np.abs(ax.lines[0].get_ydata())
+    assert drawn.max() == pytest.approx(100 * calibration.nonlinearity.value, rel=1e-9)
 
 
 @pytest.mark.figures

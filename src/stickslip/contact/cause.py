@@ -358,7 +358,7 @@ def _reason(residuals: tuple[float, ...], spread: float, lag: Estimate, give: fl
         f"(95 %: {1e3 * lag.interval[0]:.3g} to {1e3 * lag.interval[1]:.3g}) after the force, by {lag.method}"
     )
     if give is not None:
-        sentence += f"; the contact gives way by {1e6 * give:.3g} um before it slides"
+        sentence += f"; the contact gives way by {1e6 * give:.3g} µm before it slides"
     return sentence + (
         f"; the lag would pass for {100 * mimicked:.0f} % of the transition speed" if mimicked > 0 else ""
     )

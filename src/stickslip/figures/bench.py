@@ -46,9 +46,9 @@ def plot_calibrations(calibrations: Mapping[str, Calibration]) -> Figure:
     """
     figure, ax = new_figure(height=3.0)
     for number, (name, calibration) in enumerate(calibrations.items()):
-        zero = calibration.zero.value if calibration.zero is not None else 0.0
-        span = np.ptp(calibration.gain.value * calibration.reference)
-        off = 100 * (calibration.levels - zero - calibration.gain.value * calibration.reference) / span
+        line = calibration.gain.value * calibration.reference
+        off = calibration.levels - line
+        off = 100 * (off - off.mean()) / np.ptp(line)
         style: Any = {"color": COLOURS[number % 4], "marker": MARKS[number % 4], "linestyle": "none"}
         ax.plot(np.arange(1, len(off) + 1) + 0.08 * number, off, label=name, **style)
     ax.axhline(0.0, color=INK, linewidth=0.8)

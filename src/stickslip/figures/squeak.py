@@ -163,9 +163,11 @@ def plot_forcing_cycle(squeaks: Squeaks) -> Figure:
     factor, unit = prefixed(motion.velocity, "m/s")
     figure, (above, below) = new_figure(2, height=4.2, heights=[1.4, 1])
     bins = np.linspace(0, 1, PHASES + 1)
-    place = np.clip(np.digitize(motion.phase, bins) - 1, 0, PHASES - 1)
+    edge = round(record.fs / motion.frequency / 2)  # half a cycle, within which the phase at an end is not known
+    known = slice(edge, len(record) - edge)
+    place, velocity = np.clip(np.digitize(motion.phase[known], bins) - 1, 0, PHASES - 1), motion.velocity[known]
     filled = np.unique(place)
-    middle = factor * np.array([float(np.median(motion.velocity[place == phase])) for phase in filled])
+    middle = factor * np.array([float(np.median(velocity[place == phase])) for phase in filled])
     label = "sliding velocity, median of the cycles"
     above.plot((bins[1:] + bins[:-1])[filled] / 2, middle, color=INK, label=label)
     above.axhline(0, color=FAINT, linewidth=0.8)

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 from stickslip.answers.experiment import ExperimentPlan
 from stickslip.answers.findings import Findings, record_name
@@ -191,12 +192,16 @@ def _first(result: Result) -> tuple[Estimate, ...]:
 
 
 def _settings(done: Commissioned) -> dict[str, str]:
-    settings = done.known.settings()
-    flat = {key: str(value) for key, value in settings.items() if not isinstance(value, dict)}
-    for name, table in settings.items():
-        if isinstance(table, dict):
-            flat |= {f"{name}.{key}": str(value) for key, value in table.items()}
-    return flat
+    """What rig.toml says, as it is written there: a key for each value; the log's as a person reads them."""
+    return dict(_flat({key: value for key, value in done.known.settings().items() if key != "log"})) | _logged(done)
+
+
+def _flat(table: Mapping[str, Any], before: str = "") -> Iterator[tuple[str, str]]:
+    for key, value in table.items():
+        if isinstance(value, Mapping):
+            yield from _flat(value, f"{before}{key}.")
+        else:
+            yield before + key, ", ".join(map(str, value)) if isinstance(value, list) else str(value)
 
 
 def _plates(done: Commissioned) -> list[Plate]:
@@ -237,7 +242,7 @@ def of_tour(tour: Tour) -> Story:
         lines=_lines(tour),
         tables=[_runs(tour), _next(tour)] if tour.proposals else [_runs(tour)],
         parts=parts,
-        settings=_log_rows(tour),
+        settings=_logged(tour.commissioned),
         data=lambda: dict(plain(_data(tour))),
         write=write,
     )
@@ -358,8 +363,8 @@ def _next(tour: Tour) -> Table:
     return Table("What to measure next", ("base", "amplitude", "tells", "by"), rows, note, folded=True)
 
 
-def _log_rows(tour: Tour) -> dict[str, str]:
-    log = tour.commissioned.known.rig.log
+def _logged(done: Commissioned) -> dict[str, str]:
+    log = done.known.rig.log
     return dict(log.rows()) if log is not None else {}
 
 

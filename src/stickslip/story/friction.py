@@ -257,7 +257,8 @@ def _of_breakaway(breakaway: Breakaway) -> Iterator[str]:
         yield f"The breakaway force is not known: {ratio.status}."
         return
     if not stands(ratio.status):
-        yield f"At breakaway it seems to bear {value_of(ratio)} times as much as while it slides."
+        most = f"at most {high:.3g}" if low < 1 else value_of(ratio)
+        yield f"At breakaway it seems to bear {most} times as much as while it slides."
         return
     more = "more than" if low > 1 + ALIKE else "less than" if high < 1 - ALIKE else "about as much as"
     sides = " and ".join(
