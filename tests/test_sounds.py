@@ -114,6 +114,17 @@ def test_a_clock_is_no_creak_and_a_tick_that_is_missed_changes_nothing() -> None
     assert not squeaks.of("creak")
 
 
+@pytest.mark.parametrize("seed", [770012, 770050, 770097])
+def test_chirps_that_swell_are_no_pulses_of_stick_slip(seed: int) -> None:
+    """A slip is sudden: pulses of hinges are there within 6 ms, chirps of birds in 9 ms or more."""
+    assert heard(sound_strangers.draw("birds", seed).values).answer == "can not be told"
+
+
+def test_one_interval_at_the_end_is_no_rate_that_wanders() -> None:
+    """Noise ended an even clock with one short interval, which counted three times at the edge."""
+    assert heard(draw("clicks", 770142).values).answer != "creaks"
+
+
 def test_a_tone_that_leaps_to_its_overtones_is_one_squeak() -> None:
     t = np.arange(int(FS)) / FS
     shape = 1 / (1 + np.exp(-(t - 0.3) / 0.004) + np.exp((t - 0.6) / 0.004))
