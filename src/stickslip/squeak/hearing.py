@@ -399,8 +399,8 @@ class Hearing:
 def pulse_train(values: Array, fs: float) -> tuple[float, float]:
     """Rate [Hz] of pulses at intervals that change slowly, and by which factor it wanders; NaN where there are none.
 
-    Two partials beat at even intervals, too: what consists of lines that stay where they are has no pulses. Nor has what
-    swells, as chirps of a bird do: a slip is sudden.
+    Two partials beat at even intervals, too: what consists of lines that stay where they are has no pulses, nor has
+    what swells, as chirps of a bird do: a slip is sudden.
     """
     from scipy.ndimage import median_filter
     from scipy.signal import find_peaks, peak_widths
