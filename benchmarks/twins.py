@@ -109,6 +109,8 @@ def asked(
     """A rig, its answers quick and tried, and the processor time of each [s]."""
     rng = np.random.default_rng(seed)
     rig = stepped.drawn("Coulomb" if kind == BROKEN else kind, rng)
+    if kind == "compliant":
+        rig = replace(rig, loss=rng.uniform(0, 0.15) * np.sqrt(rig.contact * rig.mass))
     record = stepped.record(rig, rng, noise=10 ** rng.uniform(-4, -2.3), off=off)
     for name in "xz" if slow else "":
         level = rig.amplitude * 10 ** rng.uniform(-3.3, -2.2)

@@ -24,8 +24,9 @@ class Rig:
     """A mass on a spring, shaken at its base: (kinetic + drop exp(-(|v|/speed)^exponent)) sgn v + slope v, a spring, or
     a memory.
 
-    LuGre's bristles have the stiffness `contact` and fall along the same curve; the state variable's force follows
-    Coulomb's at the `rate` [1/s]. The forces of a rigid contact stray by a share `rough` along the surface.
+    A contact that gives way has a damping `loss` [N s/m]; in slip its spring relaxes as that lets it. LuGre's bristles
+    have the stiffness `contact` and fall along the same curve; the state variable's force follows Coulomb's at the
+    `rate` [1/s]. The forces of a rigid contact stray by a share `rough` along the surface.
     """
 
     kind: str
@@ -39,6 +40,7 @@ class Rig:
     slope: float = 0.0
     speed: float = 0.0
     contact: float = 0.0
+    loss: float = 0.0
     rate: float = 0.0
     exponent: float = 1.0
     rough: float = 0.0
@@ -131,20 +133,26 @@ def _rigid(p, samples, settle, h, steps):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True)
 def _compliant(p, samples, settle, h, steps):  # type: ignore[no-untyped-def]
-    """The same of a contact that is a spring until it slides; no sticks are counted."""
-    m, k, c, amplitude, w, kinetic, stiffness = p[0], p[1], p[2], p[3], p[4], p[5], p[9]
+    """The same of a contact that is a spring beside a damper until it slides; no sticks are counted."""
+    m, k, c, amplitude, w, kinetic, stiffness, loss = p[0], p[1], p[2], p[3], p[4], p[5], p[9], p[13]
+    relaxed = np.exp(-h * stiffness / loss) if loss > 0 else 0.0  # of the deflection in slip, what a step leaves
     out = np.zeros((3, samples))
-    x, v, t, y = 0.0, 0.0, 0.0, 0.0
+    x, v, t, y, f = 0.0, 0.0, 0.0, 0.0, 0.0
     for number in range((settle + samples - 1) * steps + 1):
-        a = (k * (amplitude * np.sin(w * t) - x) - c * v - stiffness * y) / m
+        a = (k * (amplitude * np.sin(w * t) - x) - c * v - f) / m
         row = number // steps - settle
         if number % steps == 0 and row >= 0:
             out[0, row], out[1, row], out[2, row] = x, v, a
-        half_v = v + h / 2 * a  # leap-frog: the contact's spring is clipped at what it bears
+        half_v = v + h / 2 * a  # leap-frog: the contact is clipped at what it bears
         x += h * half_v
-        y = min(max(y + h * half_v, -kinetic / stiffness), kinetic / stiffness)
+        f = stiffness * (y + h * half_v) + loss * half_v
+        if abs(f) < kinetic:
+            y += h * half_v
+        else:
+            f = np.sign(f) * kinetic
+            y = f / stiffness + (y - f / stiffness) * relaxed
         t += h
-        v = (half_v + h / 2 * (k * (amplitude * np.sin(w * t) - x) - stiffness * y) / m) / (1 + h / 2 * c / m)
+        v = (half_v + h / 2 * (k * (amplitude * np.sin(w * t) - x) - f) / m) / (1 + h / 2 * c / m)
     return out, 0.0, 0
 
 
@@ -201,7 +209,7 @@ def record(
     p = np.array([
         rig.mass, rig.stiffness, rig.damping, rig.amplitude, 2 * np.pi * rig.frequency, rig.kinetic,
         max(rig.static, rig.kinetic), rig.slope, rig.speed, rig.contact, rig.rate,
-        rig.exponent, rig.rough,
+        rig.exponent, rig.rough, rig.loss,
     ])  # fmt: skip
     march = {"compliant": _compliant, "LuGre": _remembering, "state variable": _remembering}.get(rig.kind, _rigid)
     steps = 20 * STEPS if rig.kind in SOFT else STEPS

@@ -75,7 +75,24 @@ def test_a_reversal_between_two_samples_ends_a_stroke() -> None:
 def test_a_curve_that_falls_within_the_corner_is_not_told_from_static_friction() -> None:
     """A jump spoke against a curve however quickly that was run through: odds of 1e-28 on a rig whose law it was."""
     jumps, none = np.full(4, 0.3), np.empty((0, len(FALLS)))
-    told = Rests(jumps, np.ones((4, len(FALLS))), none[:, 0], none, np.full(4, 0.03)).probabilities(0.01, 0.03)
+    sure = np.full(4, 0.03)
+    told = Rests(jumps, np.ones((4, len(FALLS))), none[:, 0], none, sure, none[:, 0]).probabilities(0.01, 0.03)
     assert told["Stribeck"] == pytest.approx(told["static"])
-    slow = Rests(jumps, np.zeros((4, len(FALLS))), none[:, 0], none, np.full(4, 0.03)).probabilities(0.01, 0.03)
+    slow = Rests(jumps, np.zeros((4, len(FALLS))), none[:, 0], none, sure, none[:, 0]).probabilities(0.01, 0.03)
     assert slow["Stribeck"] < 1e-6
+
+
+def test_a_gain_that_is_off_moves_the_friction_by_its_share_of_the_forces_that_are_balanced() -> None:
+    """Springs of 8 times the friction, off by 0.8 %, had slow sliding 7 % above fast: Coulomb's law was left out."""
+    time = np.arange(8000) / FS
+    speed = TOP * np.sin(2 * np.pi * FREQUENCY * time)
+    slow = np.abs(speed) < 0.1 * TOP
+    friction = LEVEL * np.sign(speed) * np.where(slow, 1.07, 1.0)
+    forces = np.full(len(time), 8 * LEVEL)
+    told, felt = (
+        Rests.of(speed, friction, fs=FS, frequency=2 * np.pi * FREQUENCY, unsure=0.0, balanced=balanced)
+        for balanced in (forces, None)
+    )
+    assert len(told.rises) > 4
+    assert told.probabilities(0.005, 0.015)["Coulomb"] > 0.2
+    assert felt.probabilities(0.005, 0.015)["Coulomb"] < 1e-3  # of a load cell there is no such balance

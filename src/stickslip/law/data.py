@@ -40,7 +40,6 @@ HELD = 0.4  # of a radian of the motion that a contact holds at least, for a rel
 LEAST_HELD, LEAST_SLOW = 24, 8  # samples of a hold, and of slow sliding
 CORNER, AFTER = 3, 15  # samples after a release within which a sudden fall is blurred, and is over
 ROUNDED = 0.01  # of the level, that smoothing alone makes of a corner
-GAINS = 1.0  # calibrations by which the level at rest, told by the springs, is off that in sliding
 EXCESSES = np.linspace(0.0, 0.6, 121)[1:]
 FALLS = np.geomspace(0.03, 1.0, 16)  # Stribeck speed over the largest speed
 
@@ -280,6 +279,8 @@ class Rests:
         Mean of ``exp(-(v/v_s)^2)`` there, for each v_s of FALLS.
     strays : ndarray
         Of each stroke: standard deviation in fast sliding.
+    pulls : ndarray (q,)
+        How large the forces are whose balance the friction is there, and whose calibrations may be off.
     """
 
     falls: Array
@@ -287,6 +288,7 @@ class Rests:
     rises: Array
     shapes: Array
     strays: Array
+    pulls: Array
 
     @classmethod
     def of(
@@ -298,18 +300,20 @@ class Rests:
         frequency: float,
         unsure: float,
         blur: int = 1,
-        sharp: bool = True,
+        balanced: Array | None = None,
     ) -> Rests:
         """Those of one record; `unsure` [m/s] is the speed's deviation, `frequency` [rad/s] the motion's.
 
-        A fall is not told where no sensor shows it (`sharp`), where smoothing spreads it beyond its corner (`blur`
-        samples), or where the motion goes on while its samples pass: at 60 samples a cycle even a friction of one level
-        seemed to fall by its own size.
+        `balanced` [N] is how large the forces are whose balance the friction is, where no load cell tells it.
+
+        A fall is not told of forces that are balanced, where smoothing spreads it beyond its corner (`blur` samples),
+        or where the motion goes on while its samples pass: at 60 samples a cycle even a friction of one level seemed to
+        fall by its own size.
         """
-        sudden = sharp and blur <= CORNER and AFTER / fs * frequency < HELD
+        sudden = balanced is None and blur <= CORNER and AFTER / fs * frequency < HELD
         top = float(np.abs(speed).max())
         still = max(AT_REST * top, NOISY * unsure)
-        falls, sinks, rises, shapes, strays = [], [], [], [], []
+        falls, sinks, rises, shapes, strays, pulls = [], [], [], [], [], []
         ended = None
         for first, last in _strokes(speed, still, FAST * top):
             side = np.sign(speed[(first + last) // 2])
@@ -326,6 +330,7 @@ class Rests:
                 if seen and b - a >= max(LEAST_SLOW, 2 * blur) and still < CREEPING * top:
                     rises.append(float(side * friction[a:b].mean()) / level - 1)
                     shapes.append(_stribeck(speed[a:b] / top))
+                    pulls.append(1.0 if balanced is None else float(balanced[a:b].mean()) / level)
             duration = first - (first if ended is None else ended)
             if sudden and duration >= max(LEAST_HELD, HELD / frequency * fs) and first + LEAST_HELD <= len(speed):
                 begun = first - duration // 2
@@ -334,12 +339,12 @@ class Rests:
                 sinks.append(1 - _stribeck(speed[begun:][after] / top))
             ended = last
         curves = (np.array(rows).reshape(-1, len(FALLS)) for rows in (sinks, shapes))
-        return cls(np.array(falls), next(curves), np.array(rises), next(curves), np.array(strays))
+        return cls(np.array(falls), next(curves), np.array(rises), next(curves), np.array(strays), np.array(pulls))
 
     @classmethod
     def together(cls, parts: Sequence[Rests]) -> Rests:
         """Those of several records."""
-        names = ("falls", "sinks", "rises", "shapes", "strays")
+        names = ("falls", "sinks", "rises", "shapes", "strays", "pulls")
         return cls(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))
 
     @property
@@ -367,7 +372,8 @@ class Rests:
             fall, sharp, sink = float(np.median(self.falls)), self.fall.sd, np.median(self.sinks, axis=0)
         if len(self.rises) > 1:
             scatter = max(float(np.std(self.rises, ddof=1)), float(np.median(self.strays)))
-            slow = float(np.hypot(scatter / len(self.rises) ** 0.5, max(ROUNDED, GAINS * calibration)))
+            off = calibration * max(1.0, float(np.median(self.pulls)))
+            slow = float(np.hypot(scatter / len(self.rises) ** 0.5, max(ROUNDED, off)))
             rise, shape = float(self.rises.mean()), self.shapes.mean(axis=0)
         excesses = EXCESSES[np.greater(EXCESSES, least)]
         flat, still = _likely(rise / slow), _likely(fall / sharp)

@@ -399,7 +399,9 @@ class Seen(Observed):
             frictions.append(balanced["friction"][inner])
             steps.append(np.full(len(slips[-1]), 1 / balanced.fs))
             ways.append(x[inner] - x[inner].mean())
-            rests.append(_rests(balanced, speeds[-1], frictions[-1], ways[-1]))
+            # of a fall of 20 % that an accelerometer sees the sensors together leave between nothing and 19 %
+            forces = None if "load" in record else _balanced_forces(balanced, oscillator)[inner]
+            rests.append(_rests(balanced, speeds[-1], frictions[-1], ways[-1], forces))
         speed, friction = np.concatenate(speeds), np.concatenate(frictions)
         fast = np.abs(speed) > FAST * np.abs(speed).max()
         level = float(np.median((friction * np.sign(speed))[fast]))
@@ -441,14 +443,18 @@ def _excess(speed: Array, friction: Array, level: float, rests: Rests) -> float:
     return max(LEAST_EXCESS, min(1.0, reached / level - 1))
 
 
-def _rests(record: Record, speed: Array, friction: Array, way: Array) -> Rests:
+def _balanced_forces(record: Record, oscillator: Oscillator) -> Array:
+    """How large the forces are whose balance the friction is [N]: a gain that is off moves it by its share of one."""
+    springs = [oscillator.stiffness * (record[name] - record[name].mean()) for name in "xz" if name in record]
+    return np.asarray(np.linalg.norm([oscillator.mass * np.gradient(record["v"]) * record.fs, *springs], axis=0))
+
+
+def _rests(record: Record, speed: Array, friction: Array, way: Array, forces: Array | None) -> Rests:
     unsure = float(np.median(record["v_sd"])) if "v_sd" in record else 0.0
     frequency = float(np.std(speed)) / max(float(np.std(way)), 1e-300)
     width = record.rig.bandwidth if record.rig else None
     blur = math.ceil(record.fs / (2 * width)) if width else 1
-    # of a fall of 20 % that an accelerometer sees the sensors together leave between nothing and 19 %
-    sharp = "load" in record
-    return Rests.of(speed, friction, fs=record.fs, frequency=frequency, unsure=unsure, blur=blur, sharp=sharp)
+    return Rests.of(speed, friction, fs=record.fs, frequency=frequency, unsure=unsure, blur=blur, balanced=forces)
 
 
 def _balanced(record: Record, oscillator: Oscillator) -> Record:

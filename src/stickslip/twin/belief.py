@@ -32,9 +32,10 @@ from stickslip.solve.trajectory import Trajectory
 Values = Mapping[str, float]
 
 # Names of what is believed: parts of a law, and constants that may be off.
-KINETIC, SLOPE, EXCESS, GIVE, LOSS, SPEED, POWER, RATE, HELD = (
-    "kinetic", "slope", "excess", "stiffness", "loss", "speed", "exponent", "rate", "friction at the start"
+KINETIC, SLOPE, EXCESS, GIVE, LOSS, SPEED, POWER, RATE = (
+    "kinetic", "slope", "excess", "stiffness", "loss", "speed", "exponent", "rate"
 )  # fmt: skip
+HELD, BENT = "friction at the start", "deflection at the start"  # of bristles or a lag, and of a spring that slides
 MASS, SPRING, DAMPER, GAIN, LATE = "mass", "spring", "damper", "gain of x", "x late"
 DRIVE = ("drive 0", "drive 1", "drive 2")  # ways in which the measured drive may be off
 SLIPS = (LATE, GAIN, SPRING, MASS)  # what may be off by more than anybody stated
@@ -48,7 +49,9 @@ LOGARITHMS = (
     GAIN,
 )  # whose values are logarithms: of positive numbers, or of a ratio
 POSITIVE = (KINETIC, EXCESS, LOSS)
-EXPONENT = (0.35, 0.35)  # logarithm of a Stribeck curve's, and its uncertainty: Tustin's is 1, Gauss's 2
+# What is known beforehand: the logarithm of a Stribeck curve's exponent (Tustin's is 1, Gauss's 2), and that a
+# deflection is no more than that of sliding: one that x does not tell would be drawn far, a velocity balancing it.
+KNOWN = {POWER: (0.35, 0.35), BENT: (0.0, 1.0)}
 POWERS = (math.log(0.5), math.log(4.0))  # between which the logarithm of the exponent is looked for
 FALLS = (3e-3, 10.0)  # Stribeck speed over the largest speed: below it is static friction, above a line
 STEEP = 1e-3  # of the largest speed, at which the backbone of a friction that lags has turned over: as good as a jump
@@ -83,7 +86,8 @@ class Belief:
         What is believed: where the mass begins ("x" [m], "v" [m/s]), the law's parts ("kinetic" [N], "slope" [N s/m],
         "excess" of static over sliding friction [N], logarithms of contact "stiffness" [N/m], of Stribeck "speed"
         [m/s] and "exponent", or of the "rate" [1/s] at which friction follows; the contact's "loss" c / sqrt(K m); the
-        "friction at the start" over the sliding one), and by how much a constant is off, or x late [s].
+        "friction at the start" over the sliding one, or the "deflection at the start" over that of sliding), and by
+        how much a constant is off, or x late [s].
     drive : DriveFrom
         The motion of the base, or the force, as it was recorded.
     rig : Rig
@@ -200,7 +204,7 @@ class Belief:
     def priors(self) -> Mapping[str, tuple[float, float]]:
         """Mean and standard deviation of the values of which something is known beforehand."""
         constants = {name: (0.0, sd) for name, sd in self.unsure.items()}
-        return {**constants, POWER: EXPONENT} if POWER in self.values else constants
+        return {**constants, **{name: known for name, known in KNOWN.items() if name in self.values}}
 
     @property
     def oscillator(self) -> Oscillator:
@@ -239,7 +243,7 @@ class Belief:
 
     def ends(self, name: str) -> tuple[float, float]:
         """Between which a value lies."""
-        if name == HELD:
+        if name in (HELD, BENT):
             return -1.0, 1.0
         if name == SPEED:
             fastest = _sizes(self.record).fastest
@@ -302,7 +306,7 @@ class Belief:
             return _sizes(self.record).x if name == "x" else _sizes(self.record).v
         if name in self.unsure:
             return max(NUDGE, self.unsure[name])
-        if name in (*LOGARITHMS, LOSS, HELD):
+        if name in (*LOGARITHMS, LOSS, HELD, BENT):
             return 1.0
         if name == LATE:
             return 1 / self.record.fs
@@ -427,7 +431,7 @@ class Belief:
         elif isinstance(law, Dahl):
             begun["force_state"] = held
         elif isinstance(law, CompliantContact):
-            begun["anchor"] = values["x"] - held / self.contact
+            begun["anchor"] = values["x"] - values.get(BENT, 0.0) * law.kinetic / self.contact
         return begun
 
     @property

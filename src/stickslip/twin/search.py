@@ -23,6 +23,7 @@ from stickslip.rig.sensor import Digitiser, Mount, Noise, Sensor
 from stickslip.signals.noise import noise_level, quantisation_step
 from stickslip.statistics import least_squares
 from stickslip.twin.belief import (
+    BENT,
     DAMPER,
     DRIVE,
     EXCESS,
@@ -191,7 +192,10 @@ def _richer(simple: Belief, mapped: Map) -> Belief:
     # their chances say nothing of each other: each counts as many independent samples as its own residual has
     best = _simplest([law for law in laws if _by_chance(simple, law) < CHANCE] or [simple])
     if GIVE in best.values:
-        laws += _led_by(_softer(best), simple.record, mapped)
+        softer = _led_by(_softer(best), simple.record, mapped)
+        damped = [replace(law, held="") for law in softer if law.held == LOSS]
+        laws += [law for law in softer if law.held != LOSS]
+        laws += _unlike(sorted(mapped(partial(_over, record=simple.record), damped), key=misfit))
         best = _simplest([law for law in laws if {GIVE, RATE} & law.values.keys()])
     if SPEED in best.values:
         laws += _led_by(_stretched(best), simple.record, mapped)
@@ -357,7 +361,7 @@ def _parts(simple: Belief) -> list[list[Belief]]:
     levels += [simple.values[KINETIC]] if KINETIC in simple.values else []
     static = [{KINETIC: level, EXCESS: excess * level, SLOPE: 0.0} for level in levels for excess in EXCESSES]
     give = [
-        {KINETIC: level, GIVE: math.log(level / (share * furthest)), SLOPE: 0.0}
+        {KINETIC: level, GIVE: math.log(level / (share * furthest)), BENT: 0.0, SLOPE: 0.0}
         for share in DEFLECTIONS
         for level in levels
     ]
@@ -375,13 +379,14 @@ def _softer(give: Belief) -> list[list[Belief]]:
     """Beginnings of what else may look like a contact that gives way: one with a damping, bristles, or a lag."""
     record = give.record
     furthest, fastest = (float(np.max(np.abs(record[name]))) for name in "xv")
-    damped = [give.as_stated().at(**{LOSS: loss}) for loss in LOSSES]
+    # first beside a stiffness that suits it: moved at once, it was led back to none, a stiffness 25 % too large
+    damped = [[replace(give.as_stated().at(**{LOSS: loss}), held=LOSS)] for loss in LOSSES]
     bristles = [begun for excess in EXCESSES[1:4] for begun in _bristles(give, excess)]
     # x may tell bristles from a spring, and nothing of how their friction falls
     level = [_slid(give).at(**{KINETIC: part * give.values[KINETIC]}) for part in LEVELS]
     rates = [math.log(rate * fastest / furthest) for rate in RATES]
     lags = [_slid(give).without(GIVE).at(**{RATE: rate}) for rate in rates]
-    return [damped, level, bristles, lags]
+    return [*damped, level, bristles, lags]
 
 
 def _falling(give: Belief) -> list[list[Belief]]:
@@ -392,7 +397,8 @@ def _falling(give: Belief) -> list[list[Belief]]:
 
 def _slid(give: Belief) -> Belief:
     """The same in a record that begins as it slides."""
-    return give.as_stated().without(SLOPE).at(**{HELD: float(np.sign(give.record["v"][0]))})
+    sliding = give.as_stated().without(SLOPE).without(LOSS).without(BENT)
+    return sliding.at(**{HELD: float(np.sign(give.record["v"][0]))})
 
 
 def _bristles(give: Belief, excess: float, speeds: tuple[float, ...] = SPEEDS) -> list[Belief]:
