@@ -234,7 +234,10 @@ def test_thrown_straight_up_a_steep_slope_it_sticks_below_static_friction_and_tu
 
 @pytest.mark.parametrize("frequency", [0.4, 2.0])
 def test_a_force_that_turns_carries_the_mass_on_a_circle(frequency: float) -> None:
-    """P^2 = ((k - m w^2) A)^2 + (c w A + F)^2: friction, tangential, adds to the damper; below F nothing moves."""
+    """P^2 = ((k - m w^2) A)^2 + (c w A + F)^2: friction, tangential, adds to the damper; below F nothing moves.
+
+    Griffin and Menq, J. Vib. Acoust. 113 (1991), beside a damper.
+    """
     mass, stiffness, friction, force, damping = 2.0, 50.0, 3.0, 20.0, 2.0
     omega = 2 * math.pi * frequency
     drives = [HarmonicForce(force, frequency=frequency, phase=phase) for phase in (0.0, -math.pi / 2)]
