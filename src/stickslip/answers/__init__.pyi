@@ -1,3 +1,5 @@
+from stickslip.answers.arm import without_bodies as without_bodies
+from stickslip.answers.axes import axis_record as axis_record
 from stickslip.answers.decays import Decay as Decay
 from stickslip.answers.decays import compare_decays as compare_decays
 from stickslip.answers.experiment import ExperimentPlan as ExperimentPlan
@@ -13,7 +15,6 @@ from stickslip.answers.frequencies import TimeFrequency as TimeFrequency
 from stickslip.answers.frequencies import time_frequency as time_frequency
 from stickslip.answers.machines import analyze_joint as analyze_joint
 from stickslip.answers.machines import analyze_tribometer as analyze_tribometer
-from stickslip.answers.machines import axis_record as axis_record
 from stickslip.answers.machines import compare_joints as compare_joints
 from stickslip.answers.machines import compare_tribometers as compare_tribometers
 from stickslip.answers.machines import episodes as episodes

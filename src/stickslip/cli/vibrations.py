@@ -45,6 +45,11 @@ BLOCK = 1_000_000  # rows of a part that is mapped: spikes and sticks are asked 
 @click.option("--gravity/--no-gravity", default=None, help="Whether gravity acts on it; of an angle yes unless said.")
 @click.option("--axis", metavar="NAME", help="Which axis of a log of several: a part of its columns' names.")
 @click.option(
+    "--urdf",
+    metavar="FILE",
+    help='The robot that --axis is a joint of, "arm.urdf ± 2 %": what its bodies take of the torque is taken off.',
+)
+@click.option(
     "--propose",
     type=click.Path(path_type=Path, dir_okay=False),
     metavar="FILE",
@@ -70,9 +75,12 @@ def joint(files: tuple[str, ...], output: Output, propose: Path | None, **option
     stickslip joint shoulder.csv --torque-constant "0.87 N m/A"
     stickslip joint shoulder.csv --kp "17.8 N m/rad" --propose next.csv
     stickslip joint "shoulder_*.csv"
+    stickslip joint walk.mcap --urdf arm.urdf --axis elbow
     stickslip joint episode.parquet --axis 2 --kp "17.8 N m/rad" --units "observation.state.2=deg"
     """
-    names, axis = ("inertia", "kp", "kd", "torque_constant", "gravity"), options.pop("axis")
+    names, axis, urdf = ("inertia", "kp", "kd", "torque_constant", "gravity"), options.pop("axis"), options.pop("urdf")
+    if urdf is not None and axis is None:
+        raise click.BadParameter("which of the robot's joints? name it by --axis", param_hint="--urdf")
     stated = {name: options.pop(name) for name in names}
     if propose is not None and propose.exists():
         raise click.BadParameter(f"'{propose}' is there already; name another file", param_hint="--propose")
@@ -83,7 +91,7 @@ def joint(files: tuple[str, ...], output: Output, propose: Path | None, **option
     def ask(record: Record) -> list[Findings]:
         parts = list(ss.answers.episodes(record))
         names = [f", {part.history[-1].outcome}" if len(parts) > 1 else "" for part in parts]
-        joints = [ss.answers.analyze_joint(part, **stated, axis=axis) for part in parts]
+        joints = [ss.answers.analyze_joint(part, **stated, axis=axis, urdf=urdf) for part in parts]
         return [replace(one, name=one.name + name) for one, name in zip(joints, names, strict=True)]
 
     def together(findings: list[list[Findings]]) -> Findings | Comparison:

@@ -199,7 +199,8 @@ def regress_joint(
     record : Record
         With ``theta`` [rad] (or ``x`` [m], of an axis that moves straight: its force is then in N) and one of
         ``force``, ``current`` [A] or ``reference``; with ``motor``, the angle before the gear in any unit, it is that
-        of the link; with ``temperature`` [K], friction is told over it. Delays stated for them are taken out first.
+        of the link; with ``temperature`` [K], friction is told over it; with ``bodies`` [N m], what a robot's bodies
+        take of the torque is taken off. Delays stated for them are taken out first.
     inertia : float, str, tuple or Estimate, optional
         Moment of inertia [kg m^2]; regressed where it is not stated.
     kp, kd : float, str, tuple or Estimate, optional
@@ -207,7 +208,7 @@ def regress_joint(
     torque_constant : float, str, tuple or Estimate, optional
         Torque per current [N m/A], at the joint.
     gravity : bool, optional
-        Whether gravity may act: of an angle yes, of a displacement no, where left out.
+        Whether gravity may act: of an angle yes, of a displacement or beside `bodies` no, where left out.
 
     Returns
     -------
@@ -393,6 +394,8 @@ def _rows(
     slides, position = data.logs[0].sliding, data.logs[0].position
     speed, acceleration = (slides.at(data.logs[0].turned, order) for order in (1, 2))
     weight = pull[0] * slides.at(np.sin(position)) + pull[1] * slides.at(np.cos(position))
+    if "bodies" in record:
+        weight = weight + slides.at(record["bodies"])
     return {
         "time": record.start + slides.rows / record.fs,
         "speed": speed / slides.weights,

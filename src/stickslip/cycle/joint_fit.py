@@ -300,7 +300,8 @@ def joint_data(
         )
     constants = _constants(record, **given)
     record = _torqued(record, constants)
-    return record, _data_of(record, constants, turning(record) if gravity is None else gravity, slowly)
+    pulled = turning(record) and "bodies" not in record if gravity is None else gravity
+    return record, _data_of(record, constants, pulled, slowly)
 
 
 def turning(record: Record) -> bool:
@@ -385,6 +386,9 @@ def _data_of(record: Record, constants: dict[str, Estimate], gravity: bool, slow
             terms.append("damping")
     if scale is not None:
         unsure.append(scale.sd / scale.value * torque)
+    if "bodies" in record:
+        taken = slides.at(record["bodies"])
+        known, unsure = known + taken, [*unsure, record.channels["bodies"].gain_sd * taken]
     gain_sd = max((record.channels[name].gain_sd for name in ("force", "current") if name in record), default=0.0)
     unsure.append(gain_sd * torque)
     return JointData((log,), torque, tuple(terms), source, np.asarray(raw), known, tuple(unsure), constants)

@@ -54,7 +54,7 @@ class Spec:
 
 def split_spec(text: str) -> Spec:
     """Take ``"ARITHMETIC [UNIT] @ SENSITIVITY ± PERCENT"`` apart; all but the arithmetic may be missing."""
-    before, gain_sd = _gain(text) if len(text) <= LONGEST else (text, 0.0)
+    before, gain_sd = split_gain(text) if len(text) <= LONGEST else (text, 0.0)
     match = re.fullmatch(r"\s*(.*?)\s*(?:\[([^\[\]]*)\]\s*)?(?:@\s*([^@\[\]]+?)\s*)?", before, re.DOTALL)
     if match is None or not match[1] or len(text) > LONGEST:
         raise RecordError(
@@ -93,7 +93,7 @@ def shifted(text: str, by: float, channel: str) -> str:
     return text.replace(spec.arithmetic, f"({spec.arithmetic}) {'-' if off > 0 else '+'} {abs(off):.6g}", 1)
 
 
-def _gain(text: str) -> tuple[str, float]:
+def split_gain(text: str) -> tuple[str, float]:
     """What stands before the uncertainty of a gain, and that as a part of it; ``a +- b`` is arithmetic."""
     match = re.fullmatch(rf"(.*){PLUS_MINUS}\s*([^\[\]@]*)", text, re.DOTALL)
     if match is None or not ("%" in match[2] or re.search(r"\]\s*$|@", match[1])):

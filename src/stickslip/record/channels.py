@@ -34,6 +34,7 @@ VOCABULARY: dict[str, Quantity] = {
     "reference": Quantity("position that a controller is told to reach", ("rad", "m")),
     "motor": Quantity("position of a motor before its gear (unit 1: in counts)", ("rad", "m", "1")),
     "current": Quantity("motor current", ("A",)),
+    "bodies": Quantity("torque that the bodies of a robot take of a joint's", ("N m", "N")),
     "temperature": Quantity("temperature", ("K",)),
     "sound": Quantity("sound pressure (unit 1: not calibrated)", ("Pa", "1")),
     "y": Quantity("displacement in the normal direction", ("m",)),
