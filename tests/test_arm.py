@@ -98,7 +98,7 @@ def log(seed: int = 1, *, noise: float = 0.05, counts: int = 2**16) -> ss.Record
 def test_bodies_take_what_lagranges_equations_say(urdf: Path, axis: str) -> None:
     _, q, v, a = moved()
     exact = bodies(q, v, a)[0 if axis.startswith("shoulder") else 1]
-    record = ss.answers.without_bodies(log(noise=0.0, counts=2**26), urdf, axis=axis)
+    record = ss.answers.without_bodies(log(noise=0.0, counts=2**26), urdf=urdf, axis=axis)
     missed = (record["bodies"] - exact)[100:-100] / np.ptp(exact)
     assert np.sqrt(np.mean(missed**2)) < 1e-3, "what smoothing leaves"
     assert np.max(np.abs(missed)) < 4e-3
@@ -120,7 +120,7 @@ def test_mujoco_says_the_same(urdf: Path) -> None:
 @pytest.mark.parametrize("axis", list(FRICTION))
 def test_the_friction_of_each_axis_is_what_is_left(urdf: Path, axis: str) -> None:
     forward, back, viscous, rotor = FRICTION[axis]
-    findings = ss.answers.analyze_joint(log(), axis=axis, urdf=urdf)
+    findings = ss.answers.analyze_joint(ss.answers.without_bodies(log(), urdf=urdf, axis=axis))
     joint = findings.joint
     assert joint.forward.includes(forward)
     assert joint.back.includes(back)
@@ -135,7 +135,7 @@ def test_the_friction_of_each_axis_is_what_is_left(urdf: Path, axis: str) -> Non
 def test_without_its_bodies_an_arm_is_told_wrongly(urdf: Path) -> None:
     """Gravity of one angle alone does not tell what the elbow's motion pulls at the shoulder."""
     alone = ss.answers.analyze_joint(log(), axis="shoulder").joint
-    whole = ss.answers.analyze_joint(log(), axis="shoulder", urdf=urdf).joint
+    whole = ss.answers.analyze_joint(ss.answers.without_bodies(log(), urdf=urdf, axis="shoulder")).joint
     assert alone.residual > 10 * whole.residual
 
 
@@ -144,8 +144,8 @@ def test_how_unsure_the_bodies_are_is_in_the_intervals(urdf: Path) -> None:
     heavy = urdf.with_name("heavy.urdf")
     heavier = [(1.02 * part[0], *part[1:3], 1.02 * part[3]) for part in (UPPER, FORE)]
     heavy.write_text(URDF.format(*heavier, 1.02 * HAND), encoding="utf-8")
-    told = ss.answers.analyze_joint(log(), axis="shoulder", urdf=f"{heavy} ± 2 %").joint
-    sure = ss.answers.analyze_joint(log(), axis="shoulder", urdf=heavy).joint
+    told = ss.answers.analyze_joint(ss.answers.without_bodies(log(), urdf=f"{heavy} ± 2 %", axis="shoulder")).joint
+    sure = ss.answers.analyze_joint(ss.answers.without_bodies(log(), urdf=heavy, axis="shoulder")).joint
     forward, back, viscous, rotor = FRICTION["shoulder"]
     for estimate, truth in ((told.forward, forward), (told.back, back), (told.viscous, viscous), (told.inertia, rotor)):
         assert estimate.includes(truth)
@@ -177,4 +177,4 @@ def test_a_robot_that_does_not_fit_is_refused(tmp_path: Path, text: str, axis: s
     file = tmp_path / "robot.urdf"
     file.write_text(text, encoding="utf-8")
     with pytest.raises(ss.StickslipError, match=rule):
-        ss.answers.without_bodies(log(), file, axis=axis)
+        ss.answers.without_bodies(log(), urdf=file, axis=axis)

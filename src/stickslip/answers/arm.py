@@ -21,7 +21,7 @@ from stickslip.signals.derivatives import differentiate, smooth
 SMOOTHED = 2e-3
 
 
-def without_bodies(record: Record, urdf: str | Path, *, axis: str) -> Record:
+def without_bodies(record: Record, *, urdf: str | Path, axis: str) -> Record:
     r"""One axis of a robot's log, with the torque that the robot's bodies take of it.
 
     That torque is the axis's row of :math:`M(q)\ddot q + C(q, \dot q)\dot q + g(q)`, by the recursive Newton-Euler
@@ -61,7 +61,7 @@ def without_bodies(record: Record, urdf: str | Path, *, axis: str) -> Record:
     >>> text = f'<robot name="bar">{bar}<joint name="hinge" type="continuous">{hinge}</joint></robot>'
     >>> characters = urdf.write_text(text, encoding="utf-8")
     >>> log = Record.of({"position_hinge": np.linspace(-0.5, 0.5, 1001)}, fs=100, units={"position_hinge": "rad"})
-    >>> round(float(without_bodies(log, urdf, axis="hinge")["bodies"][500]), 3)  # m g r, where it is level
+    >>> round(float(without_bodies(log, urdf=urdf, axis="hinge")["bodies"][500]), 3)  # m g r, where it is level
     1.962
     """
     pinocchio = package("pinocchio", extra="arm", rule="it computes what a URDF's bodies take", error=ModelError)

@@ -6,12 +6,10 @@ import itertools
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from stickslip.answers.arm import without_bodies
 from stickslip.answers.axes import axis_record
 from stickslip.answers.findings import Comparison, Findings, Inquiry, flagged, record_name, require_several, with_doubt
 from stickslip.cycle.joint import JointFriction, regress_joint
@@ -43,7 +41,6 @@ def analyze_joint(
     torque_constant: Constant | None = None,
     gravity: bool | None = None,
     axis: str | None = None,
-    urdf: str | Path | None = None,
 ) -> Findings:
     """Ask a joint's log every question about its friction that its columns allow.
 
@@ -56,16 +53,14 @@ def analyze_joint(
     ----------
     record : Record
         A log of positions with a torque, a current or the controller's reference; its channels as :func:`read_record`
-        names them, or ``theta``, ``reference``, ``force`` and ``current``.
+        names them, or ``theta``, ``reference``, ``force`` and ``current``; a joint of an arm from
+        :func:`~stickslip.answers.without_bodies`.
     inertia, kp, kd, torque_constant : float, str, tuple or Estimate, optional
         What is known of the joint, as "0.021 ± 0.001 kg m^2", "17.8 N m/rad", "0.6 N m s/rad", "0.87 N m/A".
     gravity : bool, optional
         Whether gravity may act on it; of an angle yes, unless said.
     axis : str, optional
         Which axis, where the log has several: what tells it in the columns' names.
-    urdf : path, optional
-        The robot of which `axis` is a joint: what its bodies take of the torque is taken off
-        (:func:`~stickslip.answers.without_bodies`); with how unsure that is, ``"arm.urdf ± 2 %"``.
 
     Returns
     -------
@@ -95,7 +90,7 @@ def analyze_joint(
     require_record(record)
     given = {"inertia": inertia, "kp": kp, "kd": kd, "torque_constant": torque_constant}
     faults, name, inquiry = tuple(record.check()), record_name(record), Inquiry()
-    log = axis_record(record, axis=axis) if urdf is None else without_bodies(record, urdf, axis=axis or "")
+    log = axis_record(record, axis=axis)
     log = without_delays(log, question="the friction of a joint")
     joint = regress_joint(log, gravity=gravity, **given)
     whole = _with_friction(log, joint)

@@ -91,7 +91,8 @@ def joint(files: tuple[str, ...], output: Output, propose: Path | None, **option
     def ask(record: Record) -> list[Findings]:
         parts = list(ss.answers.episodes(record))
         names = [f", {part.history[-1].outcome}" if len(parts) > 1 else "" for part in parts]
-        joints = [ss.answers.analyze_joint(part, **stated, axis=axis, urdf=urdf) for part in parts]
+        logs = [part if urdf is None else ss.answers.without_bodies(part, urdf=urdf, axis=axis) for part in parts]
+        joints = [ss.answers.analyze_joint(log, **stated, axis=None if urdf else axis) for log in logs]
         return [replace(one, name=one.name + name) for one, name in zip(joints, names, strict=True)]
 
     def together(findings: list[list[Findings]]) -> Findings | Comparison:
