@@ -81,7 +81,7 @@ def test_stiffness_and_give_hold_the_truth(frequency: float) -> None:
         assert cause.stiffness.includes(192000)
         assert cause.give.includes(give)
         assert cause.give.includes(cause.give.value)
-        assert f"{1e6 * cause.give.value:.3g} um" in cause.reason
+        assert f"{1e6 * cause.give.value:.3g} µm" in cause.reason
     assert cause.stiffness == ss.contact_stiffness(fused)
     assert "a damper in the contact" in ss.contact.lag_or_compliance(record).stiffness.status  # type: ignore[union-attr]
 
