@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -13,7 +14,7 @@ import stickslip as ss
 from scripts import loaded
 from stickslip import bench
 from stickslip.bench.calibration import find_holds
-from stickslip.bench.free import damper_of
+from stickslip.bench.free import coupled_mode, damper_of
 from stickslip.estimate import kinds
 from stickslip.story.words import value_of
 
@@ -375,3 +376,17 @@ def test_a_force_that_wanders_off_leaves_the_damper_as_it_is(seed: int) -> None:
     assert modes.damping.value == pytest.approx(3.0, rel=1e-3)
     assert modes.damping.includes(3.0)
     assert modes.status == "ok"
+
+
+def test_what_hardly_swings_is_no_ringing_of_the_contact():
+    """A misfit as of a mode of 89 Hz that dies at once bore the contact's name, beside one that rings at 33 Hz."""
+    contact = ss.laws.CompliantContact(1.1, stiffness=192000, damping=23.9)
+    slider = ss.Oscillator(mass=2.42, stiffness=2310, damping=0.12, law=contact)
+    run = ss.simulate(slider, duration=2.0, start={"x": 2.3e-3})
+    record = ss.Rig().having("a", white=0.004).measure(run, fs=4000, rng=1)
+    ringing = bench.onto_stick(record, mass=2.42, stiffness=2310).ringing
+    rings = coupled_mode(ringing)
+    dead = ss.Estimate.normal("damping ratio", 0.8, sd=0.006, unit="1", method="made up")
+    late = ss.Estimate.normal("frequency", 89.0, sd=1.4, unit="Hz", method="made up")
+    seen = replace(rings, name="resonance seen by a and load")
+    assert coupled_mode(replace(ringing, resonances=(seen, replace(rings, frequency=late, damping=dead)))) is seen
