@@ -69,18 +69,13 @@ def without_bodies(record: Record, *, urdf: str | Path, axis: str) -> Record:
     file = Path(text.strip())
     model = _model(pinocchio, file)
     names = list(model.names)[1:]
-    chosen = [name for name in names if fits(name, axis)]
-    chosen = [name for name in chosen if name == axis] or chosen
-    if len(chosen) != 1:
-        raise ModelError(
-            f"axis = {axis!r} fits {len(chosen)} of {', '.join(names)}", "one joint is asked for at a time", "name one"
-        )
+    chosen = _chosen(names, axis)
     logs = {name: _axis(record, name) for name in names}
-    log = logs[chosen[0]]
+    log = logs[chosen]
     if log is None:
-        raise RecordError(f"the log has no position of {chosen[0]}", "it is that joint's", "see its columns")
+        raise RecordError(f"the log has no position of {chosen}", "it is that joint's", "see its columns")
     moves = {name: part for name, part in logs.items() if part is not None}
-    torque = _torques(pinocchio, model, moves, record.fs)[names.index(chosen[0])]
+    torque = _torques(pinocchio, model, moves, record.fs)[names.index(chosen)]
     resting = [name for name in names if name not in moves]
     outcome = f"of {', '.join(moves)}" + (f"; {', '.join(resting)} taken to rest" if resting else "")
     unit = "N" if "x" in log else "N m"
@@ -103,6 +98,16 @@ def _model(pinocchio: Any, urdf: Path) -> Any:
             "give a robot of such joints",
         )
     return model
+
+
+def _chosen(names: list[str], axis: str) -> str:
+    """The joint that is called so, or the one of whose name that is a part."""
+    chosen = [name for name in names if name == axis] or [name for name in names if fits(name, axis)]
+    if len(chosen) != 1:
+        raise ModelError(
+            f"axis = {axis!r} fits {len(chosen)} of {', '.join(names)}", "one joint is asked for at a time", "name one"
+        )
+    return chosen[0]
 
 
 def _axis(record: Record, name: str) -> Record | None:
