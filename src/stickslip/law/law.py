@@ -174,12 +174,13 @@ def answered(
     for j in range(len(problem.stretches)):
         stretch, time, measured, fitted = problem.mounted(point.u, j), {}, {}, {}
         gains = problem.sensor_knobs(point.u, "gain", j)
-        for sensor, raw in zip(stretch.sensors, point.raw[j], strict=True):
+        for sensor, raw, passed in zip(stretch.sensors, point.raw[j], point.passed[j], strict=True):
             name = sensor.channel.name
-            left = sensor.readings - gains.get(name, 1.0) * raw
-            left = left - sensor.known @ (sensor.known.T @ left)
+            beside = sensor.readings - gains.get(name, 1.0) * raw
+            left = sensor.noise * sensor.freed(beside, passed)
             time[name] = shown[stretch.record].record.time[sensor.rows]
-            measured[name], fitted[name] = sensor.readings, sensor.readings - left
+            measured[name] = sensor.readings
+            fitted[name] = sensor.readings - sensor.less_known(beside, passed)
             sums[name] = sums.get(name, 0.0) + float(left @ left)
             counts[name] = counts.get(name, 0) + len(left)
             noise[name] = math.hypot(noise.get(name, 0.0), sensor.noise * math.sqrt(len(left)))

@@ -12,7 +12,7 @@ import numpy as np
 
 from stickslip.arrays import Array, Index
 from stickslip.errors import ModelError
-from stickslip.law.stretch import DRIVES, Motion, Sampled, Sensor, Stretch, attempted, remembered
+from stickslip.law.stretch import DRIVES, Motion, Sampled, Sensor, Stretch, attempted, clear, remembered
 from stickslip.laws.rough import RoughSurface
 from stickslip.oscillator import Oscillator
 from stickslip.solve.sensitivity import sensitivity
@@ -92,8 +92,8 @@ class Point:
         drive is off.
     raw : tuple of tuple of ndarray
         What each sensor of each stretch would read with a gain of one.
-    pieces : tuple
-        The pieces of its run that each row falls in, where its reading may jump.
+    passed : tuple
+        How many events of its run each row has passed, where its reading may jump.
     runs : tuple of Trajectory
         The motion of each stretch.
     residuals : tuple of ndarray
@@ -106,7 +106,7 @@ class Point:
     u: Array
     starts: tuple[Array, ...]
     raw: tuple[tuple[Array, ...], ...]
-    pieces: tuple[tuple[Index | None, ...], ...]
+    passed: tuple[tuple[Index | None, ...], ...]
     runs: tuple[Trajectory, ...]
     residuals: tuple[Array, ...]
     chi2: float
@@ -197,15 +197,16 @@ class Problem:
         return states
 
     def own(self, starts: Sequence[Array]) -> tuple[Array, ...]:
-        """Starts of the same stretches with another trust in the drive: the states alone, the drive as measured."""
-        return tuple(
-            np.append(start[: len(scale)], np.zeros(len(stretch.drive.unsure)))
-            for start, scale, stretch in zip(starts, self.scales, self.stretches, strict=True)
-        )
+        """Starts of the same stretches with another trust in the drive, which is off in as many ways as it may be."""
+        own = []
+        for start, scale, stretch in zip(starts, self.scales, self.stretches, strict=True):
+            wanted = len(scale) + len(stretch.drive.unsure)
+            own.append(np.pad(start[:wanted], (0, max(0, wanted - len(start)))))
+        return tuple(own)
 
     def at(self, u: Array, starts: tuple[Array, ...]) -> Point:
         """Simulate all stretches; chi squared is infinite where the engine refuses."""
-        raw, pieces, runs, residuals = [], [], [], []
+        raw, passed, runs, residuals = [], [], [], []
         try:
             system = self.system(u)
         except ModelError:
@@ -219,16 +220,16 @@ class Problem:
             runs.append(run)
             read = stretch.told(run, delays)
             raw.append(tuple(values for values, _ in read))
-            pieces.append(tuple(piece for _, piece in read))
+            passed.append(tuple(events for _, events in read))
             left = [
-                sensor.freed(sensor.readings - gains.get(sensor.channel.name, 1.0) * values)
-                for sensor, values in zip(stretch.sensors, raw[-1], strict=True)
+                sensor.freed(sensor.readings - gains.get(sensor.channel.name, 1.0) * values, events)
+                for sensor, (values, events) in zip(stretch.sensors, read, strict=True)
             ]
             residuals.append(np.concatenate([*left, -off / stretch.drive.unsure]))
         residuals[0] = np.append(residuals[0], self._trust() @ ([knob.mean for knob in self.knobs] - u))
         chi2 = sum(float(r @ r) for r in residuals)
         chi2 = chi2 if math.isfinite(chi2) else math.inf
-        return Point(u, starts, tuple(raw), tuple(pieces), tuple(runs), tuple(residuals), chi2)
+        return Point(u, starts, tuple(raw), tuple(passed), tuple(runs), tuple(residuals), chi2)
 
     def _trust(self) -> Array:
         """Rows that hold what is known beforehand to it, over the coordinates."""
@@ -257,7 +258,7 @@ class Problem:
             motion = stretch.motion(point.runs[j])
             for s, (sensor, part) in enumerate(zip(stretch.sensors, rows, strict=True)):
                 gain = gains.get(sensor.channel.name, 1.0)
-                columns = sensor.freed(gain * changed[s])
+                columns = sensor.freed(gain * changed[s], point.passed[j][s])
                 shared[part, moving], own[part] = columns[:, : len(moving)], columns[:, len(moving) :]
                 for k, knob in enumerate(self.knobs):
                     whose = (sensor.channel.name, *DRIVES)
@@ -273,15 +274,13 @@ class Problem:
     def _sensed(self, point: Point, at: tuple[int, int, int], motion: Motion, sensor: Sensor, gain: float) -> Array:
         """Derivative of what sensor s of stretch j would read by knob k, which is its own."""
         j, s, k = at
-        knob, raw = self.knobs[k], point.raw[j][s]
+        knob, raw, passed = self.knobs[k], point.raw[j][s], point.passed[j][s]
         if knob.kind == "gain":
-            return sensor.freed(knob.scale * raw)
+            return sensor.freed(knob.scale * raw, passed)
         moved = point.u + STEP * np.eye(len(self.knobs))[k]
         near = self.mounted(moved, j).sensors[s]
-        read, piece = near.predicted(motion, self.delays(moved, j)[sensor.channel.name])
-        if piece is not None:  # a jump that has crossed a sample has no slope
-            read = np.where(piece == point.pieces[j][s], read, raw)
-        left, beside = sensor.freed(sensor.readings - gain * raw), near.freed(sensor.readings - gain * read)
+        read, _ = near.predicted(motion, self.delays(moved, j)[sensor.channel.name])
+        left, beside = (one.freed(sensor.readings - gain * told, passed) for one, told in ((sensor, raw), (near, read)))
         return np.asarray((left - beside) / STEP)
 
     def _changed(self, point: Point, j: int, moving: Sequence[int], system: Oscillator) -> list[Array] | None:
@@ -331,7 +330,7 @@ class Problem:
                 [
                     # a jump that has crossed a sample has no slope
                     (near - raw) / STEP * (1.0 if here is None or there is None else here == there)
-                    for (near, there), raw, here in zip(read, point.raw[j], point.pieces[j], strict=True)
+                    for (near, there), raw, here in zip(read, point.raw[j], point.passed[j], strict=True)
                 ]
             )
         return [np.column_stack(parts) for parts in zip(*columns, strict=True)]
@@ -392,9 +391,9 @@ def secant(slopes: Sequence[Slopes], point: Point, tried: Point) -> tuple[list[S
         wrong = point.residuals[j] - tried.residuals[j] - guessed
         foretold -= float(np.sum((point.residuals[j] - guessed) ** 2))
         row = 0
-        for here, there, values in zip(point.pieces[j], tried.pieces[j], point.raw[j], strict=True):
+        for here, there, values in zip(point.passed[j], tried.passed[j], point.raw[j], strict=True):
             if here is not None and there is not None:
-                wrong[row : row + len(values)][here != there] = 0.0
+                wrong[row : row + len(values)] *= clear(here) * clear(there) * (here == there)
             row += len(values)
         weights = np.sum(a * a, axis=0) * moved, np.sum(b * b, axis=0) * went
         power = float(weights[0] @ moved + weights[1] @ went) or 1.0

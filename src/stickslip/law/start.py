@@ -145,6 +145,13 @@ class Shown:
         return max(level, counts, FINEST * float(np.ptp(values)), 1e-300)
 
 
+def with_own_gains(shown: Sequence[Shown], gain_sd: float) -> list[Shown]:
+    """What records show where each base's gain may be off in its own way; one gain alone scales all that is fitted."""
+    if len(shown) == 1:
+        return list(shown)
+    return [replace(motion, drive=motion.drive.calibrated(gain_sd)) for motion in shown]
+
+
 def too_few(shown: Sequence[Shown], count: int) -> str:
     """What to say where a law has more parameters than the records have strokes; nothing where it has not."""
     strokes = sum(len(motion.turns) + 1 for motion in shown)
@@ -422,8 +429,7 @@ def thinned(stretch: Stretch) -> Stretch:
     for sensor in stretch.sensors:
         rows = slice(None, None, max(1, int(len(sensor.time) / THIN)))
         sensors.append(replace(sensor, time=sensor.time[rows], readings=sensor.readings[rows]))
-    drive = replace(stretch.drive, unsure=())  # type: ignore[type-var]
-    return replace(stretch, sensors=tuple(sensors), drive=drive)
+    return replace(stretch, sensors=tuple(sensors), drive=stretch.drive.as_measured())
 
 
 def thinned_out(problem: Problem) -> Problem:

@@ -30,6 +30,7 @@ from stickslip.law.start import (
     too_few,
     usual_nuisance,
     value_of,
+    with_own_gains,
 )
 from stickslip.law.stretch import Stretch, channels_of
 from stickslip.law.trials import (
@@ -97,11 +98,12 @@ def fit_law(
 
     .. math:: \chi^2(p) = \sum_{c, t} \left(\frac{y_c(t) - \hat y_c(t; p)}{\sigma_c}\right)^2
 
-    is least over channels c and instants t, sigma the noise. Each record's displacement, velocity and memory at its
-    first slide are fitted with them, as are an offset of each channel and what its mount still rings with. Static
-    friction, Stribeck speed, contact stiffness and rate, in which chi squared has several valleys, are tried at values
-    spread over their range before the descent. The intervals are the sandwich's, which hold when what is left is
-    correlated; where a parameter is hardly seen they are the likelihood's, and may be open to one side.
+    is least over channels c and instants t, sigma the noise; what may jump is not asked in the sampling interval
+    before and after an event. Each record's displacement, velocity and memory at its first slide are fitted with them,
+    as are an offset of each channel and what its mount still rings with. Static friction, Stribeck speed, contact
+    stiffness and rate, in which chi squared has several valleys, are tried at values spread over their range before the
+    descent. The intervals are the sandwich's, which hold when what is left is correlated; where a parameter is hardly
+    seen they are the likelihood's, and may be open to one side.
 
     Parameters
     ----------
@@ -114,12 +116,12 @@ def fit_law(
         Parameters to fit, as :meth:`Oscillator.having` names them; all the law's that are not zero where left out.
         Empty: only the starts are fitted, to predict another record.
     nuisance : sequence of str, optional
-        What else is not known well: "mass", "stiffness", "damping", a sensor's "x.gain" or "x.delay", its
-        mount's "a.frequency" or "a.damping". Where left out: the damper, which may be anything from zero on, the spring
-        and all gains, which are trusted to 0.5 %, the delays of x and z, to 50 us, and the mounts that are stated, to
-        1 % of their frequency and 10 % of their damping ratio; with nothing free, nothing. The intervals then are no
-        narrower than 0.5 % of the base's gain or the applied force's leave them, and, where no sensor feels the force,
-        of the mass. Empty: all is as stated.
+        What else is not known well: "mass", "stiffness", "damping", a sensor's "x.gain" or "x.delay", its mount's
+        "a.frequency" or "a.damping". Where left out: the damper, which may be anything from zero on, the spring and all
+        gains, of several records the base's too, which are trusted to 0.5 %, the delays of x and z, to 50 us, and the
+        mounts that are stated, to 1 % of their frequency and 10 % of their damping ratio; with nothing free, nothing.
+        The intervals then are no narrower than 0.5 % of the base's gain or the applied force's leave them, and, where
+        no sensor feels the force, of the mass. Empty: all is as stated.
     channels : sequence of str, optional
         Channels to explain; all that were measured where left out.
     law : str, type or law, optional
@@ -171,6 +173,7 @@ def fit_law(
     stated = nuisance is not None or not intervals
     if nuisance is None:
         nuisance = usual_nuisance(begun[0], names, shown) if names else ()
+        shown = with_own_gains(shown, CALIBRATION) if names else shown
     require_apart(begun[0], names, nuisance, shown)
     if isinstance(law, str | type) and EXPONENT not in (*names, *nuisance):
         nuisance = (*nuisance, EXPONENT)
@@ -366,6 +369,7 @@ def compare_laws(
         motion.require_sliding()
     require_apart(oscillator, (), nuisance or (), shown)
     known = tuple(nuisance) if nuisance is not None else usual_nuisance(oscillator, (), shown)
+    shown = with_own_gains(shown, calibration) if nuisance is None else shown
     systems = [oscillator, *([seen_damping(oscillator, shown)] if "damping" in known else [])]
     search = _Search(
         kinds, seen_by(records, systems), (*known, EXPONENT), calibration, teller(progress, CALLS * len(kinds))
