@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+import threading
 import time
+from collections.abc import Mapping
 from dataclasses import replace
 from itertools import pairwise
 
@@ -12,6 +14,7 @@ import pytest
 
 import stickslip as ss
 from stickslip.bench import Block, Fault, Output, Sim, Tone, blocks, devices, find_device
+from stickslip.bench.device import Signal
 from stickslip.bench.march import March
 from stickslip.bench.sim import SimStream, air_track
 
@@ -140,6 +143,38 @@ def test_a_unit_that_keeps_time_compiles_before_its_clock_begins(monkeypatch: py
         stream.read()
         assert [times[0], times[-2]] == [(True, 0.0), (True, pytest.approx(2.98))]
         assert opened < stream.began < driven
+
+
+def test_a_drive_that_changes_in_mid_run_begins_once_it_is_compiled(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its samples were lost while the reader compiled; now they go on, under the motion before."""
+    compiled, rehearse = threading.Event(), Sim.rehearse
+
+    def slow(device: Sim, drive: Mapping[str, Signal]) -> None:
+        rehearse(device, drive)
+        if drive:
+            assert compiled.wait(60.0)
+
+    monkeypatch.setattr(Sim, "rehearse", slow)
+    system = replace(air_track(), drive=ss.drives.Release())
+    with Sim(system, rig=ss.Rig.perfect("z"), fs=1000.0).open() as stream:
+
+        def read(seconds: float) -> np.ndarray:
+            stream.began -= seconds  # as if so long had passed
+            block = stream.read()
+            assert block is not None
+            assert block.after == stream.sent
+            return block.samples[0]
+
+        assert len(read(0.1)) >= 100
+        stream.drive("base", Tone(2e-3, 5.0))
+        stream.drive("base", Tone(1e-3, 5.0))
+        assert not read(0.15).any()
+        compiled.set()
+        assert stream.ordered is not None
+        stream.ordered.rehearsal.join()
+        for _ in range(4):
+            moved = read(0.15)
+        assert 0.9e-3 < np.abs(moved).max() < 1.1e-3
 
 
 def test_devices_are_found_by_name() -> None:

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+import threading
 import time
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self, get_args
+from typing import Annotated, Any, Literal, NamedTuple, Self, get_args
 
 import numpy as np
 from pydantic import BaseModel, Field
@@ -18,7 +20,7 @@ from stickslip.bench.device import Block, Input, Output, Signal, Tone, output_of
 from stickslip.bench.march import March, Shaken
 from stickslip.compiled import waiting
 from stickslip.drives.kinds import Drive, HarmonicBase, HarmonicForce, Release
-from stickslip.errors import ModelError
+from stickslip.errors import ModelError, StickslipError
 from stickslip.laws.compliant import CompliantContact
 from stickslip.oscillator import Oscillator
 from stickslip.rig.rig import Rig
@@ -36,6 +38,8 @@ BUFFER = 10.0  # s of samples that the device holds for who reads late; older on
 RAMP = 0.25  # s in which a shaker goes over from one motion to another
 LOOSE = 30.0  # times its own noise: what a sensor picks up whose shield is off
 STRETCH = 1 << 15  # samples of coloured noise made at a time; below fs / STRETCH it is white
+
+REHEARSING = threading.Lock()  # `waiting` is of the whole process
 
 FaultKind = Literal["drop", "saturation", "cable", "noise"]
 FAULTS: tuple[str, ...] = get_args(FaultKind)
@@ -204,7 +208,7 @@ class Sim:
     def rehearse(self, drive: Mapping[str, Signal]) -> None:
         """Compile what its motion needs, moved as in `drive`, and wait for it."""
         rehearsal = SimStream(replace(self, fast=True))
-        with waiting():
+        with REHEARSING, waiting():
             for output, signal in drive.items():
                 rehearsal.drive(output, signal)
             while rehearsal.sent < REHEARSED * self.fs and rehearsal.read() is not None:
@@ -217,11 +221,20 @@ def _input(sensor: Sensor, unit: str, stated: bool) -> Input:
     return Input(sensor.channel, unit, limit, 1.0, sensor.sensitivity, serial, sensor.source, details)
 
 
+class _Order(NamedTuple):
+    """A motion that begins once it is rehearsed."""
+
+    output: str
+    signal: Signal
+    rehearsal: threading.Thread
+
+
 class SimStream:
     """The virtual rig, running."""
 
     def __init__(self, device: Sim) -> None:
         self.device, self.sent, self.moving = device, 0, ""
+        self.ordered: _Order | None = None
         self.rate = device.fs * (1 + device.rig.rate)
         self.march = March(device.system, device.start)
         self.march.ahead(0.0)
@@ -243,6 +256,9 @@ class SimStream:
     def read(self, timeout: float = 1.0) -> Block | None:
         """The next samples; see :class:`Stream`. A block that a drop touches is lost whole, as it is in a real unit."""
         device, size = self.device, max(1, round(BLOCK * self.device.fs))
+        if self.ordered is not None and not self.ordered.rehearsal.is_alive():
+            order, self.ordered = self.ordered, None
+            self._move(order.output, order.signal)
         if not device.fast:
             size = self._due(size, timeout)
         times = self._time(self.sent + np.arange(size))
@@ -262,8 +278,9 @@ class SimStream:
     def drive(self, output: str, signal: Signal) -> None:
         """Move the base or the mass otherwise from the next sample on; it goes over smoothly, in `RAMP` seconds.
 
-        Before anything was read the clock begins anew, once all is compiled. Samples are moved to from where the base
-        stands, begin when it is there, and the last one is held. See :class:`Stream`.
+        Before anything was read the clock begins anew, once all is compiled. Later a unit that keeps time goes on as
+        before until what the new motion needs is compiled, and what is ordered meanwhile takes its place. Samples are
+        moved to from where the base stands, begin when it is there, and the last one is held. See :class:`Stream`.
         """
         device = self.device
         output_of(device, output).require(signal, fs=device.fs)
@@ -274,9 +291,23 @@ class SimStream:
                 "stop it first",
             )
         self.moving = output if signal is not None else ""
-        if not (device.fast or self.sent):
+        if self.sent and not device.fast:
+            self.ordered = _Order(output, signal, threading.Thread(target=self._rehearse, args=(output, signal)))
+            self.ordered.rehearsal.daemon = True
+            self.ordered.rehearsal.start()
+            return
+        if not device.fast:
             device.rehearse({output: signal})
             self.began = time.monotonic()
+        self._move(output, signal)
+
+    def _rehearse(self, output: str, signal: Signal) -> None:
+        with suppress(StickslipError):  # who reads is told
+            self.device.rehearse({output: signal})
+
+    def _move(self, output: str, signal: Signal) -> None:
+        """Go over to another motion, from the next sample on."""
+        device = self.device
         now, label = float(self._time(self.sent)), {"base": "z", "force": "force"}[output]
         self.march.ahead(now + RAMP)
         times = np.arange(round(RAMP * device.fs) + 1) / device.fs
