@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ import stickslip as ss
 from stickslip import bench
 from stickslip.bench import through
 from stickslip.cli.program import main
+from stickslip.story.bench import _stuck_runs
 
 SLIDER = ss.Oscillator(mass=2.42, stiffness=2310, damping=0.12, law=ss.laws.Coulomb(1.1))
 SOFT = replace(SLIDER, law=ss.laws.CompliantContact(1.1, stiffness=60e3, damping=10.0))
@@ -158,3 +160,24 @@ def test_a_short_tour_reports_what_it_found(tmp_path: Path, monkeypatch: pytest.
     assert story.lines[0].true == "2.4200 kg" or story.lines[0].true is not None
     assert (tmp_path / "tour" / "next.toml").exists()
     assert json.dumps(story.data())
+
+
+def test_a_contact_that_only_turns_round_is_not_said_to_stick() -> None:
+    """It holds for 4 % of the time, and stops at no time: both were told side by side, as sticking."""
+    findings, runs = [], through.RUNS[:2]
+    for run in runs:
+        moved = replace(
+            through.thesis_oscillator(), drive=ss.drives.HarmonicBase(run.amplitude, frequency=run.frequency)
+        )
+        record = ss.Rig().measure(ss.simulate(moved, cycles=40), fs=4000, rng=1).between(2.0, 5.0)
+        findings.append(ss.analyze(record, mass=2.42, stiffness=2310, damping=moved.damping))
+    sticks = findings[1].sticks
+    assert sticks is not None
+    assert sticks.share.value == pytest.approx(0.0397, abs=3e-3)
+    assert (sticks.per_cycle.value, sticks.kind) == (0.0, "sliding")
+    assert any("at a mere reversal" in check for check in sticks.per_cycle.checks)
+    told = _stuck_runs(SimpleNamespace(comparison=SimpleNamespace(findings=findings), runs=runs))  # type: ignore[arg-type]
+    first, second = told.split("; ")
+    assert first.startswith("At 2.5 Hz it s")
+    assert "with 2 stops in each cycle" in first
+    assert second.startswith("at 5.61 Hz it rests only briefly as it turns round, ")

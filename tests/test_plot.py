@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import xml.etree.ElementTree as ET
+from types import SimpleNamespace
 
 import matplotlib as mpl
 import numpy as np
@@ -15,7 +16,8 @@ import stickslip as ss
 from stickslip.answers.findings import Findings
 from stickslip.answers.many import compare
 from stickslip.answers.questions import analyze
-from stickslip.figures.contact import plot_velocity_loop
+from stickslip.cycle.sticks import StickEvent
+from stickslip.figures.contact import plot_sticks, plot_velocity_loop
 from stickslip.figures.friction import plot_load_dependence
 from stickslip.figures.style import COLUMNS, STYLE, Plate, envelope, prefixed, thinned
 from stickslip.figures.traces import close_up, force_balance, plot_force_balance, plot_traces
@@ -280,3 +282,15 @@ def test_a_name_that_is_unknown_is_answered_with_the_nearest() -> None:
 
 def test_a_room_above_the_face_is_an_attribute_too() -> None:
     assert "STEPS" in dir(ss.bench)
+
+
+@pytest.mark.parametrize("count", [20, 30, 35, 40, 48])
+def test_no_label_of_how_often_it_stuck_is_cut(count: int) -> None:
+    events = [StickEvent(0.1 * k, kind, 0.05 + d) for k in range(count) for kind, d in (("stick", 0.0), ("slip", 0.1))]
+    figure = plot_sticks(SimpleNamespace(sticks=SimpleNamespace(events=events)))  # type: ignore[arg-type]
+    figure.canvas.draw()
+    for axes in (*figure.axes, *(child for ax in figure.axes for child in ax.child_axes)):
+        low, high = axes.get_xlim()
+        for place, label in zip(axes.get_xticks(), axes.get_xticklabels(), strict=True):
+            if low <= place <= high:
+                assert label.get_window_extent().x1 <= figure.bbox.x1

@@ -21,6 +21,7 @@ from stickslip.figures.style import (
     axes_of,
     axis_label,
     captioned,
+    empty_figure,
     legend_above,
     new_figure,
     prefixed,
@@ -75,11 +76,10 @@ def plot_sticks(findings: Findings) -> Figure:
     """
     assert findings.sticks is not None
     events = [event for event in findings.sticks.events if event.whole]
-    figure, left = new_figure(height=3.0)
+    figure = empty_figure(3.0)
+    left, right = figure.subplots(1, 2, sharey=True, width_ratios=(1, 0.3))
     factor, unit = prefixed(np.array([event.duration for event in events]), "s")
     bins = np.linspace(0, factor * max(event.duration for event in events), 40).tolist()
-    right = left.inset_axes((1.02, 0, 0.3, 1), sharey=left)
-    right.tick_params(labelleft=False)
     for kind, colour, marker in (("stick", BLUE, "o"), ("slip", ORANGE, "^")):
         chosen = [event for event in events if event.kind == kind]
         if chosen:

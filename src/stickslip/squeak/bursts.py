@@ -38,7 +38,7 @@ FREE, FED = 0.21, 0.3  # of the friction's level: it swings less beneath a free 
 ONE_PITCH, CLEAR = 0.06, 0.4  # of the pitch of a contact's tones, and the share of the power in what has a pitch
 GOES_ON, EVENLY = 0.6, 0.015  # s that a tone lasts, and that the intervals of a signal differ by at most
 THROUGH = 1.5  # periods of the forced motion: what sounds longer goes on through reversals
-QUIET = 45.0  # dB re 20 uPa: less is not heard beside a running rig
+QUIET = 45.0  # dB re 20 µPa: less is not heard beside a running rig
 RINGS = 30.0  # cycles around a burst that a filter about its tone needs
 RISEN = 0.1  # of the largest sliding speed: slower is no sliding
 MOSTLY = 0.5  # of a burst that the contact slides through
@@ -65,7 +65,7 @@ class Squeak(Plain):
     evidence : str
         Why it is called so, and what can not be told.
     level : float
-        RMS [dB]: re 20 uPa of a calibrated sound, 1 um/s^2, 1 nm/s or 1 uN (ISO 1683); re 1 where the unit is none of
+        RMS [dB]: re 20 µPa of a calibrated sound, 1 µm/s^2, 1 nm/s or 1 µN (ISO 1683); re 1 where the unit is none of
         these, as :attr:`Squeaks.reference` says. NaN where it is clipped.
     weighted_level : float
         A-weighted level of a calibrated sound [dB]; else NaN.
@@ -122,7 +122,7 @@ class Squeaks(Result):
     channel : str
         Where they were heard.
     reference : str
-        What levels are relative to ("20 uPa").
+        What levels are relative to ("20 µPa").
     forcing : float
         Frequency of the forced motion [Hz]; NaN where none is recorded.
     record : Record

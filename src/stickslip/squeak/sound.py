@@ -230,7 +230,7 @@ def level(values: Array, reference: float, *, fs: float, weighted: bool = False)
 
 def reference_of(unit: str) -> str:
     """What a level of this unit is told against."""
-    named = {"Pa": "20 uPa", "m/s^2": "1 um/s^2", "m/s": "1 nm/s", "N": "1 uN", "1": "1"}
+    named = {"Pa": "20 µPa", "m/s^2": "1 µm/s^2", "m/s": "1 nm/s", "N": "1 µN", "1": "1"}
     return named.get(unit, f"1 {unit}")
 
 

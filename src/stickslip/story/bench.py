@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from stickslip.answers.experiment import ExperimentPlan
-from stickslip.answers.findings import Findings, record_name
+from stickslip.answers.findings import record_name
 from stickslip.bench.calibration import Calibration
 from stickslip.bench.response import ModalFit
 from stickslip.bench.runs import Proposal, run_list
@@ -24,8 +24,9 @@ from stickslip.laws.guessing import family_of
 from stickslip.record.record import Record
 from stickslip.story.findings import of_comparison, of_findings, plain
 from stickslip.story.fit import of_laws
+from stickslip.story.friction import of_sticks
 from stickslip.story.story import Line, Story, Table, logged
-from stickslip.story.words import Caution, doubts, interval_of, value_of
+from stickslip.story.words import Caution, doubts, interval_of, sentence, value_of
 
 CAPTION = "Root-mean-square error against the sampling rate, for each choice of sensors."
 # What leads: of which step, and which of its numbers; the rest stands in the tables.
@@ -282,20 +283,13 @@ def _ratio(tour: Tour) -> str:
 
 
 def _stuck_runs(tour: Tour) -> str:
-    """Which runs stuck."""
-    stuck = [
-        f"{run.frequency:g} Hz ({value_of(share)} of the time)"
+    """Which runs stuck, and which only held as they turned round."""
+    runs = [
+        f"at {run.frequency:g} Hz {of_sticks(finding)}"
         for finding, run in zip(tour.comparison.findings, tour.runs, strict=True)
-        if (share := _share(finding)) is not None and share.interval[0] > 0
+        if finding.sticks is not None
     ]
-    free = len(tour.runs) - len(stuck)
-    if not stuck:
-        return "The contact never sticks in the runs measured."
-    return f"It sticks at {', '.join(stuck)}{f'; in the other {free} runs it slides throughout' if free else ''}."
-
-
-def _share(findings: Findings) -> Estimate | None:
-    return _of(tuple(findings.estimates), "stuck share of the time")
+    return sentence(f"{'; '.join(runs)}.") if runs else "Whether the contact sticks is not told by any run."
 
 
 def _squeaked(tour: Tour) -> list[str]:
@@ -338,8 +332,19 @@ def _runs(tour: Tour) -> Table:
         cells = [value_of(one) if (one := _of(estimates, name)) else "–" for name in names]
         cells.append(_static_over_sliding(_of(estimates, "static over sliding friction")))
         rows.append([f"{run.frequency:g} Hz", f"{1e3 * run.amplitude:g} mm", run.why, *cells])
-    heads = ("base", "amplitude", "what for", "sliding friction", "stuck", "contact stiffness", "static over sliding")
-    note = "Each run has its own section below, with intervals and figures; –: not asked, or not told by that run."
+    heads = (
+        "base",
+        "amplitude",
+        "what for",
+        "sliding friction",
+        "contact holds",
+        "contact stiffness",
+        "static over sliding",
+    )
+    note = (
+        "Each run has its own section below, with intervals and figures. The contact holds in its sticks, and briefly "
+        "as it turns round; –: not asked, or not told by that run."
+    )
     return Table("What the runs tell", heads, rows, note)
 
 

@@ -131,12 +131,12 @@ def _headline(findings: Findings) -> Iterator[str]:
     if wrong := list(_wrong(findings)):
         yield from wrong
         if findings.sticks is not None:
-            yield sentence(f"{_of_sticks(findings)}.")
+            yield sentence(f"{of_sticks(findings)}.")
         return
     if zero := _zero_off(findings):
         yield Caution(f"{sentence(zero.words)}.")
     clauses = [_of_level(findings)] if findings.loops is not None else []
-    clauses += [_of_sticks(findings)] if findings.sticks is not None else []
+    clauses += [of_sticks(findings)] if findings.sticks is not None else []
     if findings.loops is not None:
         yield sentence(f"{'; '.join(clauses)}.")
         yield from _of_loops(findings)
@@ -156,7 +156,7 @@ def _headline(findings: Findings) -> Iterator[str]:
         yield from _of_directions(apart.coulomb_forward, apart.coulomb_back)
         yield from _of_directions(apart.viscous_forward, apart.viscous_back, "in viscous friction")
     if findings.sticks is not None and findings.loops is None:
-        yield sentence(f"{_of_sticks(findings)}.")
+        yield sentence(f"{of_sticks(findings)}.")
     if findings.breakaway is not None:
         yield from _of_breakaway(findings.breakaway)
     if findings.stiffness is not None:
@@ -225,7 +225,8 @@ def _of_loops(findings: Findings) -> Iterator[str]:
         yield f"No {'other ' if falls else ''}change of friction with speed is resolved{seen}."
 
 
-def _of_sticks(findings: Findings) -> str:
+def of_sticks(findings: Findings) -> str:
+    """Whether, and for how long, it sticks."""
     sticks = findings.sticks
     assert sticks is not None
     low, high = sticks.share.interval
