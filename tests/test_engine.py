@@ -386,6 +386,8 @@ def test_a_budget_counts_in_short_runs_too(budget: int) -> None:
 def test_growth_without_end_is_no_number() -> None:
     growing = RIGID.having(damping=-100.0)
     assert ss.steady_state(growing).status == "unbounded"
+    tones = ss.drives.MultiTone([(1e-3, 8.7, 0.0), (1e-3, 17.4, 0.0)], on="base")
+    assert ss.steady_state(growing.having(drive=tones)).status == "unbounded"
     with pytest.raises(ss.errors.SolveError, match="beyond the largest number"):
         ss.simulate(growing.having(damping=-1e4), cycles=40)
 

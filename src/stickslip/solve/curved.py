@@ -96,7 +96,8 @@ class CurvedTrajectory(Trajectory):
         out, step = np.empty((nodes.shape[1], len(times))), np.empty(len(times), dtype=np.int64)
         count = table.watched.most
         work = np.empty(count * (self.order + 1)), np.empty(self.steps.states.shape[1]), np.empty(count)
-        march.sample(_shown(table, self.order), self.steps, times, nodes, out, step, work)
+        plain = bool(np.all(nodes < len(work[1])))
+        march.sample(_shown(table, self.order), self.steps, times, nodes, plain, out, step, work)
         return out, step
 
     @cached_property

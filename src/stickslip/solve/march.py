@@ -370,8 +370,9 @@ def rests(series, numbers, mode, state, step):
 
 
 @compiled(**EXACT)
-def sample(shown, steps, times, nodes, out, row, work):
-    """Values of nodes (by mode) at increasing times, and the step each one falls in."""
+def sample(shown, steps, times, nodes, plain, out, row, work):
+    """Values of nodes (by mode) at increasing times, and the step each one falls in; `plain` where all nodes are
+    entries of the state, so that nothing else need be worked out."""
     series = coded(shown.series)
     outputs = coded(shown.outputs)
     s, state, values = work
@@ -391,6 +392,10 @@ def sample(shown, steps, times, nodes, out, row, work):
                 series(shown.numbers, mode, steps.states[j], h, s)
                 known = j
             advance(s, shown.order, min(1.0, passed / h), state)
+        if plain:
+            for r in range(nodes.shape[1]):
+                out[r, t] = state[nodes[mode, r]]
+            continue
         outputs(shown.others, mode, state, 1.0, values)
         for r in range(nodes.shape[1]):
             out[r, t] = values[nodes[mode, r]]

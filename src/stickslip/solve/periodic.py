@@ -31,6 +31,7 @@ from stickslip.solve.poincare import (
     lap,
     tables,
 )
+from stickslip.solve.refusal import Outgrown
 from stickslip.solve.self_excited import self_excited
 from stickslip.solve.simulate import opening
 from stickslip.solve.tables import System
@@ -242,7 +243,10 @@ def settled_on(
     count, passed = transient, None
     resonant = _repeats_freely(table)
     while laps < (max(patience, RESONANT) if resonant else patience):
-        state, mode, size = _iterate(system, table, state, mode, count)
+        try:
+            state, mode, size = _iterate(system, table, state, mode, count)
+        except Outgrown:
+            size = math.inf
         laps += count
         sizes.append(size)
         if size > RUNAWAY * first or (resonant and _grows_evenly(sizes)):
@@ -260,8 +264,9 @@ def settled_on(
         or (len(sizes) > 3 and all(later > 1.5 * sooner for sooner, later in pairwise(sizes[1:])))
     )
     none = np.full(table.physical, np.nan, dtype=np.complex128)
-    if growing:
-        return passed or SteadyState("unbounded", math.nan, 0, lap(system, table, state, mode, 1), none), passed
+    if growing:  # its first period: what it has come to may be beyond all numbers
+        begun = lap(system, table, *opening(table, start), 1)
+        return passed or SteadyState("unbounded", math.nan, 0, begun, none), passed
     return SteadyState("not periodic", math.nan, 0, beats(system, table, state, mode, 1), none), passed
 
 

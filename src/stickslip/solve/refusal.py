@@ -28,6 +28,7 @@ def named(names: Sequence[str], state: Array) -> str:
 
 
 LISTED = 4  # modes that an error names
+LARGEST = 1e150  # of an entry of the state, whose square is a number still
 
 
 class Endless(SolveError):
@@ -57,11 +58,15 @@ def unproved(place: str) -> SolveError:
     )
 
 
+class Outgrown(SolveError):
+    """A motion that has outgrown the numbers."""
+
+
 def require_numbers(state: Array, place: str) -> None:
     """Refuse a motion that has outgrown the numbers."""
-    if not np.all(np.isfinite(state)):
-        raise SolveError(
-            f"motion beyond the largest number, {place}",
+    if not np.all(np.abs(state) < LARGEST):
+        raise Outgrown(
+            f"motion beyond the largest number that has a square, {place}",
             "a motion is finite",
             "simulate a shorter time; a negative damping or slope makes it grow",
         )

@@ -53,6 +53,8 @@ class Sensitivity:
         Derivatives of the state at the start of each piece.
     later : ndarray (n, K)
         Derivatives of the instant [s] at which each piece begins.
+    hops : ndarray (M, 1 + K, N, N)
+        The state after a cell of each mode that lasts longer, by that before, and its derivatives.
     """
 
     run: Trajectory
@@ -60,16 +62,18 @@ class Sensitivity:
     rows: dict[str, Array]
     begun: Array
     later: Array
+    hops: Array
 
     def sample(self, times: Array, name: str) -> Array:
         """Derivatives of an output at increasing instants (K, T), each within the piece that it falls in."""
-        run = self.run
+        run, linear = self.run, self.run.table.linear
         size, count = run.states.shape[1], len(self.flow)
-        out = np.empty((count, len(times)))
+        used = np.bincount(run.modes, minlength=len(run.table.modes)) > 0
         forms = np.ascontiguousarray(run.rows(name)[:, 0]), self.rows[name]
-        series = np.empty((DEGREE + 1, 1 + count))
-        pieces, work = (run.starts, run.modes, run.states, self.begun), np.empty((3, 1 + count, size))
-        sample_tangents(run.table.linear, self.flow, pieces, times, forms, out, series, work)
+        series, work = np.zeros((len(used), DEGREE + 1, 1 + count, size)), np.empty((2, 1 + count, size))
+        series_of(linear, self.flow, forms, used, series, work)
+        out, pieces = np.empty((count, len(times))), (run.starts, run.modes, run.states, self.begun)
+        sample_tangents(linear, self.hops, series, pieces, times, out, work, np.empty((DEGREE + 1, count)))
         return out
 
     def jumps(self, name: str) -> Array:
@@ -78,7 +82,7 @@ class Sensitivity:
         after = np.einsum("jn,jn->j", forms[run.modes[1:]], run.states[1:])
         ends = np.empty_like(run.states[1:])
         pieces = run.modes, run.states, run.durations
-        _ends(run.table.linear, self.flow[:0], pieces, ends, np.empty((3, 1, run.states.shape[1])))
+        _ends(run.table.linear, self.flow[:0], self.hops[:, :1], pieces, ends, np.empty((3, 1, run.states.shape[1])))
         return np.asarray(after - np.einsum("jn,jn->j", forms[run.modes[:-1]], ends))
 
 
@@ -133,8 +137,12 @@ def sensitivity(
     for k, (name, unit) in enumerate(starts.items(), start=last):
         begun[0, k, table.names.index(name)] = unit
     pieces, work = (run.modes, run.states, run.durations, run.exits), np.empty((4, 1 + count, size))
-    carry_parameters(table.linear, changes.of_events, table.leap, pieces, (knotted, grown), begun, later, work)
-    return Sensitivity(run, changes.flow, changes.rows, begun, later)
+    longest, hops = np.zeros(len(table.modes)), np.zeros((len(table.modes), 1 + count, size, size))
+    np.maximum.at(longest, run.modes, run.durations)
+    hops_of(table.linear, changes.flow, longest, hops, work)
+    passing = hops, table.leap
+    carry_parameters(table.linear, changes.of_events, passing, pieces, (knotted, grown), begun, later, work)
+    return Sensitivity(run, changes.flow, changes.rows, begun, later, hops)
 
 
 @dataclass(frozen=True, eq=False)
@@ -174,20 +182,21 @@ class _Changes:
 
 
 @compiled(**OPTIONS)
-def _next_term(flow, change, scale, term):
-    """The next term of the Taylor series of a state and its derivatives in place of that in ``term[0]``."""
-    count, n = term.shape[1:]
+def _turned(matrix, change, scale, both):
+    """A matrix and its derivatives applied to a state and its derivatives, times a factor: ``both[0]`` becomes those
+    of the product, ``both[1]`` is scratch."""
+    count, n = both.shape[1:]
     for p in range(count):
         for i in range(n):
             total = 0.0
             for j in range(n):
-                total += flow[i, j] * term[0, p, j]
+                total += matrix[i, j] * both[0, p, j]
                 if p > 0:
-                    total += change[p - 1, i, j] * term[0, 0, j]
-            term[1, p, i] = total * scale
+                    total += change[p - 1, i, j] * both[0, 0, j]
+            both[1, p, i] = total * scale
     for p in range(count):
         for i in range(n):
-            term[0, p, i] = term[1, p, i]
+            both[0, p, i] = both[1, p, i]
 
 
 @compiled(**OPTIONS)
@@ -198,7 +207,7 @@ def grow(flow, change, time, both, term):
         for i in range(n):
             term[0, p, i] = both[p, i]
     for k in range(1, TERMS):
-        _next_term(flow, change, time / k, term)
+        _turned(flow, change, time / k, term)
         small = True
         for p in range(count):
             for i in range(n):
@@ -210,34 +219,62 @@ def grow(flow, change, time, both, term):
 
 
 @compiled(**OPTIONS)
-def through(linear, change, mode, time, both, term):
-    """As `grow`, however long the time."""
-    cell = linear.cell[mode]
-    steps = int(time / cell) + 1 if cell < np.inf else 1
-    for _ in range(steps):
-        grow(linear.flow[mode], change[:, mode], time / steps, both, term)
+def _only(entry, both):
+    """A state of one entry alone, that does not change with the parameters."""
+    for p in range(both.shape[0]):
+        for i in range(both.shape[1]):
+            both[p, i] = 1.0 if p == 0 and i == entry else 0.0
 
 
 @compiled(**OPTIONS)
-def _ends(linear, none, pieces, out, work):
+def hops_of(linear, change, longest, hops, work):
+    """exp(A cell) of each mode that lasts longer than a cell, and its derivatives: (M, 1 + K, N, N).
+
+    Each column is where a state of one entry alone has come to, and how that changes.
+    """
+    for mode in range(hops.shape[0]):
+        if longest[mode] <= linear.cell[mode]:
+            continue
+        for column in range(hops.shape[3]):
+            _only(column, work[0])
+            grow(linear.flow[mode], change[:, mode], linear.cell[mode], work[0], work[1:])
+            for p in range(hops.shape[1]):
+                for i in range(hops.shape[3]):
+                    hops[mode, p, i, column] = work[0, p, i]
+
+
+@compiled(**OPTIONS)
+def through(linear, change, hops, mode, time, both):
+    """As `grow`, however long the time, of ``both[0]``: whole cells at once; the rest of `both` is scratch."""
+    cell = linear.cell[mode]
+    whole = int(time / cell) if cell < np.inf and time > cell else 0
+    for _ in range(whole):
+        _turned(hops[mode, 0], hops[mode, 1:], 1.0, both)
+    grow(linear.flow[mode], change[:, mode], time - whole * cell if whole else time, both[0], both[1:])
+
+
+@compiled(**OPTIONS)
+def _ends(linear, none, hops, pieces, out, work):
     """The state at the end of each piece but the last; `none` are the derivatives by no parameter."""
     modes, states, durations = pieces
     for j in range(out.shape[0]):
         for i in range(states.shape[1]):
             work[0, 0, i] = states[j, i]
-        through(linear, none, modes[j], durations[j], work[0], work[1:])
+        through(linear, none, hops, modes[j], durations[j], work)
         for i in range(states.shape[1]):
             out[j, i] = work[0, 0, i]
 
 
 @compiled(**OPTIONS)
-def carry_parameters(linear, changes, leap, pieces, signals, begun, later, work):
+def carry_parameters(linear, changes, passing, pieces, signals, begun, later, work):
     """Derivatives of the state at the start of each piece, and of that instant, from those at the first.
 
-    `changes` are the derivatives of flow, exits' quantities, resets and leaps; `signals` the entries that are set anew
-    where each piece begins, and by what share of themselves each parameter makes them larger.
+    `changes` are the derivatives of flow, exits' quantities, resets and leaps; `passing` whole cells and modes passed
+    through at once; `signals` the entries that are set anew where each piece begins, and by what share of themselves
+    each parameter makes them larger.
     """
     knotted, scaled = signals
+    hops, leap = passing
     flow, quantity, reset, passage = changes
     modes, states, durations, exits = pieces
     count, n = begun.shape[1], states.shape[1]
@@ -248,7 +285,7 @@ def carry_parameters(linear, changes, leap, pieces, signals, begun, later, work)
             both[0, i] = states[j, i]
             for p in range(count):
                 both[1 + p, i] = begun[j, p, i]
-        through(linear, flow, mode, durations[j], both, work[1:3])
+        through(linear, flow, hops, mode, durations[j], work[:3])
         if e >= 0:
             multiply(linear.flow[mode], both[0], spare[0])
             speed = 0.0
@@ -282,19 +319,43 @@ def carry_parameters(linear, changes, leap, pieces, signals, begun, later, work)
 
 
 @compiled(**OPTIONS)
-def sample_tangents(linear, change, pieces, times, forms, out, series, work):
+def series_of(linear, change, forms, used, series, work):
+    """Taylor coefficients over a cell of a linear form of the state, as forms of the state where the cell begins, and
+    their derivatives: (M, DEGREE + 1, 1 + K, N), of the modes that are used."""
+    rows, moved = forms
+    _, degrees, count, n = series.shape
+    for mode in range(series.shape[0]):
+        if not used[mode]:
+            continue
+        cell = linear.cell[mode]
+        unit = cell if cell < np.inf else 1.0
+        for column in range(n):
+            _only(column, work[0])
+            for k in range(degrees):
+                for p in range(count):
+                    total = 0.0
+                    for i in range(n):
+                        total += rows[mode, i] * work[0, p, i]
+                        if p > 0:
+                            total += moved[p - 1, mode, i] * work[0, 0, i]
+                    series[mode, k, p, column] = total
+                _turned(linear.flow[mode], change[:, mode], unit / (k + 1), work)
+
+
+@compiled(**OPTIONS)
+def sample_tangents(linear, hops, series, pieces, times, out, work, c):
     """Derivatives of a linear form of the state at increasing `times` [s], one polynomial of time for each cell."""
     begin, modes, states, begun = pieces
-    rows, moved = forms
     count, n, last = begun.shape[1], states.shape[1], begin.shape[0] - 1
-    both, spare = work[0], work[1:]
-    j, known, cells = -1, 0, 0
+    both = work[0]
+    j, cells, known = -1, 0, False
     for t in range(times.shape[0]):
+        # Piece: the state and its derivatives where it begins.
         if j < 0 or (j < last and begin[j + 1] <= times[t]):
             j = max(j, 0)
             while j < last and begin[j + 1] <= times[t]:
                 j += 1
-            known, cells = 0, 0
+            cells, known = 0, False
             for i in range(n):
                 both[0, i] = states[j, i]
                 for p in range(count):
@@ -303,43 +364,26 @@ def sample_tangents(linear, change, pieces, times, forms, out, series, work):
         cell = linear.cell[mode]
         unit = cell if cell < np.inf else 1.0
         time = times[t] - begin[j]
+        # Cell: carried through those that are over, and its polynomials.
         while cell < np.inf and time - cells * cell > cell:
-            grow(linear.flow[mode], change[:, mode], cell, both, spare)
+            _turned(hops[mode, 0], hops[mode, 1:], 1.0, work)
             cells += 1
-            known = 0
-        if known == 0:
-            known = _polynomial(
-                linear.flow[mode], change[:, mode], unit, both, rows[mode], moved[:, mode], series, spare
-            )
+            known = False
+        if not known:
+            known = True
+            for k in range(c.shape[0]):
+                for p in range(count):
+                    total = 0.0
+                    for i in range(n):
+                        total += series[mode, k, 0, i] * both[1 + p, i] + series[mode, k, 1 + p, i] * both[0, i]
+                    c[k, p] = total
+        # Instant.
         at = (time - cells * cell if cells else time) / unit
         for p in range(count):
             total = 0.0
-            for k in range(known - 1, -1, -1):
-                total = total * at + series[k, 1 + p]
+            for k in range(c.shape[0] - 1, -1, -1):
+                total = total * at + c[k, p]
             out[p, t] = total
-
-
-@compiled(**OPTIONS)
-def _polynomial(flow, change, cell, both, row, moved, series, term):
-    """Taylor coefficients of a form's derivatives over a cell; returns how many there are."""
-    count, n = both.shape
-    for p in range(count):
-        for i in range(n):
-            term[0, p, i] = both[p, i]
-    for k in range(series.shape[0]):
-        for p in range(1, count):
-            total = 0.0
-            for i in range(n):
-                total += row[i] * term[0, p, i] + moved[p - 1, i] * term[0, 0, i]
-            series[k, p] = total
-        _next_term(flow, change, cell / (k + 1), term)
-        small = True
-        for p in range(count):
-            for i in range(n):
-                small = small and both[p, i] + term[0, p, i] == both[p, i]
-        if small and k > 4:
-            return k + 1
-    return series.shape[0]
 
 
 @dataclass(frozen=True, eq=False)

@@ -43,7 +43,7 @@ from stickslip.twin.belief import (
     Belief,
     levelled,
 )
-from stickslip.twin.descent import QUESTION, descended, misfit, refined, slope_of
+from stickslip.twin.descent import QUESTION, SETTLED, descended, misfit, refined, slope_of
 from stickslip.workers import Map
 
 # How many starts, cycles and passes: by trial on the rigs of benchmarks/twins.py with Stribeck's curve, constants half
@@ -217,6 +217,8 @@ def _with_slips(belief: Belief, simple: Belief, mapped: Map) -> Belief:
         slips += [law for law in mapped(partial(_led_beside, beside=belief), begun) if law is not None]
     nearest = min([belief, *slips], key=misfit)
     freedom = 0.0 if nearest.fit is None else nearest.fit.freedom
+    # x tells a spring that is off from a mass that is by rounding alone: the first of those that are as near
+    nearest = next(law for law in [belief, *slips] if freedom * math.log(misfit(law) / misfit(nearest)) <= SETTLED)
     best = nearest if freedom * math.log(misfit(belief) / misfit(nearest)) > CERTAIN else belief
     rivals = (law for law in (*belief.rivals, *slips) if law is not best and _as_near(law, best))
     return replace(best, rivals=tuple(rivals))
