@@ -8,7 +8,7 @@ small matrices. At an event the saltation of :mod:`~stickslip.solve.sensitivity`
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -42,16 +42,18 @@ BRIEF = 1e-9  # of a natural period: as long before and behind a turn of creep n
 ROUNDED = 1e-13  # of an entry of the start, within which it is as the system opens by itself
 
 
-def _gauss() -> tuple[Array, Array, Array]:
-    """Points, matrix and weights of the collocation."""
-    points, weights = np.polynomial.legendre.leggauss(POINTS)
+def weights_until(shares: Array) -> Array:
+    """What each of Gauss's points counts in an integral from 0 to these shares (T,) of a step: (T, POINTS)."""
+    points = np.polynomial.legendre.leggauss(POINTS)[0]
     basis = [Legendre.basis(j) for j in range(POINTS)]
-    areas = np.column_stack([part.integ(lbnd=-1)(points) / 2 for part in basis])
+    areas = np.column_stack([part.integ(lbnd=-1)(2 * shares - 1) / 2 for part in basis])
     values = np.column_stack([part(points) for part in basis])
-    return (points + 1) / 2, np.asarray(np.linalg.solve(values.T, areas.T).T, dtype=np.float64), weights / 2
+    return np.asarray(np.linalg.solve(values.T, areas.T).T, dtype=np.float64)
 
 
-AT, MATRIX, WEIGHTS = _gauss()
+AT = (np.polynomial.legendre.leggauss(POINTS)[0] + 1) / 2
+MATRIX = weights_until(AT)
+WEIGHTS = np.polynomial.legendre.leggauss(POINTS)[1] / 2
 
 
 def values(nodes: Nodes, mode: int, state: NDArray[Any]) -> NDArray[Any]:
@@ -143,8 +145,7 @@ class Variation:
         """Derivatives of an output at increasing instants (K, T), each within the step that it falls in."""
         steps, count = self.run.steps, len(self.near)
         at = np.maximum(np.searchsorted(steps.starts, times, side="right") - 1, 0)
-        passage, own = _passages(self, at, times - steps.starts[at])
-        tangents = passage @ self.begun[at] + own
+        tangents = self._within(at, times)
         out = np.empty((count, len(times)))
         states = _states(self.run, times)
         for mode in np.unique(steps.modes[at]):
@@ -153,6 +154,17 @@ class Variation:
             along = self.along([[place] for place in places], int(mode), states[:, here])
             out[:, here] = np.einsum("nt,tnk->kt", along.slope[0], tangents[here]) + along.change[0]
         return out
+
+    def _within(self, at: Index, times: Array) -> Array:
+        """Derivatives of the state at instants within steps (T, N, K): the polynomial through Gauss's points."""
+        steps, tangents = self.run.steps, self.begun[at]
+        shares = weights_until(np.clip((times - steps.starts[at]) / steps.lengths[at], 0.0, 1.0))
+        for rows, stages in _stages(self, np.unique(at)):
+            here = np.flatnonzero(np.isin(at, rows))
+            size, own = len(self.run.table.names), np.searchsorted(rows, at[here])
+            rates = stages[..., :size] @ self.begun[rows][:, None] + stages[..., size:]
+            tangents[here] += np.einsum("t,ti,tink->tnk", steps.lengths[at[here]], shares[here], rates[own])
+        return tangents
 
     @property
     def tapes(self) -> tuple[Tape, ...]:
@@ -196,22 +208,31 @@ def _states(run: CurvedTrajectory, times: Array) -> Array:
     return run.sample(times, tuple(run.table.names))[0]
 
 
-def _passages(motion: Variation, steps: Index, lengths: Array) -> tuple[Array, Array]:
-    """What carries derivatives over the first so much [s] of steps: D -> M D + q, as M (S, N, N) and q (S, N, K)."""
-    size, count = len(motion.run.table.names), len(motion.near)
-    passage, own = np.empty((len(steps), size, size)), np.empty((len(steps), size, count))
-    modes = motion.run.steps.modes[steps]
-    for mode in np.unique(modes):
-        (chosen,) = np.nonzero(modes == mode)
-        for low in range(0, len(chosen), BATCH):
-            rows = chosen[low : low + BATCH]
-            passage[rows], own[rows] = _passed(motion, int(mode), motion.run.steps.starts[steps[rows]], lengths[rows])
+def _passages(motion: Variation) -> tuple[Array, Array]:
+    """What carries derivatives over each step: D -> M D + q, as M (S, N, N) and q (S, N, K)."""
+    size, count, lengths = len(motion.run.table.names), len(motion.near), motion.run.steps.lengths
+    passage, own = np.empty((len(lengths), size, size)), np.empty((len(lengths), size, count))
+    for rows, stages in _stages(motion, np.arange(len(lengths))):
+        grown = np.einsum("s,i,simk->smk", lengths[rows], WEIGHTS, stages)
+        passage[rows], own[rows] = np.eye(size) + grown[:, :, :size], grown[:, :, size:]
     return passage, own
 
 
-def _passed(motion: Variation, mode: int, begin: Array, lengths: Array) -> tuple[Array, Array]:
-    """As :func:`_passages`, of steps of one mode."""
-    size, count, many = len(motion.run.table.names), len(motion.near), len(begin)
+def _stages(motion: Variation, steps: Index) -> Iterator[tuple[Index, Array]]:
+    """Steps in turn, some of one mode at a time, and rates of derivatives at Gauss's points (s, POINTS, N, N + K): of
+    those that begin as unit vectors, and of what parameters change alone."""
+    modes = motion.run.steps.modes[steps]
+    for mode in np.unique(modes):
+        chosen = steps[modes == mode]
+        for low in range(0, len(chosen), BATCH):
+            rows = chosen[low : low + BATCH]
+            yield rows, _solved(motion, int(mode), rows)
+
+
+def _solved(motion: Variation, mode: int, rows: Index) -> Array:
+    """As :func:`_stages`, of steps of one mode."""
+    size, count, many = len(motion.run.table.names), len(motion.near), len(rows)
+    begin, lengths = motion.run.steps.starts[rows], motion.run.steps.lengths[rows]
     times = begin[:, None] + lengths[:, None] * AT
     order = np.argsort(times, axis=None, kind="stable")  # instants in one step may be the same to rounding
     state = np.empty((size, times.size))
@@ -222,10 +243,7 @@ def _passed(motion: Variation, mode: int, begin: Array, lengths: Array) -> tuple
     # The stages' rates: R_i = J_i (D + h sum_j a_ij R_j) + P_i, for D = each unit vector and for P alone
     spread = np.einsum("s,ij,simn->simjn", lengths, MATRIX, slope).reshape(many, POINTS * size, POINTS * size)
     right = np.concatenate([slope, change], axis=3).reshape(many, POINTS * size, size + count)
-    right[:, :, size:] = change.reshape(many, POINTS * size, count)
-    stages = np.linalg.solve(np.eye(POINTS * size) - spread, right).reshape(many, POINTS, size, size + count)
-    grown = np.einsum("s,i,simk->smk", lengths, WEIGHTS, stages)
-    return np.eye(size) + grown[:, :, :size], grown[:, :, size:]
+    return np.linalg.solve(np.eye(POINTS * size) - spread, right).reshape(many, POINTS, size, size + count)
 
 
 def variation(run: CurvedTrajectory, neighbours: Sequence[Oscillator], *, step: float) -> Variation:
@@ -252,7 +270,7 @@ def variation(run: CurvedTrajectory, neighbours: Sequence[Oscillator], *, step: 
     for name, value in table.motion.start.items():
         signals[table.names.index(name)] = [(one.motion.start[name] - value) / step for one in near]
     motion.begun[0] = opening_moved(np.array([one.opening for one in motion.tapes]), signals, steps.states[0], step)
-    passage, own = _passages(motion, np.arange(len(steps.starts)), steps.lengths)
+    passage, own = _passages(motion)
     pieces = {int(row): j for j, row in enumerate(np.searchsorted(steps.starts, run.starts)) if j}
     behind = range(1)
     for s in range(1, len(steps.starts)):
