@@ -113,10 +113,11 @@ class Operations:
 
     def put(self, kind: int, left: int = 0, right: int = 0, power: float = 0.0, form: Form = ({}, 0.0)) -> int:
         """A node's number; a new one only where no equal one is there."""
-        key = (kind, left, right, power, tuple(sorted(form[0].items())), form[1])
+        weights = sorted(form[0].items())  # in whatever order a law has written them: one code serves all
+        key = (kind, left, right, power, tuple(weights), form[1])
         if key not in self.known:
             self.known[key] = self.size + len(self.rows)
-            self.rows.append((kind, left, right, power, form))
+            self.rows.append((kind, left, right, power, (dict(weights), form[1])))
         return self.known[key]
 
     def node(self, form: Form) -> int:
