@@ -110,6 +110,9 @@ MISTAKES = {
     "x and z in mm, alone": ("t [s],x [m],z [m]", {"x": 1e3, "z": 1e3}, (), "Probably x and z are in mm, not in m"),
     "x and z in mm, with load": (
         "t [s],x [m],z [m],load [N]", {"x": 1e3, "z": 1e3}, (), "Probably x and z are in mm, not in m"),
+    "x in mm, stated in um": (
+        "t [s],x [um],z [mm],a [g]", {"x": 1e3, "z": 1e3, "a": 1 / 9.80665}, (), "Probably x is in mm, not in um"),
+    "time in s, stated in ms": ("t [ms],x [m],z [m],a [m/s^2]", {}, (), "Probably the time is in s, not in ms"),
     "no units": ("t,x,z,a", {"x": 1e3, "z": 1e3}, (), "Probably x and z are in mm, not in m"),
     "zero of a": ("t [s],x [m],z [m],a [m/s^2]", {"zero_a": 0.7}, (), "The accelerometer's zero is off by 0.7 m/s^2"),
 }  # fmt: skip
@@ -127,6 +130,26 @@ def test_a_mistake_is_named_first_and_the_command_printed_mends_it(name: str) ->
         assert right(again.stdout)
         return
     assert right(mended(result))
+
+
+def test_units_that_two_slips_have_left_out_are_to_be_filled_in() -> None:
+    """No single slip makes x and z in mm agree with an a in g: read as SI they told a friction a thousand times too
+    large, and the command that was to mend it stated what could not be true."""
+    scales = {"x": 1e3, "z": 1e3, "a": 1 / 9.80665}
+    result = ask("analyze", written("t [s],x,z,a", **scales), *RIG)
+    assert "The record contradicts itself: a is" in first_line(result), result.output
+    assert "The contact slides against" not in result.stdout
+    told = {"x=UNIT": "x=mm", "z=UNIT": "z=mm", "a=UNIT": "a=g"}
+    assert right(mended(result, **told))
+
+
+def test_a_command_that_mends_keeps_where_files_lie_and_results_go() -> None:
+    path = written("t [s],x [m],z [m],a [m/s^2]", x=1e3).resolve()
+    result = CliRunner().invoke(main, ["analyze", str(path), *RIG, "--twins=0", "--output", "results"])
+    command = command_in(result)
+    assert command[2] == str(path)
+    assert "--twins=0" in command
+    assert command[command.index("--output") + 1] == "results"
 
 
 @pytest.mark.parametrize("question", ["analyze", "fit", "decay"])

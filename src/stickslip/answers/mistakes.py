@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from stickslip.consistent.checks import MILLISECONDS, Slip
+from stickslip.consistent.checks import MILLISECONDS, Check, Slip
 from stickslip.consistent.contradictions import Consistency
 from stickslip.cycle.loops import Loops
 from stickslip.errors import RecordError
@@ -22,6 +22,7 @@ WHOLE_TURN = 2 * math.pi  # rad: what turns farther without a unit is as likely 
 BITS = range(8, 25)  # of an encoder, whose counts are this power of two's part of a turn
 ALIKE = 1e-4  # by which a step may miss a count's: counts of 360 degrees and of 2 pi rad are 10 % apart at the nearest
 BALANCED = ("balance", "energy")  # checks that a wrong mass, spring or sensor fails
+MOVES = "acceleration"  # of the check that a wrong unit of a, or of x, fails
 FAR = 2.0  # times by which two sides that should be one differ, from which no force is given
 NEAR = 0.1  # by which a ratio of frequencies may miss the one that a slip makes
 
@@ -37,14 +38,21 @@ def untrue(consistency: Consistency | None) -> str:
     if any("range" in check.name for check in failed):
         return ""
     apart = [check.sentence for check in failed if any(word in check.name for word in BALANCED)]
-    return f"the record and the rig's constants contradict each other: {apart[0]}" if apart else ""
+    if apart:
+        return f"the record and the rig's constants contradict each other: {apart[0]}"
+    apart = [check.sentence for check in failed if MOVES in check.name and _far(check)]
+    return f"the record contradicts itself: {apart[0]}" if apart else ""
+
+
+def _far(check: Check) -> bool:
+    """Whether two sides are so far apart that no force is worth a headline."""
+    return bool(check.right) and not 1 / FAR < check.left / check.right < FAR
 
 
 def hopeless(consistency: Consistency | None) -> str:
     """What of channels and constants can not all be true, where it is so far off that no force is worth a headline."""
     failed = consistency.failed if consistency is not None else ()
-    apart = [check for check in failed if any(word in check.name for word in BALANCED) and check.right]
-    return untrue(consistency) if any(not 1 / FAR < check.left / check.right < FAR for check in apart) else ""
+    return untrue(consistency) if any(_far(c) for c in failed if any(w in c.name for w in (*BALANCED, MOVES))) else ""
 
 
 def mistakes(record: Record, rig: RigSettings, consistent: Consistency | None, loops: Loops | None) -> tuple[Slip, ...]:

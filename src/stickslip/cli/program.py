@@ -12,7 +12,7 @@ import click
 
 import stickslip as ss
 from stickslip.cli.records import RIG_FILE
-from stickslip.cli.terminal import compiling, complain, say, spoken
+from stickslip.cli.terminal import ARGUMENTS, compiling, complain, say, spoken
 from stickslip.errors import INTERRUPTED, MISSTATED, TOO_SHORT, UNNAMED, StickslipError, interruption
 
 COMMANDS = {  # by the file that they stand in
@@ -23,7 +23,6 @@ COMMANDS = {  # by the file that they stand in
     "simulate": ("bifurcation", "dither", "lab", "simulate", "stability", "sweep"),
     "vibrations": ("decay", "joint", "squeak", "tribometer", "wavelet"),
 }
-ARGUMENTS = "stickslip.arguments"  # the key under which the context keeps what was typed
 # Of each kind of error the options without which the command may succeed.
 CAUSES = {MISSTATED: ("--delimiter", "--decimal"), TOO_SHORT: ("--rows",)}
 

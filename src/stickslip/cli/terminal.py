@@ -9,6 +9,7 @@ import itertools
 import json
 import logging
 import re
+import shlex
 import shutil
 import sys
 import textwrap
@@ -37,6 +38,8 @@ END = 3  # lines kept for what is left out and where the page lies
 TITLE: Mapping[str, Any] = {"bold": True}
 FAINT: Mapping[str, Any] = {"dim": True}
 PLURALS = {"quantity": "quantities"}
+ARGUMENTS = "stickslip.arguments"  # the key under which the context keeps what was typed
+CARRIED = ("--output", "--twins")  # what a command that mends another one keeps of it
 
 
 def say(text: object = "", *, err: bool = False) -> None:
@@ -330,7 +333,25 @@ def _print(title: str, lines: Sequence[str]) -> None:
 
 def _remedy(story: Story) -> list[str]:
     """The command that mends what is wrong, on a line that can be copied."""
-    return ["To mend it:", story.remedy] if story.remedy else []
+    return ["To mend it:", as_typed(story.remedy)] if story.remedy else []
+
+
+def as_typed(command: str) -> str:
+    """A command about the files that were asked about, where these lie, with the folder and twins that were asked for.
+
+    A page has their names alone: it may be read elsewhere.
+    """
+    context = click.get_current_context(silent=True)
+    typed: list[str] = context.meta.get(ARGUMENTS, []) if context is not None else []
+    words = shlex.split(command)
+    words[2:3] = [word for word in typed if "+".join(Path(own).name for own in word.split("+")) == words[2]][:1] or [
+        words[2]
+    ]
+    for at, word in enumerate(typed):
+        option, equals, _ = word.partition("=")
+        if option in CARRIED and option not in words:
+            words[3:3] = [word] if equals else typed[at : at + 2]
+    return shlex.join(words)
 
 
 def _lines(text: object, begin: str = "") -> list[str]:

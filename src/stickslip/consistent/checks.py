@@ -12,6 +12,7 @@ from dataclasses import dataclass, field, replace
 from itertools import combinations
 
 from stickslip.estimate import Plain
+from stickslip.units import parse_unit
 
 HOLDS, FAILS, UNTOLD = "holds", "fails", "can not be told"
 APART = 3.0  # standard deviations from which two numbers are not one
@@ -76,10 +77,9 @@ def untold(name: str, why: str) -> Check:
     return Check(name, math.nan, math.nan, "1", math.nan, UNTOLD, why)
 
 
-LENGTHS = {"mm": 1e-3, "inch": 0.0254}
+LENGTHS = ("mm", "inch", "m")
 UNITS = {
-    "x": LENGTHS, "z": LENGTHS, "v": {"mm/s": 1e-3}, "a": {"g": 9.80665, "mm/s^2": 1e-3},
-    "load": {"lbf": 4.4482216152605, "kN": 1e3},
+    "x": LENGTHS, "z": LENGTHS, "v": ("mm/s", "m/s"), "a": ("g", "mm/s^2", "m/s^2"), "load": ("lbf", "kN", "N"),
 }  # fmt: skip
 CONSTANTS = {"stiffness": {"N/mm": 1e3}, "mass": {"g": 1e-3}}
 SI = {"x": "m", "z": "m", "v": "m/s", "a": "m/s^2", "load": "N", "stiffness": "N/m", "mass": "kg"}
@@ -142,6 +142,11 @@ class Amplitudes:
     damper: str
     tolerance: float
     contact: str = "ground"
+    stated: Mapping[str, str] = field(default_factory=dict)  # units, of channels whose unit is stated
+
+    def unit(self, name: str) -> str:
+        """That a channel was read in."""
+        return self.stated.get(name, SI[name])
 
     @property
     def knows(self) -> bool:
@@ -231,9 +236,9 @@ def _of_the_balance(balance: Amplitudes) -> Iterator[Slip]:
     """What only the friction's own nature speaks against, where nothing measures it: it opposes the motion."""
     if "z" not in balance.values or "load" in balance.values:
         return
-    x = abs(balance.values["x"])
-    if x > SWUNG and balance.angular**2 * x > HURLED and balance.of_one_size and "a" not in balance.values:
-        yield _in_unit(("x", "z"), "mm", 1e-3)
+    x, metres = abs(balance.values["x"]), balance.unit("x") == balance.unit("z") == SI["x"]
+    if metres and x > SWUNG and balance.angular**2 * x > HURLED and balance.of_one_size and "a" not in balance.values:
+        yield _in_unit(("x", "z"), "mm", SI["x"])
         return
     if not balance.knows or balance.contact == "base":  # a face that moves may drive the mass by friction alone
         return
@@ -258,21 +263,20 @@ def _slips(balance: Amplitudes) -> Iterator[Slip]:
         yield Slip(f"{name} has the wrong sign", {name: (name, -1.0)})
     for one, other in combinations(names, 2):
         yield Slip(f"{one} and {other} are exchanged", {one: (other, 1.0), other: (one, 1.0)})
-    for name in names:
-        for unit, factor in UNITS.get(name, {}).items():
-            yield _in_unit((name,), unit, factor)
-    if "z" in names:
-        for unit, factor in LENGTHS.items():
-            yield _in_unit(("x", "z"), unit, factor)
+    for name in (name for name in names if name in UNITS):
+        yield from (_in_unit((name,), unit, balance.unit(name)) for unit in UNITS[name] if unit != balance.unit(name))
+    if "z" in names and balance.unit("x") == balance.unit("z"):
+        yield from (_in_unit(("x", "z"), unit, balance.unit("x")) for unit in LENGTHS if unit != balance.unit("x"))
     yield from _of_constants(balance.rig)
     yield _of_clock()
+    yield Slip("the time is in s, not in ms", clock=1 / MILLISECONDS)
 
 
-def _in_unit(names: Sequence[str], unit: str, factor: float) -> Slip:
-    are = "are" if len(names) > 1 else "is"
-    return Slip(
-        f"{' and '.join(names)} {are} in {unit}, not in {SI[names[0]]}", {name: (name, factor) for name in names}
-    )
+def _in_unit(names: Sequence[str], unit: str, stated: str) -> Slip:
+    """Channels in another unit than they were read in."""
+    are, expect = "are" if len(names) > 1 else "is", SI[names[0]]
+    factor = parse_unit(unit, expect).scale / parse_unit(stated, expect).scale
+    return Slip(f"{' and '.join(names)} {are} in {unit}, not in {stated}", {name: (name, factor) for name in names})
 
 
 def _of_constants(known: Iterable[str]) -> Iterator[Slip]:

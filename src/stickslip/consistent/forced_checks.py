@@ -13,9 +13,12 @@ from stickslip.arrays import Array, Complex
 from stickslip.balance.mass import Lines, find_lines, response_of
 from stickslip.consistent.checks import APART, FAILS, HOLDS, UNTOLD, Amplitudes, Check, Slip, compared, judged, untold
 from stickslip.consistent.sliding_balance import Slider
+from stickslip.errors import RecordError
+from stickslip.files.expression import split_spec
 from stickslip.record.channels import Channel
 from stickslip.record.record import RIG_UNITS, Record
 from stickslip.statistics import mean_uncertainty
+from stickslip.units import parse_unit
 
 RATES = ("x_rate", "x_rate_rate")  # the displacement's derivatives
 ENERGY, STOPPING = "energy of whole cycles", "sliding without stops"
@@ -113,7 +116,8 @@ class Seen:
         values = {
             name: complex(read[:, self.at].mean()) for name, read in self.lines.amplitudes.items() if name not in RATES
         }
-        return Amplitudes(values, self.angular, self.rig, self.damper, self.tolerance, self.contact)
+        stated = {name: unit for name, channel in self.stated_channels.items() if (unit := _unit_read(channel))}
+        return Amplitudes(values, self.angular, self.rig, self.damper, self.tolerance, self.contact, stated)
 
 
 def _rates(x: Array, fs: float) -> tuple[Array, Array]:
@@ -131,6 +135,15 @@ def _trips(record: Record) -> float:
     force, x = record["load"] - np.mean(record["load"]), record["x"]
     most = float(np.abs(force).max() * np.ptp(x))
     return float(np.sum((force[1:] + force[:-1]) / 2 * np.diff(x))) / most if most > 0 else 0.0
+
+
+def _unit_read(channel: Channel) -> str:
+    """The unit that a channel's file, or who named it, has stated; empty where that tells none."""
+    try:
+        unit = split_spec(channel.source).unit or ""
+        return unit if unit and parse_unit(unit, channel.unit) else ""
+    except RecordError:  # read by a sensitivity, or from no file
+        return ""
 
 
 def acceleration_check(seen: Seen) -> Check:

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from stickslip.answers.findings import Findings
+from stickslip.answers.mistakes import hopeless
 from stickslip.arrays import Array
 from stickslip.balance.motion import is_measured
 from stickslip.consistent.checks import Slip
@@ -279,9 +280,12 @@ def corrected(findings: Findings, slip: Slip, question: str = "analyze", options
 
 
 def completed(findings: Findings, question: str = "analyze", options: Sequence[str] = ()) -> str:
-    """The command that asks again with what was not stated: a constant left to fill in, a unit as it was read."""
-    record, read = findings.record, dict(_read(findings.record))
-    assumed = {name: channel.unit for name, channel in record.channels.items() if channel.assumed}
+    """The command that asks again with what was not stated: a constant left to fill in, a unit as it was read.
+
+    Where the channels contradict each other as they were read, their units are to be filled in, too.
+    """
+    record, read, wrong = findings.record, dict(_read(findings.record)), hopeless(findings.results.get("consistency"))
+    assumed = {name: "UNIT" if wrong else channel.unit for name, channel in record.channels.items() if channel.assumed}
     if assumed:
         read["units"] = {**read.get("units", {}), **assumed}
     clock = next((file["seconds"] for file in read.get("files", ()) if file.get("seconds")), "")
