@@ -143,6 +143,12 @@ def test_units_that_two_slips_have_left_out_are_to_be_filled_in() -> None:
     assert right(mended(result, **told))
 
 
+def test_a_unit_that_nobody_knows_is_named() -> None:
+    result = ask("analyze", written("t [s],x [foo],z [mm],a [g]"), *RIG)
+    assert result.exit_code == 1
+    assert "'foo' is no unit that is known" in result.stderr
+
+
 def test_a_command_that_mends_keeps_where_files_lie_and_results_go() -> None:
     path = written("t [s],x [m],z [m],a [m/s^2]", x=1e3).resolve()
     result = CliRunner().invoke(main, ["analyze", str(path), *RIG, "--twins=0", "--output", "results"])

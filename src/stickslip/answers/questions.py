@@ -26,13 +26,15 @@ from stickslip.cycle.loops import friction_loops
 from stickslip.cycle.onset import breakaway, presliding
 from stickslip.cycle.regression import Regression, regress_friction
 from stickslip.cycle.sticks import find_sticks
-from stickslip.errors import TOO_SHORT, UNNAMED, EstimateError, ModelError, StickslipError
+from stickslip.errors import TOO_SHORT, UNNAMED, EstimateError, ModelError, RecordError, StickslipError
 from stickslip.estimate import NORMAL_95, Constant, Doubt, Estimate, Result
+from stickslip.record.channels import Channel
 from stickslip.record.flaws import constant
 from stickslip.record.record import RIG_UNITS, Record, require_record
 from stickslip.rig.settings import RigSettings, rig_settings
 from stickslip.statistics import student
 from stickslip.twin.search import lacking
+from stickslip.units import parse_unit
 
 STRETCH = 1 << 14  # samples in which the contact is fitted
 GOES_ON = 0.8  # of the motion at first that is left at last, where something drives it
@@ -320,12 +322,22 @@ def _nothing(name: str, record: Record, refusals: list[StickslipError]) -> Estim
         if first.kind == TOO_SHORT:
             return EstimateError(f"{name} is too short: {len(record)} samples", *first.args[1:], kind=first.kind)
         return EstimateError(f"{value}: {first.value}", first.rule, first.next_step, kind=first.kind)
+    channels = ", ".join(f"{c.name} [{c.unit}]{_strange(c)}" for c in record.channels.values())
     return EstimateError(
-        f"{value}: its channels are {', '.join(f'{c.name} [{c.unit}]' for c in record.channels.values())}",
+        f"{value}: its channels are {channels}",
         "a displacement x or velocity v is needed, and a force, or mass and stiffness to find it",
         'name the columns, as in channels={"x": "COLUMN [mm]"}',
         kind=UNNAMED,
     )
+
+
+def _strange(channel: Channel) -> str:
+    """That its unit is none, in words; nothing of one that is."""
+    try:
+        parse_unit(channel.unit)
+    except RecordError:
+        return f" ('{channel.unit}' is no unit that is known)"
+    return ""
 
 
 # ---- doubts

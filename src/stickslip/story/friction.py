@@ -27,6 +27,7 @@ from stickslip.story.words import Caution, cautions, constant, doubts, interval_
 MOSTLY = 0.5  # of the time: a bound above it tells nothing
 RARELY = 0.005  # of the time
 SAME = 0.05  # forward and back differ noticeably beyond this part of the level
+LOOSE = 3.0  # times the sliding friction: a bound on the static one that is wider tells nothing worth a claim
 ALIKE = 0.02  # a static friction that differs from the sliding one by less is about as large
 TOO_WIDE = 0.5  # an interval wider than this part of the value deserves a word
 
@@ -258,6 +259,9 @@ def _of_breakaway(breakaway: Breakaway) -> Iterator[str]:
         yield f"The breakaway force is not known: {ratio.status}."
         return
     if not stands(ratio.status):
+        if low < 1 and high > LOOSE:
+            yield f"The record hardly tells what it bears at breakaway: at most {high:.2g} times the sliding friction."
+            return
         most = f"at most {high:.3g}" if low < 1 else value_of(ratio)
         yield f"At breakaway it seems to bear {most} times as much as while it slides."
         return
