@@ -2,9 +2,9 @@
 
 Seven servos' published parameters as centres, encoders of 8 to 16 bit, 50 Hz to 1 kHz, gravity, currents with noise;
 with the torque measured to 1 %, or by the controller's kp alone, known to 1 %, its kd unknown; with play between motor
-and link, which both have an encoder, or ("link alone", "motor alone": of joints that have play) one of them; with a
-torque that comes late; with friction that falls with the speed ("stribeck": counted where a fall is told). Counted
-are the numbers that stand without a grave doubt.
+and link, which both have an encoder, or ("link alone", "motor alone", "motor alone with its play stated": of joints
+that have play) one of them; with a torque that comes late; with friction that falls with the speed ("stribeck":
+counted where a fall is told). Counted are the numbers that stand without a grave doubt.
 
     python benchmarks/joints.py --draws 100 --first 1000
 """
@@ -30,7 +30,8 @@ TOLD = (
 )  # fmt: skip
 
 PLAYING = ("play", "play without gravity")
-ALONE = ("link alone", "motor alone")
+STATED = "motor alone with its play stated"  # to a tenth
+ALONE = ("link alone", "motor alone", STATED)
 LATE = "late"  # by one of joints.LATE, and without the reference
 FALLS = {"stribeck": True, "stribeck without": False}  # friction that falls with the speed, or none that does
 IDLE = "idle temperature"  # of joints whose friction does not follow it
@@ -71,7 +72,7 @@ Found = tuple[ss.cycle.JointFriction, ss.cycle.JointBacklash | None]
 def asked(joint: joints.Joint, kind: str, seed: int) -> Found:
     """What is said of one joint, and of its play."""
     record, written = joint.record, dict(joint.record.samples)
-    if kind == "motor alone":
+    if kind in ("motor alone", STATED):
         written["theta"] = written["motor"] / joint.truth["ratio"]
     left_out = {"torque alone": "reference", **dict.fromkeys(ALONE, "motor")}.get(kind)
     if left_out is not None:
@@ -82,7 +83,11 @@ def asked(joint: joints.Joint, kind: str, seed: int) -> Found:
         record = joints.delayed(joint, float(np.random.default_rng([seed, 10]).choice(joints.LATE)))
     if kind == IDLE:
         record = record.with_channel("temperature", idle(record, seed), unit="K")
-    regression = ss.cycle.regress_joint(record, **({"kp": joint.kp} if kind == "controller" else {}))
+    given = {"kp": joint.kp} if kind == "controller" else {}
+    if kind == STATED:
+        off = 1 + 0.1 * np.random.default_rng([seed, 11]).standard_normal()
+        given["play"] = (off * joint.truth["play"], 0.1 * joint.truth["play"])
+    regression = ss.cycle.regress_joint(record, **given)
     if kind in PLAYING:
         with contextlib.suppress(ss.errors.EstimateError):
             return regression, ss.cycle.joint_backlash(record, joint=regression)

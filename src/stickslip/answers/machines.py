@@ -40,6 +40,7 @@ def analyze_joint(
     kd: Constant | None = None,
     torque_constant: Constant | None = None,
     gravity: bool | None = None,
+    play: Constant | None = None,
     axis: str | None = None,
 ) -> Findings:
     """Ask a joint's log every question about its friction that its columns allow.
@@ -59,6 +60,8 @@ def analyze_joint(
         What is known of the joint, as "0.021 ± 0.001 kg m^2", "17.8 N m/rad", "0.6 N m s/rad", "0.87 N m/A".
     gravity : bool, optional
         Whether gravity may act on it; of an angle yes, unless said.
+    play : float, str, tuple or Estimate, optional
+        Of the teeth between motor and link [rad], where the motor alone has an encoder.
     axis : str, optional
         Which axis, where the log has several: what tells it in the columns' names.
 
@@ -88,15 +91,15 @@ def analyze_joint(
     True
     """
     require_record(record)
-    given = {"inertia": inertia, "kp": kp, "kd": kd, "torque_constant": torque_constant}
+    given = {"inertia": inertia, "kp": kp, "kd": kd, "torque_constant": torque_constant, "play": play}
     faults, name, inquiry = tuple(record.check()), record_name(record), Inquiry()
     log = axis_record(record, axis=axis)
     log = without_delays(log, question="the friction of a joint")
     joint = regress_joint(log, gravity=gravity, **given)
     whole = _with_friction(log, joint)
     breakaway = inquiry.ask("Breakaway", partial(joint_breakaway, whole, joint=joint), aside=True)
-    play = partial(joint_backlash, whole, joint=joint)
-    backlash = inquiry.ask("Backlash", play, aside=True) if "motor" in whole else None
+    apart = partial(joint_backlash, whole, joint=joint)
+    backlash = inquiry.ask("Backlash", apart, aside=True) if "motor" in whole else None
     sticks = inquiry.ask("Sticks and slips", partial(find_sticks, whole, method="speed"), aside=True)
     results = {"joint": joint, "breakaway": breakaway, "backlash": backlash}
     results["sticks"] = with_doubt(sticks, TURNS)
@@ -156,7 +159,7 @@ def compare_joints(
     gravity : bool, optional
         As there.
     **constants : float, str, tuple or Estimate
-        `inertia`, `kp`, `kd` and `torque_constant`, as there.
+        `inertia`, `kp`, `kd`, `torque_constant` and `play`, as there.
 
     Returns
     -------

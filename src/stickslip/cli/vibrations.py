@@ -43,6 +43,9 @@ BLOCK = 1_000_000  # rows of a part that is mapped: spikes and sticks are asked 
 @click.option("--kd", metavar="VALUE", help="The controller's damping in N m s/rad; found unless given.")
 @click.option("--torque-constant", metavar="VALUE", help="Torque per current at the joint in N m/A.")
 @click.option("--gravity/--no-gravity", default=None, help="Whether gravity acts on it; of an angle yes unless said.")
+@click.option(
+    "--play", metavar="VALUE", help="Of the teeth in rad, or with its unit, where the motor alone has an encoder."
+)
 @click.option("--axis", metavar="NAME", help="Which axis of a log of several: a part of its columns' names.")
 @click.option(
     "--urdf",
@@ -78,7 +81,8 @@ def joint(files: tuple[str, ...], output: Output, propose: Path | None, **option
     stickslip joint walk.mcap --urdf arm.urdf --axis elbow
     stickslip joint episode.parquet --axis 2 --kp "17.8 N m/rad" --units "observation.state.2=deg"
     """
-    names, axis, urdf = ("inertia", "kp", "kd", "torque_constant", "gravity"), options.pop("axis"), options.pop("urdf")
+    names = ("inertia", "kp", "kd", "torque_constant", "gravity", "play")
+    axis, urdf = options.pop("axis"), options.pop("urdf")
     if urdf is not None and axis is None:
         raise click.BadParameter("which of the robot's joints? name it by --axis", param_hint="--urdf")
     stated = {name: options.pop(name) for name in names}

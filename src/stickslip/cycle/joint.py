@@ -21,6 +21,7 @@ from stickslip.cycle.joint_fit import (
     coefficient,
     fitted,
     joint_data,
+    seating,
     turning,
     warmed,
 )
@@ -168,6 +169,7 @@ def regress_joint(
     kd: Constant | None = None,
     torque_constant: Constant | None = None,
     gravity: bool | None = None,
+    play: Constant | None = None,
 ) -> JointFriction:
     r"""Which friction, inertia and gravity explain the torque of a joint?
 
@@ -209,6 +211,9 @@ def regress_joint(
         Torque per current [N m/A], at the joint.
     gravity : bool, optional
         Whether gravity may act: of an angle yes, of a displacement or beside `bodies` no, where left out.
+    play : float, str, tuple or Estimate, optional
+        Of the teeth between the encoder and the link [rad], where the motor alone has an encoder: while the motor
+        crosses it the link is left out of the balance, and gravity acts half of it beside.
 
     Returns
     -------
@@ -219,7 +224,7 @@ def regress_joint(
     RecordError
         A channel is missing, broken or too short, or the units of torque and motion do not belong together.
     ModelError
-        A constant without meaning, or gravity of an axis that moves straight.
+        A constant without meaning, gravity of an axis that moves straight, or play that two encoders tell.
     EstimateError
         No sliding both ways, or columns that the motion does not tell apart: the sentence says which motion would.
 
@@ -234,13 +239,14 @@ def regress_joint(
     >>> regression.forward.includes(0.06), regression.load.includes(0.1), round(regression.inertia.value, 3)
     (True, True, 0.02)
     """
-    given = {"inertia": inertia, "kp": kp, "kd": kd, "torque_constant": torque_constant}
-    record, data = joint_data(record, gravity, **given)
+    given = {"inertia": inertia, "kp": kp, "kd": kd, "torque_constant": torque_constant, "play": play}
+    teeth = seating(record, gravity, **given)
+    record, data = joint_data(record, gravity, False, teeth, **given)
     (data,) = warmed([data])
     delay = delay_of(data)
     data = punctual(data, delay)
     fit, terms, pull, left_out = fitted(data)
-    (slow,) = warmed([joint_data(record, gravity, True, **given)[1]])
+    (slow,) = warmed([joint_data(record, gravity, True, teeth, **given)[1]])
     slow = punctual(slow, delay)
     fall = falling(slow, fit, terms, pull)
     data = slow if fall else data
@@ -391,7 +397,7 @@ def _rows(
     record: Record, data: JointData, fit: LeastSquares, pull: tuple[float, float], inertia: float, damped: Array
 ) -> dict[str, Any]:
     """Speed, torque and friction wherever it slides."""
-    slides, position = data.logs[0].sliding, data.logs[0].position
+    slides, position = data.logs[0].sliding, data.logs[0].link
     speed, acceleration = (slides.at(data.logs[0].turned, order) for order in (1, 2))
     weight = pull[0] * slides.at(np.sin(position)) + pull[1] * slides.at(np.cos(position))
     if "bodies" in record:
@@ -420,7 +426,7 @@ def _stribeck(tell: Telling, fall: Fall | None, pull: tuple[float, float], load:
 
 def _carried(data: JointData, pull: tuple[float, float]) -> float:
     """Mean size of gravity's torque while it slides."""
-    place = data.logs[0].position[data.logs[0].sliding.rows]
+    place = data.logs[0].link[data.logs[0].sliding.rows]
     return float(np.mean(np.abs(pull[0] * np.sin(place) + pull[1] * np.cos(place))))
 
 
@@ -431,7 +437,7 @@ def _level(tell: Telling, pull: tuple[float, float], load: Estimate | None, *, r
         weights[FALL[0]] = 1.0
     if load is None or not load.known:
         return tell.sum(weights, name)
-    place = tell.data.logs[0].position[tell.data.logs[0].sliding.rows]
+    place = tell.data.logs[0].link[tell.data.logs[0].sliding.rows]
     side = np.sign(pull[0] * np.sin(place) + pull[1] * np.cos(place))
     carried, share = _carried(tell.data, pull), load.value
     weights |= {"load": carried, "sine": share * float(np.mean(side * np.sin(place)))}

@@ -10,7 +10,7 @@ import numpy as np
 from stickslip.arrays import Array
 from stickslip.cycle.joint import RICHER, Telling, delay_of, misfits, punctual
 from stickslip.cycle.joint_fall import bends
-from stickslip.cycle.joint_fit import JointData, about_load, fitted, joint_data, pooled, turning, warmed
+from stickslip.cycle.joint_fit import JointData, about_load, fitted, joint_data, pooled, seating, turning, warmed
 from stickslip.errors import EstimateError, RecordError
 from stickslip.estimate import Constant, Estimate, Result
 from stickslip.record.record import Record
@@ -93,7 +93,7 @@ def regress_joint_logs(
     gravity : bool, optional
         As of :func:`regress_joint`.
     **constants : float, str, tuple or Estimate
-        `inertia`, `kp`, `kd` and `torque_constant`, as of :func:`regress_joint`.
+        `inertia`, `kp`, `kd`, `torque_constant` and `play`, as of :func:`regress_joint`.
 
     Returns
     -------
@@ -123,8 +123,12 @@ def regress_joint_logs(
     >>> [bool(one.error < one.plain) for one in together.predictions]
     [True, True, True]
     """
+    teeth = [seating(record, gravity, **constants) for record in records]
     data, slow = (
-        warmed([joint_data(record, gravity, slowly, **constants)[1] for record in records]) for slowly in (False, True)
+        warmed(
+            [joint_data(record, gravity, slowly, at, **constants)[1] for record, at in zip(records, teeth, strict=True)]
+        )
+        for slowly in (False, True)
     )
     if len(data) < 2 or len({(one.source, one.terms) for one in data}) > 1:
         raise RecordError(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -121,8 +122,44 @@ class Sliding:
         return smoothed * self.weights
 
 
-def sliding(position: Array, fs: float, *, slowly: bool = False) -> Sliding:
-    """When does a joint surely slide?
+class Teeth(NamedTuple):
+    """How a motor stands against its link, whose teeth have play.
+
+    Attributes
+    ----------
+    lead : ndarray, shape (n,)
+        By how much the motor is ahead: half of the play, to the side on which the teeth carry.
+    carry : ndarray of bool
+        Where they surely do.
+    unsure : ndarray
+        Standard deviation of gravity's torque, by that of the play.
+    """
+
+    lead: Array
+    carry: Mask
+    unsure: Array
+
+
+def seated(position: Array, least: Array, most: Array, play: float) -> tuple[Array, Mask]:
+    """On which side teeth carry, and where they surely do, by the bounds of their torque.
+
+    Where it changes its sign the motor crosses the play, while the link may stay: until it has gone by all of it.
+    """
+    sure = np.where(np.minimum(least, most) > 0, 1.0, np.where(np.maximum(least, most) < 0, -1.0, 0.0))
+    side, carry = np.zeros(len(position)), np.zeros(len(position), dtype=bool)
+    last, begin, crosses = 0.0, float(position[0]), True
+    for row, (place, now) in enumerate(zip(position, sure, strict=True)):
+        if now not in (0.0, last):
+            last, begin, crosses = now, float(place), True
+        if crosses:
+            begin = min(begin, place) if last > 0 else max(begin, place)
+            crosses = last * (place - begin) < play
+        side[row], carry[row] = last, not crosses and now == last
+    return side, carry
+
+
+def sliding(position: Array, fs: float, *, slowly: bool = False, carry: Mask | None = None) -> Sliding:
+    """When does a joint surely slide, and where `carry` tells so, with its teeth seated?
 
     Where its speed is above four deviations of its noise, a twentieth of its fast speed, and one encoder count in half
     a window: slower, the error of the counts is a slope and no noise. With `slowly` the ends of strokes are seen too,
@@ -140,6 +177,8 @@ def sliding(position: Array, fs: float, *, slowly: bool = False) -> Sliding:
     window = Window(max(SHORTEST, int(SHARE * float(lengths @ lengths) / float(lengths.sum()))), fs)
     count = quantisation_step(position) * fs
     side = np.where(speed > max(slowest, count / window.half), np.sign(velocity.values), 0.0)
+    if carry is not None:
+        side = np.where(carry, side, 0.0)
     slides = Sliding(side, window, _apart(window.within(side), window), max(slowest, count / window.half))
     if not slowly:
         return slides
