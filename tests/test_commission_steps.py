@@ -390,3 +390,13 @@ def test_what_hardly_swings_is_no_ringing_of_the_contact():
     late = ss.Estimate.normal("frequency", 89.0, sd=1.4, unit="Hz", method="made up")
     seen = replace(rings, name="resonance seen by a and load")
     assert coupled_mode(replace(ringing, resonances=(seen, replace(rings, frequency=late, damping=dead)))) is seen
+
+
+@pytest.mark.parametrize("seed", [71021, 71026, 71060])
+def test_a_ringing_is_read_after_the_last_slip(seed: int) -> None:
+    """On these it was read from the flat top of the last slip, and the damping ratio was too high."""
+    rig = loaded("benchmarks/commission.py").random_rig(seed)
+    system, let_go = rig.system, {"x": 4.6 * rig.system.law.kinetic / rig.system.stiffness}
+    run = ss.simulate(replace(system, drive=ss.drives.Release()), duration=1.0, start=let_go)
+    held = bench.onto_stick(rig.record("stick"), mass=system.mass, stiffness=system.stiffness)
+    assert held.stopped > run.events[-1].time

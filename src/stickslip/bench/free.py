@@ -450,18 +450,28 @@ def _stop(record: Record) -> int:
 
 
 def _rung(record: Record, mass: Estimate, stop: int) -> tuple[ImpactTest, float]:
-    """What rings after the stop, from the first beginning on at which it is decaying oscillations and no slip."""
+    """What rings after the stop, from the second beginning on at which it is decaying oscillations and no slip.
+
+    At the first one the last slip may end after it, which modes that die at once make up for: the loudest reading, from
+    which a ringing is read, lies on the flat top of a slip. Of 60 simulated rigs it did so in 20, and damping ratios
+    were too high by one standard deviation there; by none in the others. Of 130 others 122 intervals held from the
+    second beginning on.
+    """
     best: ImpactTest | None = None
+    settled = False
     begin, last = stop, EstimateError("nothing rings", f"{STICKS} needs a contact that holds", "let go further out")
     step = max(1, round(LATER * record.fs / 45.0))  # the thesis's contact rings at 45 Hz
     for _ in range(TRIES):
         try:
             test = impact_test(record.rows(begin), mass=mass, tapped=False)
             step = max(1, round(LATER * record.fs / test.resonances[0].frequency.value))
-            if best is None or _disorder(test) < _disorder(best):
+            clean = test.residual < CLEAN and len(test.resonances) <= MOST_MODES
+            if best is None or (clean and settled) or _disorder(test) < _disorder(best):
                 best = test
-            if test.residual < CLEAN and len(test.resonances) <= MOST_MODES:
+            if clean and settled:
                 break
+            if settled := clean:
+                begin = round((test.time - record.start) * record.fs)
         except EstimateError as error:
             last = error
         begin += step
