@@ -35,6 +35,17 @@ RIGID = ss.Oscillator(
 )
 COMPLIANT = RIGID.having(law=ss.laws.CompliantContact(1.1, 192000, 23.9))
 BELT = ss.Oscillator(mass=1, stiffness=1, damping=0.1, law=ss.laws.Coulomb(1.0, static=1.5), drive=ss.drives.Belt(0.5))
+TWO_BLOCKS = ss.Structure(
+    np.eye(2),
+    np.zeros((2, 2)),
+    np.array([[2.2, -1.2], [-1.2, 2.2]]),
+    contacts=[
+        ss.Contact(ss.laws.Coulomb(0.8, static=1.0), [1, 0]),
+        ss.Contact(ss.laws.Coulomb(1.0, static=1.25), [0, 1]),
+    ],
+    drive=ss.drives.Belt(0.02),
+)
+TWO_TONES = ss.drives.MultiTone([(0.65e-3, 2.5, 0.0), (0.3e-3, 2.5 * math.sqrt(2), 0.0)])
 CASES: dict[str, tuple[ss.Oscillator, dict[Any, Any], int, int]] = {
     "rigid": (RIGID, {"frequency": [1.3, 5.61, 20.0], "kinetic": [0.3, 1.1, 1.6]}, 30, 40),
     "compliant": (COMPLIANT, {"frequency": [2.5, 5.61], "kinetic": [0.7, 1.28]}, 30, 40),
@@ -67,11 +78,45 @@ def test_systems_together_have_the_tables_of_each_alone(systems: list[ss.Oscilla
         assert (own.entry, own.names, own.motion) == (alone.entry, alone.names, alone.motion)
 
 
+@pytest.mark.parametrize("engine", ["serial", "threads"])
+@pytest.mark.parametrize(
+    ("system", "name", "values"),
+    [
+        (BELT, "speed", (0.1, 0.5)),
+        (BELT.having(law=COMPLIANT.law), "mass", (1.0, 2.0)),
+        (TWO_BLOCKS, "speed", (0.02, 0.05)),
+        (RIGID.having(drive=TWO_TONES), "mass", (1.0, 2.0)),
+    ],
+    ids=["rigid", "compliant", "two blocks", "tones"],
+)
+def test_exponents_without_a_period_of_the_drive_are_those_of_each_alone(
+    system: ss.Oscillator, name: str, values: tuple[float, ...], engine: str
+) -> None:
+    swept = ss.sweep(system, {name: values}, measures=["lyapunov", "amplitude"], cycles=25, settle=5, engine=engine)
+    for value, exponent in zip(values, swept.lyapunov.values, strict=True):
+        assert exponent == ss.solve.lyapunov(system.having(**{name: value}), cycles=25, transient=5).value
+    assert np.all(swept.amplitude > 0)
+
+
+@pytest.mark.parametrize("measures", [["lyapunov"], ["amplitude", "lyapunov"]])
+def test_no_exponent_is_asked_of_what_nothing_drives(measures: list[str]) -> None:
+    with pytest.raises(SolveError, match=r"no period.*a belt"):
+        ss.sweep(CASES["free"][0], {"mass": [1.0, 2.0]}, measures=measures, settle=1, cycles=30)
+
+
+def test_an_exponent_on_a_belt_is_for_other_engines_than_a_gpu() -> None:
+    cuda = pytest.importorskip("stickslip.maps.cuda")
+    plan = planned(BELT, {"mass": [1.0]}, measures=["lyapunov"], cycles=30, settle=0, start={})
+    with pytest.raises(ModelError, match=r"tells its exponent under one; take engine=\"threads\""):
+        run_block(plan, 0, alone=cuda._refuse)
+
+
 @pytest.mark.parametrize("name", CASES)
 def test_marched_together_they_are_as_each_alone(name: str) -> None:
     """The counted march against a Trajectory of each motion, whose measures are taken in another way."""
     system, values, settle, cycles = CASES[name]
-    plan = planned(system, values, measures=COUNTED, cycles=cycles, settle=settle, start={})
+    asked = [measure for measure in COUNTED if name != "free" or measure != "lyapunov"]
+    plan = planned(system, values, measures=asked, cycles=cycles, settle=settle, start={})
     for number in plan.blocks:
         found, _ = run_block(plan, number)
         for row, steps in enumerate(plan.points(number)):

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from stickslip.arrays import Array, Index
+from stickslip.drives.kinds import Drive
 from stickslip.errors import ModelError, SolveError
 from stickslip.maps import measures as log
 from stickslip.maps.grid import START
@@ -22,7 +23,7 @@ from stickslip.solve.assembly import tables_of
 from stickslip.solve.glide import Model, Past, blank_pieces
 from stickslip.solve.kernel import scratch
 from stickslip.solve.phasors import phasors_of
-from stickslip.solve.poincare import derivative, lap, lyapunov, tables
+from stickslip.solve.poincare import beat, derivative, lap, lyapunov, tables
 from stickslip.solve.simulate import simulate
 from stickslip.solve.tables import System, Systems, Tables, by_value, kind_of_drive, kind_of_law, opened, oscillators
 from stickslip.solve.trajectory import Event, Trajectory
@@ -52,7 +53,7 @@ def crowds(plan: Plan, number: int) -> Iterator[tuple[Index, Systems | None, dic
     real = np.array([s is not None for s in laws])[law] & np.array([s is not None for s in drives])[drive]
     real &= np.array([s is not None for s in owners])[own]
     yield np.flatnonzero(~real), None, {"status": NO_SYSTEM}
-    kinds = [s and kind_of_law(s.law) for s in laws], [s and kind_of_drive(s.drive) for s in drives]
+    kinds = [s and kind_of_law(s.law) for s in laws], [s and _kind_of_drive(plan, s.drive) for s in drives]
     which = np.array([_numbers(kinds[0])[law], _numbers(kinds[1])[drive]])
     which[:, ~real] = -1
     pairs = np.unique(which[:, np.all(which >= 0, axis=0)], axis=1).T
@@ -71,6 +72,13 @@ def crowds(plan: Plan, number: int) -> Iterator[tuple[Index, Systems | None, dic
             on_base=base == 1.0,
         )
         yield rows, systems, {**plan.start, **_starts(plan, steps[rows])}
+
+
+def _kind_of_drive(plan: Plan, drive: Drive) -> Any:
+    """The kind of a drive; None also where an exponent is asked of what it leaves to itself: all directions tell it,
+    and the watch carries one."""
+    alone = "lyapunov" in plan.measures and not math.isfinite(drive.motion().period)
+    return None if alone else kind_of_drive(drive)
 
 
 def _numbers(kinds: Sequence[Any]) -> Index:
@@ -140,7 +148,7 @@ def watched(plan: Plan, systems: Systems, start: Mapping[str, Any], watch: Watch
         units = np.where(np.isfinite(table.period), table.period, 2 * np.pi / natural)
         rest = np.where(natural > 0, 1 / natural, table.period)
     tangents = named & {"multipliers", "lyapunov"}
-    grown, turned = driven and "lyapunov" in named, driven and "multipliers" in named
+    grown, turned = "lyapunov" in named, driven and "multipliers" in named
     rows = min(2 * ORDERS, plan.cycles) if driven and named & {"period", "multipliers"} else 0
     leaps = table.leap if tangents else np.zeros((count, 1, 1, 1, 1))
     weights = np.ones((count, physical))
@@ -156,7 +164,7 @@ def watched(plan: Plan, systems: Systems, start: Mapping[str, Any], watch: Watch
         np.full((count, physical, physical), np.nan),
     )
     watch(given, out, states.shape[1], physical)
-    answers = _answers(plan, out, units, table.period)
+    answers = _answers(plan, out, units)
     lost = out.statuses == FAILED
     for name, values in answers.items():
         values[lost] = plan.variables[name].fill if name in plan.variables else 0
@@ -190,7 +198,7 @@ def _look(table: Tables, named: set[str]) -> Look:
     )
 
 
-def _answers(plan: Plan, out: Counted, units: Array, period: Array) -> Arrays:
+def _answers(plan: Plan, out: Counted, units: Array) -> Arrays:
     """The variables from what was counted."""
     sums, sections, jacobians, cycles = out.sums, out.sections, out.jacobians, plan.cycles
     with np.errstate(invalid="ignore"):
@@ -199,7 +207,7 @@ def _answers(plan: Plan, out: Counted, units: Array, period: Array) -> Arrays:
             "stick_share": sums[:, log.HELD] / (units * cycles), "micro_slips": sums[:, log.SHORT] / cycles,
             "transition_speed": np.where(sums[:, log.FASTEST] > 0, sums[:, log.FASTEST], np.nan),
             "amplitude": sums[:, log.REACH], "energy": sums[:, log.WORK] / cycles,
-            "lyapunov": np.where(np.isfinite(period), out.growths / (units * cycles), np.nan),
+            "lyapunov": out.growths / (units * cycles),
         }  # fmt: skip
     answers["order"] = np.zeros(len(sums))
     if sections.shape[1]:
@@ -326,7 +334,7 @@ def measured(run: Trajectory, plan: Plan, start: Mapping[str, float | str]) -> d
         values["order"] = order(run, settle)
     if "multipliers" in measures:
         values["multiplier"] = multiplier(run, settle)
-    if "lyapunov" in measures and math.isfinite(run.table.motion.period):
+    if "lyapunov" in measures and math.isfinite(beat(run.system, run.table)):
         values["lyapunov"] = lyapunov(run.system, cycles=cycles, transient=settle, start=start).value
     return values | {own_name(measure): measure(run) for measure in measures if callable(measure)}
 

@@ -67,7 +67,9 @@ def carried(values: Any) -> Any:
 
 def _refuse(plan: Plan, steps: tuple[int, ...]) -> Any:
     raise ModelError(
-        repr(plan.at(steps)[0]), "a GPU marches one mass under laws of linear modes with at most one tone", INSTEAD
+        repr(plan.at(steps)[0]),
+        "a GPU marches one mass under laws of linear modes with at most one tone, and tells its exponent under one",
+        INSTEAD,
     )
 
 

@@ -23,7 +23,7 @@ from stickslip.maps.measures import EVENTS, FAILED, REPEATS, Measure, Variable, 
 from stickslip.maps.plan import BLOCK, Arrays, Keep, Plan, assemble, blank, chunked, required
 from stickslip.maps.store import Store
 from stickslip.oscillator import Oscillator, Structure
-from stickslip.solve.poincare import BATCHES, tables
+from stickslip.solve.poincare import BATCHES, recurring, tables
 from stickslip.solve.refusal import Endless
 from stickslip.solve.simulate import opening, simulate
 from stickslip.solve.tables import System, laws_of
@@ -147,7 +147,8 @@ def sweep(
         [m/s], "energy" [J], "period", "multipliers", "lyapunov" [1/s], "events" (their number, and with a store
         each of them in Parquet files beside it), or a function of a Trajectory.
     cycles : int
-        Periods of the drive that are measured; without a periodic drive, natural periods.
+        Periods of the drive that are measured; without a periodic drive, natural periods (of the exponent under
+        several tones, periods of the slowest).
     settle : int
         Periods before that.
     start : mapping, optional
@@ -174,7 +175,7 @@ def sweep(
         scheduler answers; there is no GPU.
     SolveError
         The store can not be written or another process writes there; the law changes its mode for ever while no
-        time passes.
+        time passes; a Lyapunov exponent is asked of what nothing drives.
 
     Examples
     --------
@@ -234,8 +235,10 @@ def planned(
     laws_of(system)  # a mass in a plane has none of the measures
     if begun and not (isinstance(system, Oscillator) and isinstance(system.law, TimeDelay)):
         opening(tables(system), begun)
-    if "lyapunov" in named and cycles < BATCHES:
-        raise ModelError(f"cycles = {cycles}", f"a Lyapunov exponent needs {BATCHES} at least", "raise cycles=")
+    if "lyapunov" in named:
+        recurring(system)
+        if cycles < BATCHES:
+            raise ModelError(f"cycles = {cycles}", f"a Lyapunov exponent needs {BATCHES} at least", "raise cycles=")
     if named & REPEATS and cycles < 2:
         raise ModelError(f"cycles = {cycles}", "an orbit repeats within 2 measured periods at least", "raise cycles=")
     if named & EVENTS and isinstance(system, Structure) and len(system.contacts) != 1:

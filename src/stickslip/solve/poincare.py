@@ -489,12 +489,18 @@ def lyapunov(
     """
     if cycles < BATCHES or transient < 0:
         raise ModelError(f"cycles = {cycles}", f"the interval needs {BATCHES} cycles at least", "raise cycles=")
+    table = recurring(system)
+    return growth(system, table, *opening(table, start or {}), cycles=cycles, transient=transient)
+
+
+def recurring(system: System) -> Table:
+    """The tables of a system whose growth can be counted from beat to beat; refused where there is none."""
     table = tables(system)
     if not math.isfinite(beat(system, table)):
         raise SolveError(
             "the drive has no period", "growth is counted from period to period", "use a periodic drive, or a belt"
         )
-    return growth(system, table, *opening(table, start or {}), cycles=cycles, transient=transient)
+    return table
 
 
 def growth(system: System, table: Table, state: Array, mode: int, *, cycles: int, transient: int = 0) -> Estimate:
