@@ -145,6 +145,16 @@ def test_a_lag_of_whole_cycles_is_found_where_cycles_differ(frequency: float, na
     assert consistency[f"{other} is of the same cycle as x"].verdict != "fails"
 
 
+@pytest.mark.parametrize("factor", [-1.0, 1e-3, 9.81])
+@pytest.mark.parametrize("frequency", [8.7, 11.1])
+def test_a_channel_in_a_wrong_unit_or_sign_is_not_told_as_late(frequency: float, factor: float) -> None:
+    """Nothing cancels at any shift then, and the least of what is left stood somewhere by chance."""
+    record = started(frequency)
+    samples = {name: record[name] * (factor if name == "a" else 1.0) for name in record}
+    consistency = ss.consistent.consistency(dataclasses.replace(record, samples=samples), **RIG)
+    assert consistency["a is of the same cycle as x"].verdict != "fails"
+
+
 def test_in_a_steady_motion_whole_cycles_leave_no_trace() -> None:
     check = ss.consistent.consistency(good(), **RIG)["a is of the same cycle as x"]
     assert check.verdict == "can not be told"

@@ -62,6 +62,7 @@ SMOOTHED = 6.0  # times the forcing frequency, to which channels are smoothed be
 FEW_CYCLES = 6
 FARTHEST = 20  # whole cycles of a lag that is looked for
 UNIQUE = 1.03  # times the least that the next best shift leaves over, if the best is to be named
+FAR = 2.0  # times by which a channel's cycle differs from what is expected, from which it is in a wrong unit
 SURE = 5.0  # standard deviations of what is left over, from which shifts differ
 
 
@@ -297,7 +298,11 @@ def cycle_checks(record: Record, seen: Seen) -> list[Check]:
     expected = _foretold(record, seen, smooth)
     for name in (channel for channel in expected if channel in seen.channels):
         title = f"{name} is of the same cycle as x"
-        left = _left_over(smooth.apply(record[name], {0: 1.0}), expected[name], edges)
+        read = smooth.apply(record[name], {0: 1.0})
+        if not 1 / FAR < _gain(read, expected[name], edges) < FAR:
+            checks.append(untold(title, "its unit or sign is wrong, so that nothing cancels at any lag"))
+            continue
+        left = _left_over(read, expected[name], edges)
         best, here = min(left, key=lambda shift: left[shift]), left[0]
         # a channel smoothed to b Hz for T s is worth 2 b T samples; the deviation of their size is 1 / sqrt(4 b T)
         distinct = left[best] * (1 + SURE / math.sqrt(4 * SMOOTHED * len(edges)))
@@ -327,6 +332,14 @@ def _foretold(record: Record, seen: Seen, smooth: Filter) -> dict[str, Array]:
     for name, factor in (("z", seen.rig["stiffness"]), ("force", 1.0)):
         pull = pull + factor * record[name] if name in record else pull
     return {"a": moved, "load": smooth.apply(pull, {0: 1.0}) - seen.rig["mass"] * moved}
+
+
+def _gain(read: Array, expected: Array, edges: Array) -> float:
+    """How large a channel's mean cycle is by what is expected of it; a lag of whole cycles leaves it as it is."""
+    period = float(np.diff(edges).mean())
+    own, other = (values - _unrepeated(values, period) for values in (read, expected))
+    own, other = own - own.mean(), other - other.mean()
+    return float(own @ other / (other @ other)) if other.any() else math.nan
 
 
 def _left_over(read: Array, expected: Array, edges: Array) -> dict[int, float]:
