@@ -271,13 +271,13 @@ def _status(pair: Alignment, others: Sequence[float], channels: tuple[str, str],
             f"{second} is {abs(gain):.3g} times what {first} makes of it: see the units and the sensitivities"
         )
     if others:
-        delays = " or ".join(f"{delay:.4g}" for delay in others[:2])
-        sentence = f"the motion repeats itself: a delay of {delays} s would explain it as well; the shortest is taken"
+        delays = " or ".join(f"{1e3 * delay:.3g}" for delay in others[:2])
+        sentence = f"what they share repeats itself: {delays} ms would explain it as well; the shortest is taken"
         doubts.append(Doubt(sentence, REPEATS))
     if hidden:
         sentence = (
-            f"what a mount of {second} delays (2 zeta/w_m) is in it: this motion does not tell them apart; state the "
-            "mount, or give runs at other frequencies too"
+            f"what a mount of {second} delays, by twice its damping ratio over its angular frequency, is in it: this "
+            "motion does not tell them apart; state the mount, or give runs at other frequencies too"
         )
         doubts.append(Doubt(sentence, HIDDEN))
     if pair.unexplained > UNEXPLAINED:

@@ -363,11 +363,12 @@ def vendors(package: str) -> ModuleType:
     """A vendor's package, or a sentence that says how to install it."""
     try:
         return importlib.import_module(package)
-    except (ImportError, OSError) as error:  # OSError: the package is there, the library behind it is not
+    except (ImportError, OSError) as error:
+        remedy = f"install it with: pip install {INSTALLED[package.partition('.')[0]]}"
+        if isinstance(error, OSError):
+            remedy = "the package is there: install the library behind it, of the system or the vendor"
         raise ModelError(
-            f"the package {package} can not be imported ({error})",
-            "this device is reached through it",
-            f"install it with: pip install {INSTALLED[package.partition('.')[0]]}, and the vendor's driver if need be",
+            f"the package {package} can not be imported ({error})", "this device is reached through it", remedy
         ) from error
 
 
