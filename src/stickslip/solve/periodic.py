@@ -264,9 +264,8 @@ def settled_on(
         or (len(sizes) > 3 and all(later > 1.5 * sooner for sooner, later in pairwise(sizes[1:])))
     )
     none = np.full(table.physical, np.nan, dtype=np.complex128)
-    if growing:  # its first period: what it has come to may be beyond all numbers
-        begun = lap(system, table, *opening(table, start), 1)
-        return passed or SteadyState("unbounded", math.nan, 0, begun, none), passed
+    if growing:
+        return passed or SteadyState("unbounded", math.nan, 0, lap(system, table, state, mode, 1), none), passed
     return SteadyState("not periodic", math.nan, 0, beats(system, table, state, mode, 1), none), passed
 
 

@@ -23,7 +23,7 @@ from stickslip.solve import kernel
 from stickslip.solve.assembly import table_of
 from stickslip.solve.curved import degree, delayed_tape, run_curved, run_delayed
 from stickslip.solve.glide import Clock, Model, Pieces, blank_past, blank_pieces, until
-from stickslip.solve.phasors import fast_tables, without
+from stickslip.solve.phasors import fast_tables
 from stickslip.solve.planar import planar_tape, run_planar
 from stickslip.solve.refusal import LISTED, Budget, chatter, held_back, named, require_numbers, unproved
 from stickslip.solve.roots import NOISE
@@ -38,7 +38,6 @@ CHUNK = 16384  # pieces between two looks at the clock and the keyboard
 FEW, SHORT = 16, 2048  # pieces and cells of a chunk that Python runs: tenths of a second, and some
 CELLS = 65536  # Taylor cells between two looks, of a state of up to `SMALL` entries; of larger ones less by the square
 SMALL = 8
-LONG = 40.0  # periods: of fewer, the tables of the fast path take longer than the march saves (a rigid contact: 100)
 MOST_CELLS = 1e10  # of a run: some hours
 PACE = 0.1  # s between two calls of progress
 ORDER = 14  # of the polynomials: a cell turns by a radian or so, and its terms fall as 1 / 14!
@@ -278,8 +277,7 @@ class _March:
     ) -> None:
         size = len(table.names)
         self.table, self.total, self.events, self.tell, self.holding = table, total, events, tell, ExitStack()
-        fast = fast_tables(table) if total > LONG * table.motion.period else without(1).of(0)
-        self.model = Model(table.linear, fast, table.motion.period)
+        self.model = Model(table.linear, fast_tables(table), table.motion.period)
         self.past, self.work = blank_past(), kernel.scratch(size)
         self.clock, self.state, self.mode, self.stop = Clock(0.0, 0.0, 0.0), state.copy(), mode, 0
         tonal = len(table.tones) == 1 and size == table.physical + 3
