@@ -58,6 +58,9 @@ class DriveFrom(Protocol):
     def as_measured(self) -> DriveFrom:
         """The drive off by the gain of its sensor alone."""
 
+    def held(self) -> DriveFrom:
+        """The drive just as it was measured."""
+
     def __call__(self, begin: float, end: float, off: ArrayLike = ()) -> Drive:
         """The drive whose time 0 is `begin` [s] on the record's clock."""
 
@@ -81,6 +84,10 @@ class Measured:
     def as_measured(self) -> Self:
         """The drive off by the gain of its sensor alone."""
         return replace(self, unsure=(self.gain_sd,) if self.gain_sd else ())
+
+    def held(self) -> Self:
+        """The drive just as it was measured."""
+        return replace(self, unsure=())
 
 
 @dataclass(frozen=True, eq=False)
@@ -294,6 +301,10 @@ class Known:
 
     drive: Drive
     unsure: tuple[float, ...] = ()
+
+    def held(self) -> Known:
+        """The same."""
+        return self
 
     def calibrated(self, gain_sd: float) -> Known:
         """The same: no sensor tells of it."""
