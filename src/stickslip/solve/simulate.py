@@ -21,7 +21,8 @@ from stickslip.oscillator import Oscillator, PlanarOscillator
 from stickslip.parameters import finite
 from stickslip.solve import kernel
 from stickslip.solve.assembly import table_of
-from stickslip.solve.curved import degree, delayed_tape, run_curved, run_delayed
+from stickslip.solve.curved import degree, run_curved
+from stickslip.solve.delayed import delayed_tape, run_delayed
 from stickslip.solve.glide import Clock, Model, Pieces, blank_past, blank_pieces, until
 from stickslip.solve.phasors import fast_tables
 from stickslip.solve.planar import planar_tape, run_planar
