@@ -11,10 +11,10 @@ import pytest
 
 import servo
 import stickslip as ss
+from stickslip.law.driven import Tones, measured_drive
 from stickslip.law.law import _held
 from stickslip.law.search import Problem
 from stickslip.law.start import knob
-from stickslip.law.stretch import Tones, measured_drive
 from stickslip.record.record import Step
 
 RIG = {"mass": 2.42, "stiffness": 2310.0, "damping": 0.1196}

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from types import ModuleType
 
+import numpy as np
 import pytest
 
+import stickslip as ss
 from scripts import loaded
 
 
@@ -29,6 +31,20 @@ def test_the_law_is_named_or_left_open(laws: ModuleType, truth: str, tried: list
     assert found["family"] == laws.family(laws.NAMES[truth])
     assert laws.NAMES[truth] in found["kept"]
     assert 0.5 < found["confidence"] <= 0.999
+
+
+def test_a_rough_surface_draws_no_base_away(laws: ModuleType) -> None:
+    """Where each base's gain was free it came out 17 % off a calibration of 1 %, and the friction 6 % too low."""
+    chance = np.random.default_rng([1001, laws.LAWS.index("Coulomb")])
+    law, rigs = laws.drawn_law("Coulomb", chance), laws.built_rig(laws.CONDITIONS["both"], chance)
+    seeds = [int(chance.integers(2**31)) for _ in laws.MOTIONS]
+    records = [
+        laws.measured(law, frequency, laws.CONDITIONS["both"], rigs, seed=seed)
+        for frequency, seed in zip(laws.MOTIONS, seeds, strict=True)
+    ]
+    fit = ss.fit_law(records, ss.Oscillator(law=ss.laws.Coulomb(1.0), **laws.RIG))
+    assert fit.parameters["kinetic"].includes(law.kinetic)
+    assert all(abs(one.value - 1) < 0.06 for name, one in fit.parameters.items() if "gain" in name)
 
 
 def test_what_is_told_is_counted(laws: ModuleType) -> None:

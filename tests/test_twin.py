@@ -21,7 +21,7 @@ import stickslip as ss
 from stickslip.answers.on_twins import _yields
 from stickslip.cli.program import main
 from stickslip.estimate import UNTRIED, kinds, stands
-from stickslip.law.stretch import Sampled, Tones
+from stickslip.law.driven import Sampled, Tones
 from stickslip.twin.belief import EXCESS, GAIN, HELD, LATE, SLOPE, SPRING
 from stickslip.twin.descent import _step, _towards, linearised, misfit
 from stickslip.twin.search import believe

@@ -12,6 +12,7 @@ import numpy as np
 from stickslip.arrays import Array, Mask
 from stickslip.errors import ModelError
 from stickslip.estimate import Doubt, Estimate, Result, Status, doubts_of
+from stickslip.law.driven import Sampled, Tones
 from stickslip.law.search import (
     OF_MOUNTS,
     OF_SENSORS,
@@ -30,7 +31,7 @@ from stickslip.law.start import (
     too_few,
     value_of,
 )
-from stickslip.law.stretch import Sampled, Sensor, Tones
+from stickslip.law.stretch import Sensor
 from stickslip.laws.base import Law
 from stickslip.laws.curved import CurvedLaw
 from stickslip.oscillator import Oscillator

@@ -12,7 +12,8 @@ import numpy as np
 
 from stickslip.arrays import Array, Index
 from stickslip.errors import ModelError
-from stickslip.law.stretch import DRIVES, Motion, Sampled, Sensor, Stretch, attempted, clear, remembered
+from stickslip.law.driven import DRIVES, Sampled
+from stickslip.law.stretch import Motion, Sensor, Stretch, attempted, clear, remembered
 from stickslip.laws.rough import RoughSurface
 from stickslip.oscillator import Oscillator
 from stickslip.solve.sensitivity import sensitivity
@@ -203,6 +204,12 @@ class Problem:
             wanted = len(scale) + len(stretch.drive.unsure)
             own.append(np.pad(start[:wanted], (0, max(0, wanted - len(start)))))
         return tuple(own)
+
+    def held(self, point: Point) -> tuple[Problem, Point]:
+        """The same with the gains of the bases as stated, and a point of it: the drive as measured."""
+        problem = replace(self, stretches=tuple(replace(one, drive=one.drive.held()) for one in self.stretches))
+        states = [start[: len(scale)] for start, scale in zip(point.starts, self.scales, strict=True)]
+        return problem, problem.at(point.u, problem.own(states))
 
     def at(self, u: Array, starts: tuple[Array, ...]) -> Point:
         """Simulate all stretches; chi squared is infinite where the engine refuses."""

@@ -12,8 +12,9 @@ import numpy as np
 
 from stickslip.arrays import Array, Rows
 from stickslip.errors import UNNAMED, EstimateError, ModelError, RecordError
+from stickslip.law.driven import DriveFrom, as_driven, driving, measured_drive
 from stickslip.law.search import ABOVE, OF_MOUNTS, OF_SENSORS, Knob, Point, Problem, Profile, descend
-from stickslip.law.stretch import DriveFrom, Sensor, Stretch, as_driven, driving, measured_drive
+from stickslip.law.stretch import Sensor, Stretch
 from stickslip.oscillator import Oscillator
 from stickslip.parameters import find
 from stickslip.record.record import Record

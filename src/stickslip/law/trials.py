@@ -14,9 +14,10 @@ from stickslip.balance.force import friction_force
 from stickslip.drives.kinds import Release
 from stickslip.errors import EstimateError
 from stickslip.law.data import FAST, Rests
+from stickslip.law.driven import Sampled, as_driven, face_of
 from stickslip.law.search import Knob, Point, Problem, descend, rows_of
 from stickslip.law.start import EXPONENT, Shown, bounded, free_names, knob, nuisance_knobs, thinned, value_of
-from stickslip.law.stretch import Sampled, Sensor, Stretch, as_driven, face_of
+from stickslip.law.stretch import Sensor, Stretch
 from stickslip.law.verdict import Evidence, Key, independent
 from stickslip.laws.guessing import LEAST_EXCESS, STIFF, STIFFEST, Hypothesis, Observed
 from stickslip.oscillator import Oscillator

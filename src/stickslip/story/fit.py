@@ -18,9 +18,9 @@ from stickslip.drives.kinds import Drive, HarmonicBase, Ramp, Release
 from stickslip.errors import ModelError
 from stickslip.estimate import UNKNOWN, doubts_of
 from stickslip.figures.law import law_plates
+from stickslip.law.driven import driving
 from stickslip.law.fit_curve import CurveFit
 from stickslip.law.law import LawFit
-from stickslip.law.stretch import driving
 from stickslip.law.verdict import LawComparison
 from stickslip.laws.export import export_law, plain
 from stickslip.parameters import unit

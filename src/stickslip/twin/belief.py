@@ -12,7 +12,7 @@ import numpy as np
 
 from stickslip.arrays import Array
 from stickslip.errors import StickslipError
-from stickslip.law.stretch import DriveFrom, Sampled, Tones, driving
+from stickslip.law.driven import DriveFrom, Sampled, Tones, driving
 from stickslip.laws.compliant import CompliantContact
 from stickslip.laws.coulomb import Coulomb, LinearSlope
 from stickslip.laws.lugre import Dahl, LuGre

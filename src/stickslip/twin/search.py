@@ -13,7 +13,7 @@ import numpy as np
 from stickslip.balance.motion import is_measured
 from stickslip.drives.kinds import HarmonicBase
 from stickslip.errors import EstimateError, StickslipError
-from stickslip.law.stretch import DriveFrom, driving, possible_drives
+from stickslip.law.driven import DriveFrom, driving, possible_drives
 from stickslip.laws.coulomb import LinearSlope
 from stickslip.oscillator import Oscillator
 from stickslip.record.flaws import saturated
