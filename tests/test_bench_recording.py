@@ -19,7 +19,7 @@ from click.testing import CliRunner
 import stickslip as ss
 from bench_devices import Counter, Counting, counts
 from stickslip.bench import Block, Fault, Sim, Tape, Tone, Trigger, Wanted, acquire
-from stickslip.bench.trigger import Awaited
+from stickslip.bench.recording import Awaited
 from stickslip.cli.program import main
 from stickslip.files import journal
 

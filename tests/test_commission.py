@@ -12,7 +12,7 @@ from click.testing import CliRunner
 import stickslip as ss
 from stickslip import bench
 from stickslip.cli.program import main
-from stickslip.figures.bench import plot_calibrations
+from stickslip.figures.traces import plot_calibrations
 
 RIG = ss.Rig().having("x", gain=1.02, offset=3e-5).having("load", gain=0.97, offset=0.02)
 BENCH = bench.SimulatedBench(rig=RIG, fs=1000, seed=4)

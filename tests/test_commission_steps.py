@@ -16,7 +16,7 @@ from stickslip import bench
 from stickslip.bench.calibration import find_holds
 from stickslip.bench.free import coupled_mode, damper_of
 from stickslip.estimate import kinds
-from stickslip.story.words import value_of
+from stickslip.story.story import value_of
 
 NOISE = np.random.default_rng(7)
 

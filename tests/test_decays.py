@@ -366,7 +366,7 @@ def test_what_no_repair_bridges_is_not_sent_to_a_repair():
 
 
 def test_the_release_is_told_by_one_number_everywhere():
-    from stickslip.story.words import value_of
+    from stickslip.story.story import value_of
 
     values, fs, _ = free_decay(hold=1.0)
     noisy = values + 1e-3 * np.random.default_rng(1).standard_normal(len(values))

@@ -6,7 +6,7 @@ import pytest
 
 from stickslip import Estimate
 from stickslip.errors import EstimateError
-from stickslip.story.words import interval_of, value_of
+from stickslip.story.story import interval_of, value_of
 
 
 def estimate(value, low, high, *, sd=1.0, unit="N", status="ok"):

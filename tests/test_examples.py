@@ -18,7 +18,7 @@ WITH_EXAMPLES = sorted(file for file in PACKAGE.rglob("*.py") if ">>>" in file.r
 
 @pytest.mark.parametrize(
     "file",
-    [pytest.param(file, marks=[pytest.mark.loudness] * (file.stem == "quality")) for file in WITH_EXAMPLES],
+    [pytest.param(file, marks=[pytest.mark.loudness] * (file.stem == "sound")) for file in WITH_EXAMPLES],
     ids=[str(file.relative_to(PACKAGE)) for file in WITH_EXAMPLES],
 )
 def test_the_examples_run(file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -12,8 +12,7 @@ import pytest
 
 import stickslip as ss
 from stickslip.laws.base import Exit, Mode, Rigid, Row
-from stickslip.laws.curved import CurvedMode, Sliding, either_side, exp, lifted, symbol
-from stickslip.laws.filippov import with_sliding_modes
+from stickslip.laws.curved import CurvedMode, Sliding, either_side, exp, lifted, symbol, with_sliding_modes
 
 
 @dataclass(frozen=True)

@@ -23,8 +23,7 @@ from motions import free_decay
 from stickslip.cli.program import main
 from stickslip.story.folder import report
 from stickslip.story.scope import LEVELS, Panel, Scope
-from stickslip.story.story import Line, Story
-from stickslip.story.words import Caution
+from stickslip.story.story import Caution, Line, Story
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
 FS = 500.0

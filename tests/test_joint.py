@@ -18,7 +18,7 @@ from stickslip.cycle.joint import is_late
 from stickslip.cycle.joint_fit import SURELY
 from stickslip.errors import EstimateError, ModelError, RecordError
 from stickslip.estimate import kinds, stands
-from stickslip.figures.law import plot_joint
+from stickslip.figures.contact import plot_joint
 from stickslip.units import parse_unit
 
 TRUTH = {"inertia": 0.02, "forward": 0.07, "back": 0.05, "load": 0.15, "viscous": 0.03, "sine": 0.5, "cosine": -0.2}

@@ -13,7 +13,7 @@ from stickslip.cli.program import main
 from stickslip.cycle import regress_joint, regress_joint_logs
 from stickslip.errors import EstimateError
 from stickslip.estimate import kinds, stands
-from stickslip.figures.law import plot_joint
+from stickslip.figures.contact import plot_joint
 from stickslip.laws import LinearSlope, Stribeck
 from stickslip.statistics import mixture
 

@@ -10,7 +10,7 @@ import pytest
 
 import stickslip as ss
 from rigs import RIG, measured, told
-from stickslip.cycle.parts import join_sticks, overlapping
+from stickslip.cycle.sticks import join_sticks, overlapping
 from stickslip.errors import EstimateError, RecordError
 from stickslip.estimate import Doubt, Status
 

@@ -10,11 +10,11 @@ import pytest
 from matplotlib.figure import Figure
 
 import stickslip as ss
-from stickslip.figures.animation import frames
 from stickslip.figures.style import BLUE, SKY
 from stickslip.figures.trajectory import (
     curve,
     cycle_of,
+    frames,
     last_cycles,
     plot_loop,
     plot_motion,

@@ -22,8 +22,7 @@ from stickslip.errors import EstimateError, ModelError, StickslipError
 from stickslip.estimate import Doubt, Estimate, Status
 from stickslip.story import folder as folder_module
 from stickslip.story.folder import publish, report
-from stickslip.story.story import summary
-from stickslip.story.words import doubts, interval_of, value_of
+from stickslip.story.story import doubts, interval_of, summary, value_of
 
 VOID = {"meta", "link", "br", "hr", "img", "input"}
 
@@ -306,7 +305,7 @@ def test_earlier_results_come_back_when_the_new_ones_can_not_take_their_place(
 
 
 def test_the_digits_of_an_interval_do_not_exclude_the_value():
-    from stickslip.story.words import interval_of
+    from stickslip.story.story import interval_of
 
     wide = ss.Estimate("dry, whichever motion", 1.0003e-3, (0.0005e-3, 1.0012e-3), 2.5e-4, "m", "any")
     low, _, high, unit = interval_of(wide).split()

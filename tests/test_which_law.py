@@ -18,7 +18,7 @@ import stickslip as ss
 from any_law import ONE_NEWTON
 from stickslip.cli.program import main
 from stickslip.estimate import kinds
-from stickslip.figures.law import law_plates
+from stickslip.figures.contact import law_plates
 from stickslip.law.law import REMAINDER, _end
 from stickslip.law.search import Knob, Problem
 from stickslip.law.start import Shown, nuisance_knobs

@@ -20,8 +20,16 @@ from stickslip.drives.on_another import Both
 from stickslip.errors import ModelError
 from stickslip.laws.base import Exit, Law, Mode, Row
 from stickslip.laws.coulomb import Coulomb, LinearSlope
-from stickslip.laws.curved import Creeping, CurvedLaw, CurvedMode, Expression, lifted, symbol
-from stickslip.laws.filippov import curved_modes, with_sliding_modes
+from stickslip.laws.curved import (
+    Creeping,
+    CurvedLaw,
+    CurvedMode,
+    Expression,
+    curved_modes,
+    lifted,
+    symbol,
+    with_sliding_modes,
+)
 from stickslip.laws.guessing import registered
 from stickslip.laws.stribeck import SpeedCurve, Tabulated, TimeDelay
 from stickslip.parameters import changed, finite, parameter, parametric

@@ -1,5 +1,5 @@
+from stickslip.answers.arm import axis_record as axis_record
 from stickslip.answers.arm import without_bodies as without_bodies
-from stickslip.answers.axes import axis_record as axis_record
 from stickslip.answers.decays import Decay as Decay
 from stickslip.answers.decays import compare_decays as compare_decays
 from stickslip.answers.experiment import ExperimentPlan as ExperimentPlan

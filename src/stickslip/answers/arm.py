@@ -1,20 +1,210 @@
-"""What the bodies of a robot take of a joint's torque, by its URDF: the rest is the joint's own, friction and rotor."""
+"""One axis of a robot's log: which column is what, by the names that robots and drives give them, and what the bodies
+take of its torque, by a URDF: the rest is the joint's own, friction and rotor."""
 
 from __future__ import annotations
 
 import math
 import re
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from stickslip.answers.axes import axis_record, fits
+from stickslip.answers.mistakes import called, require_angle
 from stickslip.arrays import Array
 from stickslip.errors import ABSENT, ModelError, RecordError, package
 from stickslip.files.expression import split_gain
+from stickslip.record.channels import VOCABULARY
 from stickslip.record.record import Record, Step
+from stickslip.settings import nearest
 from stickslip.signals.derivatives import differentiate, smooth
+from stickslip.units import parse_unit
+
+# What a column holds, by how ROS and ros2_control, LeRobot, MuJoCo, Dynamixel and drives of machines call it.
+NAMES = {
+    "theta": (
+        "present position", "actual position", "measured position", "joint position", "link position",
+        "observation state", "qpos", "positions", "position", "pos", "angle", "theta", "actual q", "joint angle", "q",
+    ),
+    "reference": (
+        "goal position", "target position", "desired position", "commanded position", "reference position",
+        "position command", "position setpoint", "position reference", "action", "ctrl", "command", "cmd", "target",
+        "setpoint", "reference", "goal", "desired", "target q", "q ref", "q des", "qref", "qdes", "ref",
+    ),
+    "motor": ("motor position", "motor angle", "rotor position", "rotor angle"),
+    "force": ("motor torque", "joint torque", "actuator force", "qfrc actuator", "effort", "torque", "tau", "force"),
+    "temperature": ("present temperature", "motor temperature", "joint temperature", "temperature"),
+    "current": ("present current", "motor current", "actual current", "joint current", "current"),
+}  # fmt: skip
+OTHERS = {
+    "velocity", "velocities", "vel", "qvel", "speed", "acceleration", "accelerations", "acc", "voltage",
+    "pwm", "load", "error",
+}  # fmt: skip
+WANTED = {
+    "goal", "target", "desired", "command", "commands", "commanded", "cmd", "reference", "action", "output",
+}  # fmt: skip  # of a torque: not measured
+SOURCES = {"state", "states", "feedback"}  # who says it, not of which axis
+TITLE_UNITS = {
+    "rad": ("rad", "rad"), "deg": ("deg", "rad"), "Nm": ("N m", "N m"), "mNm": ("mN m", "N m"), "A": ("A", "A"),
+    "mA": ("mA", "A"),
+}  # fmt: skip  # at a title's end ("torque_Nm"): the unit, and that of SI
+NEARLY = 0.25  # of a turn: an encoder that wraps jumps by one within so much, and by no more from sample to sample else
+TURNING = {"theta": "rad", "reference": "rad", "motor": "rad", "force": "N m", "current": "A", "temperature": "K"}
+
+
+@dataclass(frozen=True)
+class _Column:
+    """A channel of a log: what it holds, of which axis, and the unit that its title ends in."""
+
+    channel: str
+    kind: str
+    axis: str
+    unit: str = ""
+
+
+def axis_record(record: Record, *, axis: str | None = None) -> Record:
+    """The channels of one axis of a robot's log, under the names of the vocabulary.
+
+    Position, reference, torque and current are known by the names that ROS, LeRobot, MuJoCo, Dynamixel and drives give
+    their columns; what else stands in a name tells which axis it is of. An angle or torque whose unit is not stated is
+    taken to be in rad or N m, and flagged.
+
+    Parameters
+    ----------
+    record : Record
+        A log with its columns as they are called in the file.
+    axis : str, optional
+        What tells the axis in the columns' names, "shoulder_pan" or "2"; needed where there are several.
+
+    Returns
+    -------
+    Record
+        With ``theta`` (``x`` of an axis that moves straight) and, where the log has them, ``reference``, ``force`` and
+        ``current``; the same record where its channels are called so already.
+
+    Raises
+    ------
+    RecordError
+        No position is found, several axes and none named, or an angle without a unit that is not in rad.
+
+    Examples
+    --------
+    >>> log = {"observation.state.0": [0.1, 0.2], "action.0": [0.1, 0.3], "action.1": [0.0, 0.0]}
+    >>> record = Record.of({name.replace(".", "_"): values for name, values in log.items()}, fs=30.0)
+    >>> list(axis_record(record, axis="0"))
+    ['theta', 'reference']
+    """
+    if axis is None and ("theta" in record or "x" in record):
+        require_angle(record)
+        return _unwrapped(record)
+    columns = list(_columns(record))
+    if all(column.kind != "theta" for column in columns):  # the motor's encoder is the only one
+        columns = [replace(one, kind="theta") if one.kind == "motor" else one for one in columns]
+    axes = list(dict.fromkeys(column.axis for column in columns if column.kind == "theta"))
+    if not axes:
+        stated = "" if axis is None else f"axis = {axis!r}: "
+        raise RecordError(
+            f"{stated}no column is called a position: {', '.join(called(record, name) for name in record)}",
+            "a joint's log has its position, and a torque, a current or a reference",
+            'name the columns: --channels "theta=COLUMN [rad]" --channels "force=COLUMN [N m]"',
+        )
+    chosen = [one for one in axes if axis is None or fits(one, axis)]
+    if len(chosen) != 1:
+        names = ", ".join(one or "(unnamed)" for one in axes)
+        raise RecordError(
+            f"the log has the axes {names}" if axis is None else f"axis = {axis!r} fits {len(chosen)} of {names}",
+            "the friction of one axis is asked for at a time",
+            nearest(axis or "", axes) if axis else f"name one: --axis {axes[0]}",
+            kind="" if axis is None else ABSENT,
+        )
+    log = _renamed(record, [column for column in columns if column.axis == chosen[0]], chosen[0])
+    require_angle(log)
+    return _unwrapped(log)
+
+
+def _unwrapped(record: Record) -> Record:
+    """Angles that jump by a turn, as of an encoder that counts one alone, counted on beyond it."""
+    samples, jumps = dict(record.samples), dict[str, int]()
+    for name in ("theta", "reference"):
+        turns = np.diff(samples[name]) / (2 * np.pi) if name in samples else np.zeros(0)
+        jumped = np.abs(turns) > 0.5
+        if np.any(jumped) and np.all(np.abs(np.abs(turns) - jumped) < NEARLY):
+            samples[name], jumps[name] = np.unwrap(samples[name]), int(jumped.sum())
+    if not jumps:
+        return record
+    if "theta" in samples and "reference" in samples:  # within half a turn of each other
+        ahead = np.median(samples["reference"] - samples["theta"]) / (2 * np.pi)
+        samples["reference"] = samples["reference"] - 2 * np.pi * np.rint(ahead)
+    step = Step("axis_record", {"jumps of a turn": jumps}, "angles counted on beyond a turn")
+    return replace(record, samples=samples, history=(*record.history, step))
+
+
+def _columns(record: Record) -> Iterator[_Column]:
+    lettered = any(called(record, name).endswith("_B") for name in record)  # then "_A" is an axis
+    for name in record:
+        title = re.sub(r"[\[(][^\[(]*[\])]\s*$", "", called(record, name))
+        bare, _, unit = title.rpartition("_")
+        title, unit = (bare, unit) if unit in TITLE_UNITS and not (lettered and unit == "A") else (title, "")
+        parts = re.findall(r"[a-z]+|\d+", title.lower())
+        if OTHERS & set(parts):
+            continue
+        kinds = [
+            (len(alias.split()), kind, parts[:at] + parts[at + len(alias.split()) :])
+            for kind, aliases in NAMES.items()
+            for alias in aliases
+            for at in range(len(parts))
+            if parts[at : at + len(alias.split())] == alias.split()
+        ]
+        if not kinds:
+            continue
+        _, kind, others = max(kinds, key=lambda one: one[0])
+        if kind in ("force", "current") and WANTED & set(parts):
+            continue
+        if kind == "theta" and WANTED & set(parts):
+            kind, others = "reference", [word for word in others if word not in WANTED]
+        yield _Column(name, kind, "_".join(word for word in others if word not in SOURCES), unit)
+
+
+def fits(name: str, axis: str) -> bool:
+    """Whether an axis is named so, by all words of its name or by some of them in a row."""
+    name_parts, axis_parts = (re.findall(r"[a-z]+|\d+", text.lower()) for text in (name, axis))
+    return any(name_parts[at : at + len(axis_parts)] == axis_parts for at in range(len(name_parts)))
+
+
+def _renamed(record: Record, columns: list[_Column], axis: str) -> Record:
+    samples, channels, titles = {}, {}, {}
+    straight = any(record.channels[column.channel].unit == "m" for column in columns)
+    for kind in TURNING:
+        fitting = [column for column in columns if column.kind == kind]
+        if kind == "temperature" and len(fitting) > 1:  # of what, nobody said: the friction is told without
+            continue
+        if len(fitting) > 1:
+            raise RecordError(
+                f"{' and '.join(called(record, column.channel) for column in fitting)} both tell the {kind}",
+                "one column tells one quantity of an axis",
+                f'name the one meant: --channels "{kind}=COLUMN"',
+            )
+        for column in fitting:
+            known = record.channels[column.channel]
+            name = "x" if straight and kind == "theta" else kind
+            usual = TURNING[kind].replace("rad", "m").replace("N m", "N") if straight else TURNING[kind]
+            unit, unstated = (usual, True) if known.unit == "1" else (known.unit, known.assumed)
+            if kind == "temperature":  # robots write it in degrees Celsius, without a unit
+                scale = parse_unit("degC" if known.unit == "1" or known.assumed else known.unit, expect="K")
+                samples[name], titles[name] = record[column.channel] * scale.scale + scale.zero, name
+                channels[name] = replace(known, name=name, unit="K", quantity=VOCABULARY[name].words)
+                continue
+            samples[name], titles[name] = record[column.channel], called(record, column.channel)
+            written, meant = TITLE_UNITS.get(column.unit, ("", ""))
+            if unstated and meant == usual:
+                samples[name], unstated = samples[name] * parse_unit(written, expect=usual).scale, False
+            quantity = VOCABULARY[name].words
+            channels[name] = replace(known, name=name, unit=unit, quantity=quantity, assumed=unstated)
+    step = Step("axis_record", titles, f"axis {axis}" if axis else "one axis")
+    return replace(record, samples=samples, channels=channels, history=(*record.history, step))
+
 
 # Of what bodies take, that smoothing and counts leave unknown at least: at 12 bit the rotor beside bodies of ten times
 # its inertia was told 1.4 % too small (30 logs of tests/test_arm.py), which is 0.14 % of both.
@@ -112,9 +302,9 @@ def _chosen(names: list[str], axis: str) -> str:
 
 def _axis(record: Record, name: str) -> Record | None:
     """A joint's own channels; None where the log has not its position."""
-    for called in (name, re.sub(r"[\W_]*joint[\W_]*", "_", name).strip("_")):
+    for axis in (name, re.sub(r"[\W_]*joint[\W_]*", "_", name).strip("_")):
         try:
-            return axis_record(record, axis=called)
+            return axis_record(record, axis=axis)
         except RecordError as error:
             if error.kind != ABSENT:
                 raise

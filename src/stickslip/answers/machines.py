@@ -10,11 +10,10 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.answers.axes import axis_record
+from stickslip.answers.arm import axis_record
 from stickslip.answers.findings import Comparison, Findings, Inquiry, flagged, record_name, require_several, with_doubt
 from stickslip.cycle.joint import JointFriction, regress_joint
-from stickslip.cycle.joint_logs import regress_joint_logs
-from stickslip.cycle.joint_onset import joint_backlash, joint_breakaway
+from stickslip.cycle.joint_logs import joint_backlash, joint_breakaway, regress_joint_logs
 from stickslip.cycle.static_peak import static_coefficient
 from stickslip.cycle.sticks import find_sticks
 from stickslip.cycle.tribometer import DEFINITIONS, friction_coefficients

@@ -18,7 +18,7 @@ from stickslip.rig.settings import RigSettings, rig_settings
 from stickslip.squeak.bursts import Squeaks, find_squeaks
 from stickslip.squeak.couplings import coupling
 from stickslip.squeak.hearing import HEARD
-from stickslip.squeak.quality import SoundQuality, impulsiveness, sound_quality
+from stickslip.squeak.sound import SoundQuality, impulsiveness, sound_quality
 from stickslip.squeak.spectra import burst_spectra
 from stickslip.units import parse_constant, parse_range
 

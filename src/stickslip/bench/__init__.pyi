@@ -27,6 +27,7 @@ from stickslip.bench.monitor import Monitor as Monitor
 from stickslip.bench.monitor import Picture as Picture
 from stickslip.bench.monitor import answers as answers
 from stickslip.bench.recording import Acquired as Acquired
+from stickslip.bench.recording import Trigger as Trigger
 from stickslip.bench.recording import Wanted as Wanted
 from stickslip.bench.recording import acquire as acquire
 from stickslip.bench.response import FrequencyResponse as FrequencyResponse
@@ -58,6 +59,5 @@ from stickslip.bench.through import SimulatedBench as SimulatedBench
 from stickslip.bench.through import Tour as Tour
 from stickslip.bench.through import sweep_of as sweep_of
 from stickslip.bench.through import tour as tour
-from stickslip.bench.trigger import Trigger as Trigger
 
 __all__: list[str]

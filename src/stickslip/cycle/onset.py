@@ -11,8 +11,8 @@ from stickslip.arrays import Array
 from stickslip.balance.balance import ALONE, Balance
 from stickslip.balance.force import FUSIONS
 from stickslip.balance.motion import FORCES, is_measured
-from stickslip.cycle.peak import Peak, unseen
 from stickslip.cycle.slips import FAST, Stroke, Strokes, find_strokes, ringing_of, sliding_swing
+from stickslip.cycle.static_peak import Peak, unseen
 from stickslip.errors import EstimateError
 from stickslip.estimate import UNSTATED, Doubt, Estimate, Result, Status
 from stickslip.record.record import Record

@@ -39,16 +39,16 @@ if TYPE_CHECKING:
 # What draws each kind of result, the file of this room and the function. One that takes no `ax` fills a whole figure.
 DRAWN = {
     "Record": "drawing.of_record", "Findings": "drawing.of_findings", "Comparison": "drawing.of_comparison",
-    "Loops": "drawing.of_loops", "JointFriction": "law.plot_joint", "Coefficients": "contact.plot_coefficients",
+    "Loops": "drawing.of_loops", "JointFriction": "contact.plot_joint", "Coefficients": "contact.plot_coefficients",
     "DecayFit": "drawing.of_decay", "Decrement": "decay.plot_differences",
     "ForceComparison": "traces.plot_force_comparison", "Consistency": "friction.plot_consistency",
     "TransitionSpeed": "contact.plot_transition_speed", "Trial": "traces.plot_twin", "Squeaks": "squeak.plot_squeaks",
     "TimeFrequency": "drawing.of_frequencies", "DataArray": "maps.plot_wavelet",
-    "LawComparison": "law.plot_laws", "LawFit": "law.plot_fit", "CurveFit": "law.plot_curve",
+    "LawComparison": "contact.plot_laws", "LawFit": "contact.plot_fit", "CurveFit": "contact.plot_curve",
     "Trajectory": "trajectory.plot_motion", "CycleBranches": "bifurcation.plot_limit_cycles",
     "Bifurcation": "bifurcation.plot_bifurcation", "Basins": "bifurcation.plot_basins",
     "Boundary": "bifurcation.plot_boundary", "Dither": "bifurcation.plot_dither", "Dataset": "drawing.of_dataset",
-    "ExperimentPlan": "bench.plot_plan", "Estimate": "drawing.of_estimates", "list": "drawing.of_estimates",
+    "ExperimentPlan": "traces.plot_plan", "Estimate": "drawing.of_estimates", "list": "drawing.of_estimates",
     "tuple": "drawing.of_estimates", "Result": "drawing.of_result",
 }  # fmt: skip
 
@@ -147,7 +147,7 @@ def of_findings(findings: Findings, *, ax: Axes | None = None) -> Figure | Axes:
     if results.get("decay") is not None:
         return _named("decay.plot_decay")(findings.decay, ax=ax)
     if results.get("joint") is not None:
-        return _named("law.plot_joint")(findings.joint, ax=ax)
+        return _named("contact.plot_joint")(findings.joint, ax=ax)
     if results.get("squeaks") is not None and ax is None:
         return _named("squeak.plot_squeaks")(findings.squeaks)
     return of_record(findings.record, ax=ax)

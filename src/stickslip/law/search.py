@@ -14,7 +14,7 @@ from stickslip.arrays import Array, Index
 from stickslip.errors import ModelError
 from stickslip.law.driven import DRIVES, Sampled
 from stickslip.law.stretch import Motion, Sensor, Stretch, attempted, clear, remembered
-from stickslip.laws.rough import RoughSurface
+from stickslip.laws.surfaces import RoughSurface
 from stickslip.oscillator import Oscillator
 from stickslip.solve.sensitivity import sensitivity
 from stickslip.solve.trajectory import Trajectory

@@ -63,7 +63,7 @@ from stickslip.law.verdict import (
     unexplained_part,
 )
 from stickslip.laws.guessing import Hypothesis, contained, hypotheses, hypothesis_of
-from stickslip.laws.rough import RoughSurface
+from stickslip.laws.surfaces import RoughSurface
 from stickslip.oscillator import Oscillator
 from stickslip.record.record import Record, require_record
 from stickslip.units import dimensions

@@ -8,9 +8,6 @@ from stickslip.laws.export import export_fmu as export_fmu
 from stickslip.laws.export import export_law as export_law
 from stickslip.laws.lugre import Dahl as Dahl
 from stickslip.laws.lugre import LuGre as LuGre
-from stickslip.laws.pairs import Pair as Pair
-from stickslip.laws.pairs import pair as pair
-from stickslip.laws.rough import RoughSurface as RoughSurface
 from stickslip.laws.series import ElastoSlip as ElastoSlip
 from stickslip.laws.series import InSeries as InSeries
 from stickslip.laws.state_variable import RateState as RateState
@@ -20,5 +17,8 @@ from stickslip.laws.stribeck import FrictionCurve as FrictionCurve
 from stickslip.laws.stribeck import Stribeck as Stribeck
 from stickslip.laws.stribeck import Tabulated as Tabulated
 from stickslip.laws.stribeck import TimeDelay as TimeDelay
+from stickslip.laws.surfaces import Pair as Pair
+from stickslip.laws.surfaces import RoughSurface as RoughSurface
+from stickslip.laws.surfaces import pair as pair
 
 __all__: list[str]

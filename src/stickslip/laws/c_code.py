@@ -17,8 +17,15 @@ from xml.sax.saxutils import quoteattr
 
 from stickslip.errors import ModelError
 from stickslip.laws.base import Exit, Law, Mode, Row
-from stickslip.laws.curved import FUNCTIONS, Creeping, CurvedLaw, CurvedMode, Expression
-from stickslip.laws.filippov import curved_modes, with_sliding_modes
+from stickslip.laws.curved import (
+    FUNCTIONS,
+    Creeping,
+    CurvedLaw,
+    CurvedMode,
+    Expression,
+    curved_modes,
+    with_sliding_modes,
+)
 from stickslip.laws.formula import remark, written
 
 Modes = Sequence[Mode | CurvedMode]

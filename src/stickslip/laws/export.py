@@ -28,8 +28,8 @@ from stickslip.laws.curved import CurvedLaw, lifted
 from stickslip.laws.formula import one_line, remark, written
 from stickslip.laws.guessing import registered
 from stickslip.laws.lugre import LuGre
-from stickslip.laws.rough import RoughSurface
 from stickslip.laws.stribeck import FrictionCurve, SpeedCurve, Tabulated
+from stickslip.laws.surfaces import RoughSurface
 from stickslip.parameters import finite
 from stickslip.settings import nearest, toml_lines
 from stickslip.whole import whole_file

@@ -18,8 +18,7 @@ import numpy as np
 
 from stickslip.errors import ModelError
 from stickslip.laws.base import Exit, Law, Mode, Row
-from stickslip.laws.curved import Creeping, CurvedLaw, CurvedMode, Expression, lifted, symbol
-from stickslip.laws.filippov import differs
+from stickslip.laws.curved import Creeping, CurvedLaw, CurvedMode, Expression, differs, lifted, symbol
 from stickslip.laws.stribeck import TimeDelay
 from stickslip.parameters import finite, parameter, parametric
 

@@ -21,10 +21,8 @@ import numpy as np
 from stickslip.arrays import Array, Index, Mask
 from stickslip.drives.kinds import Drive, Motion
 from stickslip.errors import ModelError
-from stickslip.laws import filippov
 from stickslip.laws.base import Exit, Law, Mode
-from stickslip.laws.curved import CurvedLaw, CurvedMode
-from stickslip.laws.filippov import with_sliding_modes
+from stickslip.laws.curved import CurvedLaw, CurvedMode, compared_by_value, with_sliding_modes
 from stickslip.oscillator import Oscillator, Structure
 from stickslip.solve.cells import Linear
 
@@ -326,7 +324,7 @@ def require_oscillator(system: object, question: str) -> Oscillator:
 
 def by_value(system: Oscillator) -> bool:
     """Whether an equal system is the same one: law and drive are compared by their values."""
-    return all(map(filippov.by_value, (system.law, system.drive)))
+    return all(map(compared_by_value, (system.law, system.drive)))
 
 
 def systems_of(systems: Sequence[Oscillator]) -> Systems:

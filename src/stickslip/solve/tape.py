@@ -14,8 +14,7 @@ from stickslip.arrays import Array, Index
 from stickslip.drives.kinds import Motion
 from stickslip.errors import ModelError
 from stickslip.laws.base import Exit, Mode
-from stickslip.laws.curved import Creeping, CurvedMode
-from stickslip.laws.filippov import curved_modes
+from stickslip.laws.curved import Creeping, CurvedMode, curved_modes
 from stickslip.oscillator import Contact, Oscillator, Structure
 from stickslip.solve.operations import Bound, Form, Operations, Scaled, combined, flat, guards_of, stilled, sums_of
 from stickslip.solve.tables import JointMode, System, by_value, mode_number, numbered, reached

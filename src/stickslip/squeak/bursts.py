@@ -13,7 +13,7 @@ from stickslip.arrays import Array
 from stickslip.errors import EstimateError, RecordError
 from stickslip.estimate import Estimate, Plain, Result, Status, plain
 from stickslip.record.record import Record, require_record
-from stickslip.squeak.hearing import LASTS, PARTIALS, Hearing, Span, chosen_channel, clipped_rows, filtered
+from stickslip.squeak.hearing import LASTS, LOWEST, PARTIALS, Hearing, Span, chosen_channel, clipped_rows, filtered
 from stickslip.squeak.sound import REFERENCES, level, reference_of
 from stickslip.statistics import mean_of_cycles
 
@@ -23,7 +23,6 @@ WORDS = {
 }  # fmt: skip
 OF_MEDIAN = math.sqrt(math.pi / 2)  # its standard deviation over that of the mean
 
-LOWEST = 50.0  # Hz
 GROWN = 12.0  # cycles of growth to the peak: what is struck is there within fewer
 EVEN = 0.35  # of a burst's length at which half of its energy has come: a ring that dies away has it earlier
 SUSTAINED = 0.25  # s: a squeak is shorter

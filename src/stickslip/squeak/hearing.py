@@ -17,6 +17,7 @@ from stickslip.record.record import Record
 HEARD = ("sound", "normal_acceleration", "a", "friction", "ch1")  # the first of these, unless told
 WINDOW = 0.0232  # s
 OVERLAP = 4  # windows that share a sample
+LOWEST = 50.0  # Hz of what is listened to
 STANDS_OUT = 18.0  # dB of a line over the median of its neighbours: noise alone has 10
 OF_POWER = 0.3  # share of the power in the line and its harmonics
 LOBE = 2  # bins to either side of a line that are its own
@@ -31,10 +32,8 @@ TOGETHER = 0.08  # s: broad bursts nearer are one
 SPARSE = 0.75  # share of the time that clicks are heard at most, soon after one another: a window holds each for 23 ms
 HARMONICS = 6
 PULSE, DEEP, APART = 2e-3, 6.0, 0.25  # s, dB, and the change of the logarithm of an interval
-HALF, SUDDEN = (
-    6.0,
-    7e-3,
-)  # dB, s: how soon a pulse is there. Of 22 creaks all took under 6 ms, of 6 trains of chirps over 9
+# dB, s: how soon a pulse is there. Of 22 creaks all took under 6 ms, of 6 trains of chirps over 9
+HALF, SUDDEN = 6.0, 7e-3
 PULSES, SLIM = 8, 0.5  # pulses at least, and their width against their interval
 STEADY = 5  # frames of the median that a level is taken over: no dip of two frames cuts a burst
 PARTIALS = 0.1  # of the power in steady lines

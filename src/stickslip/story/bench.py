@@ -17,16 +17,15 @@ from stickslip.bench.runs import Proposal, run_list
 from stickslip.bench.steps import STEPS, BenchStep, Commissioned
 from stickslip.bench.through import Tour
 from stickslip.estimate import Estimate, Result, stands
-from stickslip.figures.bench import plot_calibrations, plot_plan, plot_response
 from stickslip.figures.style import Plate, plate
+from stickslip.figures.traces import plot_calibrations, plot_plan, plot_response
 from stickslip.files.write import require_form, write_record
 from stickslip.laws.guessing import family_of
 from stickslip.record.record import Record
 from stickslip.story.findings import of_comparison, of_findings, plain
 from stickslip.story.fit import of_laws
 from stickslip.story.friction import of_sticks
-from stickslip.story.story import Line, Story, Table, logged
-from stickslip.story.words import Caution, doubts, interval_of, sentence, value_of
+from stickslip.story.story import Caution, Line, Story, Table, doubts, interval_of, logged, sentence, value_of
 
 CAPTION = "Root-mean-square error against the sampling rate, for each choice of sensors."
 # What leads: of which step, and which of its numbers; the rest stands in the tables.

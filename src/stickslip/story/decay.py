@@ -21,8 +21,18 @@ from stickslip.estimate import Estimate, kinds
 from stickslip.figures.decay import plates_of, plates_together
 from stickslip.record.record import Record
 from stickslip.story.scope import Scope, completed, corrected, of_fit
-from stickslip.story.story import Line, Story, Table, tried
-from stickslip.story.words import WITHIN_DIGIT, cautions, doubts, interval_of, number, value_of
+from stickslip.story.story import (
+    WITHIN_DIGIT,
+    Line,
+    Story,
+    Table,
+    cautions,
+    doubts,
+    interval_of,
+    number,
+    tried,
+    value_of,
+)
 
 MOST = 0.5  # of the power of what is left over
 OTHER = 0.1  # of the oscillation's frequency: farther from its multiples swings something else

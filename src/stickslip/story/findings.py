@@ -25,8 +25,7 @@ from stickslip.figures.friction import plates_of_batch
 from stickslip.files.write import require_form, write_record
 from stickslip.record.record import Record
 from stickslip.story.scope import of_findings as scope_of
-from stickslip.story.story import Line, Story, Table, logged
-from stickslip.story.words import Caution, constant, flags, interval_of, leading, value_of
+from stickslip.story.story import Caution, Line, Story, Table, constant, flags, interval_of, leading, logged, value_of
 from stickslip.whole import whole_file
 
 # Which functions, of one record and of several, tell findings that hold a result of this name; others are friction's.

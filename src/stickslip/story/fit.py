@@ -17,7 +17,7 @@ from stickslip.balance.motion import forcing_frequency
 from stickslip.drives.kinds import Drive, HarmonicBase, Ramp, Release
 from stickslip.errors import ModelError
 from stickslip.estimate import UNKNOWN, doubts_of
-from stickslip.figures.law import law_plates
+from stickslip.figures.contact import law_plates
 from stickslip.law.driven import driving
 from stickslip.law.fit_curve import CurveFit
 from stickslip.law.law import LawFit
@@ -28,8 +28,7 @@ from stickslip.record.record import Record
 from stickslip.rig.settings import rig_toml
 from stickslip.settings import toml_lines
 from stickslip.story.scope import Scope, corrected, of_fit, reading_of
-from stickslip.story.story import Line, Story, Table
-from stickslip.story.words import Caution, doubts, faulty, interval_of, leading, number, value_of
+from stickslip.story.story import Caution, Line, Story, Table, doubts, faulty, interval_of, leading, number, value_of
 
 Fit: TypeAlias = LawComparison | LawFit | CurveFit
 Records: TypeAlias = Record | Sequence[Record]  # what it was fitted to

@@ -21,8 +21,19 @@ from stickslip.figures.friction import plates_of, plates_together
 from stickslip.figures.maps import plates_of_map
 from stickslip.record.record import RIG_UNITS
 from stickslip.story import scope
-from stickslip.story.story import Line, Story
-from stickslip.story.words import Caution, cautions, constant, doubts, interval_of, leading, number, sentence, value_of
+from stickslip.story.story import (
+    Caution,
+    Line,
+    Story,
+    cautions,
+    constant,
+    doubts,
+    interval_of,
+    leading,
+    number,
+    sentence,
+    value_of,
+)
 
 MOSTLY = 0.5  # of the time: a bound above it tells nothing
 RARELY = 0.005  # of the time

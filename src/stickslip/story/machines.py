@@ -17,14 +17,12 @@ from stickslip.cycle.joint_logs import JointLogs
 from stickslip.cycle.tribometer import DEFINITIONS
 from stickslip.errors import ModelError
 from stickslip.estimate import Estimate, stands
-from stickslip.figures.contact import tribometer_plates
-from stickslip.figures.law import plates_of, plates_together
+from stickslip.figures.contact import plates_of, plates_together, tribometer_plates
 from stickslip.laws.c_code import compiler
 from stickslip.laws.coulomb import LinearSlope
 from stickslip.laws.export import export_fmu, export_law, urdf_dynamics
 from stickslip.story.fit import ALONE, FILES
-from stickslip.story.story import Story, Table
-from stickslip.story.words import Caution, cautions, interval_of, number, value_of
+from stickslip.story.story import Caution, Story, Table, cautions, interval_of, number, value_of
 from stickslip.units import parse_unit
 
 APART = 0.05  # of a level, by which directions or definitions must differ to be worth a sentence

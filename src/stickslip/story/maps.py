@@ -18,8 +18,7 @@ from stickslip.maps.dither import Dither
 from stickslip.solve.tables import System
 from stickslip.squeak.stability import Stability
 from stickslip.story.findings import plain
-from stickslip.story.story import Line, Story, Table
-from stickslip.story.words import number, value_of
+from stickslip.story.story import Line, Story, Table, number, value_of
 
 LOST = ("not run", "failed")  # outcomes that leave holes in a map
 

@@ -13,9 +13,9 @@ import numpy as np
 
 from stickslip import scenarios
 from stickslip.errors import ModelError
-from stickslip.figures.animation import animate, require_writer
 from stickslip.figures.style import Plate
 from stickslip.figures.trajectory import (
+    animate,
     contacts_of,
     cycle_of,
     last_cycles,
@@ -23,6 +23,7 @@ from stickslip.figures.trajectory import (
     period_of,
     plates_of,
     pressed,
+    require_writer,
     sampled,
     stretches,
 )

@@ -15,8 +15,7 @@ from stickslip.figures.squeak import plates_of, plates_together
 from stickslip.squeak.bursts import WORDS, Squeak, Squeaks
 from stickslip.squeak.couplings import Coupling, Pair
 from stickslip.squeak.spectra import burst_clips
-from stickslip.story.story import Story, Table
-from stickslip.story.words import cautions, interval_of, number, value_of
+from stickslip.story.story import Story, Table, cautions, interval_of, number, value_of
 from stickslip.units import prefixed
 
 MOST = 40  # bursts in a table
