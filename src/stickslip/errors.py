@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+from collections.abc import Sequence
 from typing import Any
 
 MISSTATED = "delimiter"  # stated otherwise than the file has it
@@ -26,6 +27,8 @@ class StickslipError(Exception):
         What the user can do now ("give a longer record").
     kind : str
         What code asks for, where it goes on differently; a name that is not there is wrong use.
+    options : sequence of str
+        The words that mend a command which ended in it, beside those that were typed.
 
     Examples
     --------
@@ -35,9 +38,9 @@ class StickslipError(Exception):
 
     exit_code = 1
 
-    def __init__(self, value: str, rule: str, next_step: str, *, kind: str = "") -> None:
+    def __init__(self, value: str, rule: str, next_step: str, *, kind: str = "", options: Sequence[str] = ()) -> None:
         super().__init__(value, rule, next_step)
-        self.value, self.rule, self.next_step, self.kind = value, rule, next_step, kind
+        self.value, self.rule, self.next_step, self.kind, self.options = value, rule, next_step, kind, options
         if kind == ABSENT:
             self.exit_code = ModelError.exit_code
 

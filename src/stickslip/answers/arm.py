@@ -16,7 +16,8 @@ from stickslip.answers.mistakes import called, require_angle
 from stickslip.arrays import Array
 from stickslip.errors import ABSENT, ModelError, RecordError, package
 from stickslip.files.expression import split_gain
-from stickslip.record.channels import VOCABULARY
+from stickslip.files.select import split_name
+from stickslip.record.channels import VOCABULARY, Channel
 from stickslip.record.record import Record, Step
 from stickslip.settings import nearest
 from stickslip.signals.derivatives import differentiate, smooth
@@ -38,13 +39,12 @@ NAMES = {
     "temperature": ("present temperature", "motor temperature", "joint temperature", "temperature"),
     "current": ("present current", "motor current", "actual current", "joint current", "current"),
 }  # fmt: skip
-OTHERS = {
-    "velocity", "velocities", "vel", "qvel", "speed", "acceleration", "accelerations", "acc", "voltage",
-    "pwm", "load", "error",
-}  # fmt: skip
+RATES = {"velocity", "velocities", "vel", "qvel", "speed"}
+OTHERS = {*RATES, "acceleration", "accelerations", "acc", "voltage", "pwm", "load", "error"}
 WANTED = {
     "goal", "target", "desired", "command", "commands", "commanded", "cmd", "reference", "action", "output",
 }  # fmt: skip  # of a torque: not measured
+LINKS = {"joint", "link", "present", "actual", "measured", "observation", "state", "rad", "deg", "s"}  # of no axis
 SOURCES = {"state", "states", "feedback"}  # who says it, not of which axis
 TITLE_UNITS = {
     "rad": ("rad", "rad"), "deg": ("deg", "rad"), "Nm": ("N m", "N m"), "mNm": ("mN m", "N m"), "A": ("A", "A"),
@@ -97,7 +97,7 @@ def axis_record(record: Record, *, axis: str | None = None) -> Record:
     ['theta', 'reference']
     """
     if axis is None and ("theta" in record or "x" in record):
-        require_angle(record)
+        require_angle(record, _rate(record, ""))
         return _unwrapped(record)
     columns = list(_columns(record))
     if all(column.kind != "theta" for column in columns):  # the motor's encoder is the only one
@@ -120,8 +120,18 @@ def axis_record(record: Record, *, axis: str | None = None) -> Record:
             kind="" if axis is None else ABSENT,
         )
     log = _renamed(record, [column for column in columns if column.axis == chosen[0]], chosen[0])
-    require_angle(log)
+    require_angle(log, _rate(record, chosen[0]))
     return _unwrapped(log)
+
+
+def _rate(record: Record, axis: str) -> tuple[Channel, Array] | None:
+    """The velocity of an axis, which is no motor's nor a set value; None without one."""
+    own = set(re.findall(r"[a-z]+|\d+", axis.lower()))
+    for name in record:
+        words = set(re.findall(r"[a-z]+|\d+", split_name(called(record, name))[0].lower()))
+        if words & RATES and not words & {*WANTED, "motor", "rotor"} and words - RATES - LINKS == own - LINKS:
+            return record.channels[name], record[name]
+    return None
 
 
 def _unwrapped(record: Record) -> Record:

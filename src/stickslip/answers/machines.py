@@ -12,6 +12,7 @@ import numpy as np
 
 from stickslip.answers.arm import axis_record
 from stickslip.answers.findings import Comparison, Findings, Inquiry, flagged, record_name, require_several, with_doubt
+from stickslip.answers.mistakes import require_torque
 from stickslip.cycle.joint import JointFriction, regress_joint
 from stickslip.cycle.joint_logs import joint_backlash, joint_breakaway, regress_joint_logs
 from stickslip.cycle.static_peak import static_coefficient
@@ -93,6 +94,7 @@ def analyze_joint(
     given = {"inertia": inertia, "kp": kp, "kd": kd, "torque_constant": torque_constant, "play": play}
     faults, name, inquiry = tuple(record.check()), record_name(record), Inquiry()
     log = axis_record(record, axis=axis)
+    require_torque(log, gravity, given)
     log = without_delays(log, question="the friction of a joint")
     joint = regress_joint(log, gravity=gravity, **given)
     whole = _with_friction(log, joint)

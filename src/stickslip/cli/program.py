@@ -63,7 +63,10 @@ class _Commands(click.Group):
             ctx.exit(1)
 
     def _remedy(self, ctx: click.Context, error: StickslipError) -> list[str]:
-        """The command that mends an error: it asks for columns, or is this one less an option; empty if none does."""
+        """The command that mends an error: it asks for columns, or is this one less an option or with more of them.
+
+        Empty if none does.
+        """
         arguments = ctx.meta.get(ARGUMENTS, [])
         if error.kind == UNNAMED:
             name, command, rest = self.resolve_command(ctx, list(arguments))
@@ -71,7 +74,7 @@ class _Commands(click.Group):
                 _naming(command.make_context(name, rest, parent=ctx, resilient_parsing=True).params) if command else []
             )
         kept = list(_without(arguments, CAUSES.get(error.kind, ())))
-        return kept if len(kept) < len(arguments) else []
+        return [*kept, *error.options] if error.options or len(kept) < len(arguments) else []
 
 
 def _misused(error: click.UsageError, command: str) -> int:

@@ -182,7 +182,7 @@ def collected(refused: list[ss.StickslipError], files: Sequence[Path], names: Se
     except ss.StickslipError as error:
         known = any(name in str(error) for name in names)
         value = error.value if known else f"{' + '.join(names)}: {error.value}"
-        refused.append(type(error)(value, error.rule, error.next_step, kind=error.kind))
+        refused.append(type(error)(value, error.rule, error.next_step, kind=error.kind, options=error.options))
 
 
 def answers(
