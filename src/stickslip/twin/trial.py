@@ -17,7 +17,7 @@ from stickslip.estimate import FEW, NORMAL_95, UNSTATED, Doubt, Estimate, Status
 from stickslip.record.record import Record
 from stickslip.statistics import BINS, repeating, student
 from stickslip.twin import descent
-from stickslip.twin.belief import EXCESS, GIVE, KINETIC, RATE, SLOPE, Belief, levelled
+from stickslip.twin.belief import EXCESS, GIVE, KINETIC, RATE, SLOPE, Belief, Fit, levelled
 from stickslip.twin.search import CHANCE
 from stickslip.workers import Map
 
@@ -282,7 +282,8 @@ def _asked(
 ) -> _Twin | None:
     """A twin, with its answers and its truth; None of one that can not be followed: it tells nothing."""
     chance = np.random.default_rng(seed)
-    drawn = belief.drawn(chance)
+    # the linear fit of a rig that is nowhere near draws others that can not be followed
+    drawn = belief if belief.left > LOST else belief.drawn(chance)
     try:
         record = drawn.twin(chance)
         return _Twin(drawn.values, record["x"], ask(record), _truth(drawn, record, frequency))
@@ -394,7 +395,9 @@ def _apart(belief: Belief, value: Callable[[Belief], float]) -> list[float]:
     low, high = _reached(belief, value, NORMAL_95)
     for rig in belief.rivals:
         further = rig.fit.freedom * math.log(left[rig] / min(left.values())) if rig.fit is not None else math.inf
-        least, most = _reached(rig, value, math.sqrt(max(0.0, NORMAL_95**2 - further)))
+        if further > NORMAL_95**2:
+            continue
+        least, most = _reached(rig, value, math.sqrt(NORMAL_95**2 - further))
         more = value(rig) - value(belief)
         ends += [min(more, least - low), max(more, most - high)]
     return ends
@@ -408,9 +411,30 @@ def _reached(belief: Belief, value: Callable[[Belief], float], deviations: float
     slopes = np.array([value(belief.by(fit.names, LITTLE * step)) - middle for step in fit.root.T])
     if not (norm := float(np.linalg.norm(slopes))) > 0:  # what is not moved at all, or undefined nearby
         return middle, middle
-    step = deviations * fit.root @ (slopes / norm)
-    ends = sorted(value(belief.by(fit.names, side * step)) for side in (-1, 1))
+    ends = sorted(value(_moved(belief, fit, side * slopes / norm, deviations)) for side in (-1, 1))
     return ends[0], ends[1]
+
+
+def _moved(belief: Belief, fit: Fit, way: Array, deviations: float) -> Belief:
+    """The rig so many standard deviations away; where a value comes to its end, the others go on without it.
+
+    A contact's stiffness went on as if its damping became less than none.
+    """
+    step, root, free = np.zeros(len(fit.names)), fit.root, np.ones(len(fit.names), dtype=bool)
+    ends = [belief.ends(name) for name in fit.names]
+    values = np.array([belief.values[name] for name in fit.names])
+    while True:
+        ahead = deviations * root @ way
+        room = np.array([high if go > 0 else low for (low, high), go in zip(ends, ahead, strict=True)]) - values - step
+        shares = np.divide(room, ahead, out=np.full(len(ahead), math.inf), where=free & (ahead != 0))
+        share, first = max(0.0, float(shares.min())), int(shares.argmin())
+        step = step + min(1.0, share) * ahead
+        if share >= 1:
+            return belief.by(fit.names, step)
+        held, free[first] = root[first] / float(np.linalg.norm(root[first])), False
+        deviations *= math.sqrt(1 - share**2)
+        root, way = root - np.outer(root @ held, held), way - held * float(way @ held)
+        way = way / (float(np.linalg.norm(way)) or 1.0)
 
 
 def _counted(belief: Belief, frequency: float) -> dict[str, list[float]]:
