@@ -81,10 +81,10 @@ def believe(record: Record, *, mapped: Map = map) -> Belief:
     The law is the simplest that the record leaves possible. It begins as :math:`f = f_k\,\mathrm{sgn}\,v + s\,v`, by
     least squares where the mass slides faster than a fifth of its largest speed; its values, the state in which the
     record begins, and the constants within their stated uncertainty are moved to where the simulated displacement is
-    nearest to the measured one, by Gauss's and Newton's method. A part that does not stand out of chance (one in a
-    hundred) is left out; a static friction above the sliding one, a contact that gives way or a friction that falls as
-    Stribeck's does is believed in where it leaves less of the displacement than chance would (by an F test, at one in a
-    hundred for all of them together).
+    nearest to the measured one, by Levenberg's and Marquardt's method. A part that does not stand out of chance (one in
+    a hundred) is left out; a static friction above the sliding one, a contact that gives way or a friction that falls
+    as Stribeck's does is believed in where it leaves less of the displacement than chance would (by an F test, at one
+    in a hundred for all of them together).
 
     Parameters
     ----------
