@@ -132,6 +132,25 @@ def test_a_mistake_is_named_first_and_the_command_printed_mends_it(name: str) ->
     assert right(mended(result))
 
 
+@pytest.mark.parametrize("title", ["y", "frame", "Tisch"])
+def test_a_column_that_is_called_as_a_base_is_proposed_as_one(title: str) -> None:
+    path = written("t [s],x [mm],z [mm]", x=1e3, z=1e3)
+    path.write_text(path.read_text().replace("z [mm]", f"{title} [mm]"))
+    result = ask("analyze", path, *RIG)
+    assert first_line(result).startswith(f"Probably {title} is the motion of the base, z: until"), result.output
+    assert f"z={title} [mm]" in command_in(result)
+    assert right(mended(result))
+
+
+def test_what_moves_otherwise_than_the_mass_is_no_base() -> None:
+    path = written("t [s],x [m],z [m]")
+    table = np.loadtxt(path, delimiter=",", skiprows=1)
+    for motion in (np.sin(40 * table[:, 0]), np.arange(len(table))):
+        table[:, 2] = motion
+        np.savetxt(path, table, delimiter=",", header="t [s],x [m],frame [m]", comments="")
+        assert "is the motion of the base" not in ask("analyze", path, *RIG).output
+
+
 def test_units_that_two_slips_have_left_out_are_to_be_filled_in() -> None:
     """No single slip makes x and z in mm agree with an a in g: read as SI they told a friction a thousand times too
     large, and the command that was to mend it stated what could not be true."""

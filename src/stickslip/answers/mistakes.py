@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from stickslip.arrays import Array
+from stickslip.balance.balance import ALONE
 from stickslip.consistent.checks import MILLISECONDS, Check, Slip
 from stickslip.consistent.contradictions import Consistency
 from stickslip.cycle.joint import regress_joint
@@ -17,9 +19,9 @@ from stickslip.errors import RecordError, StickslipError
 from stickslip.estimate import Estimate
 from stickslip.files.expression import split_spec
 from stickslip.files.select import split_name
-from stickslip.record.channels import Channel
+from stickslip.record.channels import VOCABULARY, Channel
 from stickslip.record.record import Record
-from stickslip.rig.settings import RigSettings
+from stickslip.rig.settings import WORDS, RigSettings
 from stickslip.signals.derivatives import differentiate
 from stickslip.signals.noise import quantisation_step
 from stickslip.units import parse_unit
@@ -27,6 +29,8 @@ from stickslip.units import parse_unit
 LATEST = 0.1  # of a record's length: a sensor that is said to be later, and tells of no cycle, is late by milliseconds
 SHORTEST_DELAY = 0.05  # s: a true delay of more than a cycle is shorter than this, where the motion is fast
 HALF_TURN = math.pi  # rad: what swings farther, and is called an angle in rad, is one in degrees
+GOES_ON = 0.8  # of the motion at first that is left at last, where something drives it
+BASES = rf"{dict(WORDS)['z']}|frame|rahmen|^y$"  # how a column of the base's motion is called
 BALANCED = ("balance", "energy")  # checks that a wrong mass, spring or sensor fails
 MOVES = "acceleration"  # of the check that a wrong unit of a, or of x, fails
 FAR = 2.0  # times by which two sides that should be one differ, from which no force is given
@@ -72,10 +76,44 @@ def hopeless(consistency: Consistency | None) -> str:
     return untrue(consistency) if any(_far(c) for c in failed if any(w in c.name for w in (*BALANCED, MOVES))) else ""
 
 
-def mistakes(record: Record, rig: RigSettings, consistent: Consistency | None, loops: Loops | None) -> tuple[Slip, ...]:
-    """What one slip of the hand would explain, the likeliest first; none where nothing speaks for one."""
-    late = _late(record, rig, loops)
-    return (late,) if late is not None else consistent.slips if consistent is not None else ()
+def mistakes(
+    record: Record, rig: RigSettings, consistent: Consistency | None, loops: Loops | None, *, unseen: bool
+) -> tuple[Slip, ...]:
+    """What one slip of the hand would explain, the likeliest first; none where nothing speaks for one.
+
+    Where the base is `unseen`, a column may be its motion.
+    """
+    first = _late(record, rig, loops) or (_base(record) if unseen else None)
+    return (first,) if first is not None else consistent.slips if consistent is not None else ()
+
+
+def base_unseen(record: Record) -> bool:
+    """Whether the friction is that of a spring whose other end was not measured, while the motion goes on."""
+    rig = record.rig
+    if rig is None or rig.method == ALONE or "x" not in record or not {"z", "force", "load"}.isdisjoint(record):
+        return False
+    first, last = (float(np.std(part)) for part in np.array_split(record["x"], 2))
+    return last > GOES_ON * first
+
+
+def _base(record: Record) -> Slip | None:
+    """The one column that is called as a base is and moves as often as the mass."""
+    often = _strongest(record["x"])
+    bases = [
+        name
+        for name, channel in record.channels.items()
+        if (name == "y" or name not in VOCABULARY) and channel.unit in ("m", "1")
+        if re.search(BASES, name.lower().strip("_")) and _strongest(record[name]) == often
+    ]
+    if len(bases) != 1:
+        return None
+    return Slip(f"{_called(record.channels[bases[0]])} is the motion of the base, z", {"z": (bases[0], 1.0)})
+
+
+def _strongest(values: Array) -> int:
+    """The strongest line of a channel, by its number; 0 where there is none."""
+    spectrum = np.abs(np.fft.rfft(_about_line(values) * np.hanning(len(values))))
+    return int(np.argmax(spectrum)) if np.all(np.isfinite(spectrum)) else 0
 
 
 def _late(record: Record, rig: RigSettings, loops: Loops | None) -> Slip | None:

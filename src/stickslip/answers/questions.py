@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 
 from stickslip.answers.findings import BY_FORCE, NOT_TRIED, ONSETS, Findings, Inquiry, flagged, record_name, with_doubt
-from stickslip.answers.mistakes import missing, mistakes, slipped, untrue
+from stickslip.answers.mistakes import base_unseen, missing, mistakes, slipped, untrue
 from stickslip.answers.preparation import AT_ONCE, CONSTANTS, MOTION, described, middle, normal_load, ready, unmoved
-from stickslip.balance.balance import ALONE, Balance, pulled_slider
+from stickslip.balance.balance import Balance, pulled_slider
 from stickslip.balance.force import FUSIONS, friction_force
 from stickslip.balance.likely_contact import STRAYING
 from stickslip.balance.motion import is_measured, slid_on
@@ -37,7 +37,6 @@ from stickslip.twin.search import lacking
 from stickslip.units import parse_unit
 
 STRETCH = 1 << 14  # samples in which the contact is fitted
-GOES_ON = 0.8  # of the motion at first that is left at last, where something drives it
 NO_BASE = "there is no channel z: the base is taken to be at rest, but something keeps the motion up"
 TIMES = ("cycles", "slips")  # arrays of instants, which follow each other from block to block
 
@@ -151,7 +150,7 @@ def _findings(record: Record, rig: RigSettings, method: str, questions: Sequence
         led = not question.follows or answers.get(question.follows) is not None
         if led and answers.get(question.unless) is None and question.fits(whole):
             answers[question.key] = inquiry.ask(question.name, partial(_answer, question, whole, fused, slid))
-    slips = mistakes(record, rig, answers.get("consistency"), answers.get("loops"))
+    slips = mistakes(record, rig, answers.get("consistency"), answers.get("loops"), unseen=base_unseen(whole))
     answers = doubted(answers, whole, slips, unknown=made.doubt, refusals=inquiry.refusals)
     answers = untried(answers) if lacking(whole) is None else answers
     if all(answer is None for answer in answers.values()):
@@ -367,7 +366,7 @@ def _reasons(
     """Each doubt with the questions that it concerns, the gravest first."""
     if contradiction:
         yield contradiction, (*BY_FORCE, "sticks")
-    if _base_unseen(record):
+    if base_unseen(record):
         yield NO_BASE, (*BY_FORCE, "sticks")
     if unknown:
         yield unknown, BY_FORCE
@@ -382,15 +381,6 @@ def _reasons(
 def untried(answers: dict[str, Any]) -> dict[str, Any]:
     """The answers, with a doubt at those that may be otherwise on twins."""
     return answers | {key: with_doubt(answers.get(key), doubt) for key, doubt in NOT_TRIED.items()}
-
-
-def _base_unseen(record: Record) -> bool:
-    """Whether the friction is that of a spring whose other end was not measured, while the motion goes on."""
-    rig = record.rig
-    if rig is None or rig.method == ALONE or "x" not in record or not {"z", "force", "load"}.isdisjoint(record):
-        return False
-    first, last = (float(np.std(part)) for part in np.array_split(record["x"], 2))
-    return last > GOES_ON * first
 
 
 def analyze_blocks(

@@ -261,10 +261,13 @@ def corrected(findings: Findings, slip: Slip, question: str = "analyze", options
     channels = dict(read.get("channels") or _sources(record))
     if not channels.keys() >= {*slip.zeros, *(of for of, _ in slip.cure.values())}:
         return ""
-    # of two that were exchanged each keeps its unit
+    # of two that were exchanged each keeps its unit; a channel that there was not is read from the other's column
     cured = {
-        name: times(channels[of], by, unit=split_spec(channels[name]).unit) for name, (of, by) in slip.cure.items()
+        name: times(channels[of], by, unit=split_spec(channels.get(name, channels[of])).unit)
+        for name, (of, by) in slip.cure.items()
     }
+    renamed = {of for name, (of, _) in slip.cure.items() if name not in channels}
+    channels = {name: text for name, text in channels.items() if name not in renamed}
     cured |= {name: shifted(channels[name], off, name) for name, off in slip.zeros.items()}
     if not all(cured.values()):
         return ""
