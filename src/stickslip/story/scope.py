@@ -258,7 +258,7 @@ def corrected(findings: Findings, slip: Slip, question: str = "analyze", options
     """The command that asks again, without a slip of the hand; empty where none can."""
     record, settings = findings.record, dict(findings.settings)
     read = dict(_read(record))
-    channels = dict(read.get("channels") or _sources(record))
+    channels: dict[str, str] = dict(read.get("channels") or _sources(record))
     if not channels.keys() >= {*slip.zeros, *(of for of, _ in slip.cure.values())}:
         return ""
     # of two that were exchanged each keeps its unit; a channel that there was not is read from the other's column
