@@ -383,6 +383,20 @@ def test_no_force_stands_in_the_table_where_what_it_rests_on_was_stated_wrongly(
     assert "sliding friction" in mended(answer)
 
 
+@pytest.mark.figures
+def test_no_force_is_drawn_where_none_is_given(tmp_path: Path) -> None:
+    """Under "no force is given" the page drew friction in kN."""
+    path = written("t [s],x [m],z [m],a [m/s^2]", x=1e3, z=1e3)
+    ask("analyze", path, *RIG, "--output", tmp_path / "out")
+    names = {picture.stem for picture in (tmp_path / "out").rglob("*.svg")}
+    assert "record" in names
+    assert not names & {"friction-velocity", "friction-displacement", "force-balance", "regression"}
+    drawn = "".join(picture.read_text("utf-8") for picture in (tmp_path / "out").rglob("*.svg"))
+    assert "friction" not in drawn
+    page = (tmp_path / "out" / "report.html").read_text("utf-8")
+    assert '"name":"friction"' not in page.replace(": ", ":")
+
+
 def test_a_unit_that_ends_a_columns_name_is_read() -> None:
     path = Path("data") / "run.csv"
     seen = motion()

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, fields, replace
 from typing import TYPE_CHECKING, Any, Self, TypeVar
 
 from stickslip.answers.mistakes import hopeless
+from stickslip.balance.motion import is_measured
 from stickslip.errors import EstimateError, ModelError, StickslipError
 from stickslip.estimate import UNTRIED, Doubt, Estimate, Result, Status, doubts_of, kinds, stands
 from stickslip.printing import html_table
@@ -25,6 +26,7 @@ WHOLES = {
     "comparison": "comparison of the forces",
 }
 BY_FORCE = ("loops", "breakaway", "stiffness", "contact_damping", "transition", "coupled", "cause", "presliding")
+RESTING = (*BY_FORCE, "regression", "asymmetric", "pull", "comparison", "trial")  # on what was stated of the rig
 DRIVEN = "forcing frequency"  # no matter of friction
 SEEMING = Doubt(
     "not tried on twins: rigs that never stick, that slide at one level or on a rigid contact may seem "
@@ -170,10 +172,25 @@ class Findings(Answers):
         """The numbers that lead, without those that a result tells by other ways, too, and without any force where what
         it rests on was stated wrongly."""
         left_out = [estimate for result in self.results.values() for estimate in getattr(result, "beside", ())]
-        if self.contradiction or hopeless(self.results.get("consistency")):
+        if self.forceless:
             forces = _numbers(self.results.get(key) for key in BY_FORCE)
             left_out += [estimate for estimate in forces if estimate.name != DRIVEN]
         return tuple(estimate for estimate in self.estimates if estimate not in left_out)
+
+    @property
+    def forceless(self) -> bool:
+        """Whether no force is to be given, as what it rests on was stated wrongly."""
+        return bool(self.contradiction or hopeless(self.results.get("consistency")))
+
+    @property
+    def drawn(self) -> Findings:
+        """What of this figures show: all of it, but for the forces where none is to be given."""
+        if not self.forceless:
+            return self
+        record, computed = self.record, "friction" in self.record and not is_measured(self.record, "friction")
+        left = {name: values for name, values in record.samples.items() if name != "friction" or not computed}
+        record = replace(record, samples=left, channels={name: record.channels[name] for name in left}, rig=None)
+        return replace(self, record=record).having(**dict.fromkeys(RESTING))
 
     @property
     def doubts(self) -> tuple[tuple[str, str], ...]:

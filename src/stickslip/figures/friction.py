@@ -67,6 +67,7 @@ COLOURS = {"holds": BLUE, "fails": ORANGE, "can not be told": FAINT}
 
 def plates_of(findings: Findings) -> list[Plate]:
     """The figures of one record, in reading order."""
+    findings = findings.drawn
     events = findings.sticks.events if findings.sticks is not None else ()
     sticks = [event for event in events if event.kind == "stick"]
     plates = [*_of_friction(findings), *_over_time(findings, sticks=len(sticks)), *_of_contact(findings)]

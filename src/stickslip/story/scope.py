@@ -142,6 +142,7 @@ def _line(values: Array, detail: slice) -> dict[str, Any]:
 
 def of_findings(findings: Findings, file: str = "") -> Scope | None:
     """A record of friction, with its twin over it where it has one; None of a broken clock."""
+    findings = findings.drawn
     record, trial, loops = findings.record, findings.trial, findings.loops
     if record.stamps is not None:
         return None
