@@ -108,6 +108,18 @@ def test_what_creaks_or_whistles_is_not_called_silent() -> None:
     assert ss.answers.compare_squeaks(found[2:] * 2).verdicts == ("Whether Pipe and Pipe squeak can not be told.",)
 
 
+def test_pulses_of_a_creak_are_told_apart_from_sharp_ones_of_the_record() -> None:
+    """One creak was told to have 32.7 pulses in a second, and 7.91."""
+    t = np.arange(int(FS)) / FS
+    since = np.mod(20 * t + 6 * t**2, 1) / (20 + 12 * t)
+    creak = np.exp(-since / 0.002) * np.random.default_rng(3).standard_normal(len(t)) * (t > 0.1) * (t < 0.9)
+    story = ss.summary(of_sound(creak, "Door"))
+    assert "stick-slip pulses, 2" in story.answer
+    names = [row[0] for table in story.tables for row in table.rows]
+    assert "sharp pulses" in names
+    assert "pulses" not in names
+
+
 def test_no_squeak_is_said_with_what_sounds_instead() -> None:
     headline = ss.summary(findings("dry", 6.13)).headline
     count = len(findings("dry", 6.13).squeaks.bursts)

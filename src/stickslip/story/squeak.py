@@ -281,9 +281,9 @@ def _hearing_table(findings: Findings) -> tuple[Sequence[str], list[list[str]]]:
             ["crest factor", f"{impulses.crest_factor:.3g}", "largest magnitude over RMS; 1.41 of a sine"],
             ["kurtosis", f"{impulses.kurtosis:.3g}", "3 of normal noise, 1.5 of a sine, large of pulses"],
             [
-                "pulses",
-                _or_none(impulses.rate, ".3g") + " in a second",
-                "in windows of 2 ms, 10 dB over the valleys beside",
+                "sharp pulses",
+                _or_none(impulses.rate, ".3g") + " in a second of all",
+                "in windows of 2 ms, 10 dB over the valleys beside: not all pulses of a creak are",
             ],
         ]
     return ["", "value", "what it is"], rows
@@ -292,7 +292,7 @@ def _hearing_table(findings: Findings) -> tuple[Sequence[str], list[list[str]]]:
 def _hearing_note(findings: Findings) -> str:
     """By what, and that no conformity is claimed."""
     by = "" if findings.quality is None else f"Loudness, sharpness and roughness by {findings.quality.method}. "
-    return f"{by}No conformity to a standard is claimed; the pulses follow none."
+    return f"{by}No conformity to a standard is claimed; the sharp pulses follow none."
 
 
 def _coupling_table(joined: Coupling) -> tuple[Sequence[str], list[list[str]]]:
