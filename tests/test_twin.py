@@ -143,6 +143,14 @@ def test_the_work_of_friction_is_that_of_the_rig(rig: stepped.Rig) -> None:
     assert energy.value == pytest.approx(tried.record.truth["energy per cycle"], rel=2e-3)
 
 
+def test_the_work_of_a_cycle_is_the_mean_of_all_that_a_record_holds() -> None:
+    """Of a motion that grows and 14 cycles less a sample, the last cycle was left out, and the interval narrower."""
+    grows = stepped.Rig("Coulomb", 0.54, 187.76, 0.0136, 2.887e-4, 3.387, kinetic=0.01255)
+    record = stepped.record(grows, np.random.default_rng(11), noise=1e-4, cycles=14)
+    tried = ss.tried(ss.analyze(record.rows(0, len(record) - 1), **grows.stated), twins=8)
+    assert tried.loops.energy_per_cycle.includes(record.truth["energy per cycle"])
+
+
 def test_friction_that_falls_along_a_curve_has_the_slope_of_the_line_nearest_to_it() -> None:
     """It was zero, within 0.04 and without a doubt: the curve was taken for no change with speed."""
     _, tried = asked(FADES)

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from stickslip.arrays import Array
+from stickslip.balance.motion import NEARLY
 from stickslip.errors import EstimateError, StickslipError
 from stickslip.estimate import FEW, NORMAL_95, UNSTATED, Doubt, Estimate, Status, doubts_of, kinds
 from stickslip.record.record import Record
@@ -283,17 +284,18 @@ def _asked(
     """A twin, with its answers and its truth; None of one that can not be followed: it tells nothing."""
     chance = np.random.default_rng(seed)
     # the linear fit of a rig that is nowhere near draws others that can not be followed
-    drawn = belief if belief.left > LOST else belief.drawn(chance)
-    try:
-        record = drawn.twin(chance)
-        return _Twin(drawn.values, record["x"], ask(record), _truth(drawn, record, frequency))
-    except StickslipError:
-        return None
+    for drawn in (belief.drawn(chance), belief) if belief.left > LOST else (belief.drawn(chance),):
+        try:
+            record = drawn.twin(chance)
+            return _Twin(drawn.values, record["x"], ask(record), _truth(drawn, record, frequency))
+        except StickslipError:
+            continue
+    return None
 
 
 def _truth(rig: Belief, record: Record, frequency: float) -> dict[str, float]:
     """What is true of a twin, by the name of the answer."""
-    cycles = math.floor(record.duration * frequency) if frequency > 0 else 0
+    cycles = math.floor(record.duration * frequency + NEARLY) if frequency > 0 else 0
     # a twin of a record that begins in a stick is not quite at rest there, and comes to a stop that the record has not
     begin = 1 if cycles > 1 else 0
     stops = sum(kind in STICKS and begin <= time * frequency < cycles for time, kind in record.truth["events"])
