@@ -183,6 +183,7 @@ def test_the_comparison_shows_the_line_of_the_coefficient() -> None:
     comparison = compare([slid(0.3 * n, n) for n in (1.0, 2.0, 4.0)])
     axes = plot_load_dependence(comparison)
     line = next(line for line in axes.get_lines() if "×" in str(line.get_label()))
+    assert f" {comparison.coefficient.cells[1]} ×" in str(line.get_label()), "rounded as in the table"
     assert comparison.coefficient is not None
     x, y = (np.asarray(part, dtype=float) for part in line.get_data())
     assert y[-1] / x[-1] == pytest.approx(comparison.coefficient.value)

@@ -105,7 +105,7 @@ def plot_differences(decrement: Decrement, *, ax: Axes | None = None) -> Axes:
     first = decrement.bounds.i
     scale = abs(float(decrement.differences[first - 1])) * math.exp(math.pi * beta * first)
     for side in (1, -1):
-        label = f"exponential of the damping ratio {zeta:.3g}" if side == 1 else None
+        label = f"exponential of the damping ratio {decrement.damping_ratio.cells[1]}" if side == 1 else None
         ax.plot(along, side * factor * scale * np.exp(-math.pi * beta * along), color=BLUE, linestyle="--", label=label)
     label = f"amplitude {'differences' if apart == 2 else 'sums'}, 95 %"
     look: Any = {"fmt": "o", "color": INK, "markersize": 3.5, "linewidth": 0.9, "zorder": 3, "label": label}

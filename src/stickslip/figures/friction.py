@@ -238,7 +238,7 @@ def plot_load_dependence(comparison: Comparison, *, ax: Axes | None = None) -> A
         reach, value = np.array([0.0, 1.1 * loads.max()]), comparison.coefficient.value
         low, high = (y_factor * end * reach for end in comparison.coefficient.interval)
         ax.fill_between(x_factor * reach, low, high, color=ORANGE, alpha=0.18, linewidth=0, label="95 % band")
-        label = f"friction = {value:.3g} × normal load"
+        label = f"friction = {comparison.coefficient.cells[1]} × normal load"
         ax.plot(x_factor * reach, y_factor * value * reach, color=ORANGE, label=label)
     away = y_factor * np.abs(ends - values[:, None]).T
     ax.errorbar(x_factor * loads, y_factor * values, yerr=away, color=INK, label="records, 95 %", **BARS)

@@ -147,7 +147,7 @@ def of_findings(findings: Findings, file: str = "") -> Scope | None:
     if record.stamps is not None:
         return None
     twin = None if trial is None else _quiet_twin(trial.belief, len(record))
-    panels, model = list(_panels(record, twin)), "" if trial is None or twin is None else str(trial.belief)
+    panels, model = list(_panels(record, twin)), "" if trial is None or twin is None else trial.belief.called
     if not model and findings.regression is not None:
         panels, model = [_explained(panel, findings) for panel in panels], EXPLAINED
     moved, cycles, period = None, (), 0.0

@@ -139,15 +139,20 @@ class Belief:
         return {name: value for name, value in vars(self).items() if name != "_motion"}
 
     def __str__(self) -> str:
-        law = self.law
-        numbers = {own: getattr(law, own.name) for own in fields(law)}
+        numbers = {own: getattr(self.law, own.name) for own in fields(self.law)}
         parts = [
             f"{declaration(own).name} {value:.4g} {declaration(own).unit}".removesuffix(" 1")
             for own, value in numbers.items()
             if isinstance(value, float) and value
         ]
+        return f"{self.called} ({', '.join(parts)})" if parts else "no friction"
+
+    @property
+    def called(self) -> str:
+        """The law without its numbers, whose digits nothing rounds by how sure they are."""
+        law = self.law
         label = Coulomb.label if isinstance(law, LinearSlope) and not law.slope else law.label
-        return f"{label.partition(':')[0]} ({', '.join(parts)})" if parts else "no friction"
+        return label.partition(":")[0]
 
     @property
     def slope(self) -> float:
