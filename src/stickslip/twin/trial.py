@@ -394,12 +394,14 @@ def _apart(belief: Belief, value: Callable[[Belief], float]) -> list[float]:
     They lie where it leaves as much more of x than the nearest law as chance would once in twenty.
     """
     left, ends = {rig: descent.misfit(rig) for rig in (belief, *belief.rivals)}, list[float]()
+    # one with a constant off by what nobody stated is nearer by that alone, and makes no other law less likely
+    nearest = min(misfit for rig, misfit in left.items() if rig.slipped == belief.slipped)
     low, high = _reached(belief, value, NORMAL_95)
     for rig in belief.rivals:
-        further = rig.fit.freedom * math.log(left[rig] / min(left.values())) if rig.fit is not None else math.inf
-        if further > NORMAL_95**2:
+        further = rig.fit.freedom * math.log(left[rig] / nearest) if rig.fit is not None else math.inf
+        if further > NORMAL_95**2 and not rig.held:  # of a grid over a value that is held, the end lies between two
             continue
-        least, most = _reached(rig, value, math.sqrt(NORMAL_95**2 - further))
+        least, most = _reached(rig, value, math.sqrt(min(max(0.0, NORMAL_95**2 - further), NORMAL_95**2)))
         more = value(rig) - value(belief)
         ends += [min(more, least - low), max(more, most - high)]
     return ends
