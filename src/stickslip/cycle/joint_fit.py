@@ -299,12 +299,7 @@ def pooled(data: Sequence[JointData]) -> JointData:
 
 
 def joint_data(
-    record: Record,
-    gravity: bool | None,
-    slowly: bool = False,
-    teeth: Teeth | None = None,
-    /,
-    **given: Constant | None,
+    record: Record, gravity: bool | None, slowly: bool = False, teeth: Teeth | None = None, /, **given: Constant | None
 ) -> tuple[Record, JointData]:
     """The record with its torque, and what is asked of it under what is stated; of slow sliding too, where asked.
 

@@ -269,14 +269,7 @@ POSITIVE = ("inertia", "coulomb", "stiffness")  # viscous friction may fall with
 
 
 def _answer(
-    record: Record,
-    name: str,
-    fit: LeastSquares,
-    terms: list[str],
-    force: Array,
-    rows: Rows,
-    width: float,
-    noisy: float,
+    record: Record, name: str, fit: LeastSquares, terms: list[str], force: Array, rows: Rows, width: float, noisy: float
 ) -> Regression:
     turning = record.channels[name].unit == "N m"
     method = f"least squares below {width:.3g} Hz"

@@ -9,14 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from stickslip.arrays import Array, Mask, Rows
-from stickslip.balance.motion import (
-    Cycles,
-    Motion,
-    contact_motion,
-    find_cycles,
-    motion_channels,
-    require_fit,
-)
+from stickslip.balance.motion import Cycles, Motion, contact_motion, find_cycles, motion_channels, require_fit
 from stickslip.cycle.loops import DRIVES, levels_of, sliding_parts
 from stickslip.errors import EstimateError, ModelError, RecordError
 from stickslip.estimate import Constant, Doubt, Estimate, Result, Status

@@ -18,17 +18,7 @@ import numpy as np
 
 from stickslip.arrays import Array
 from stickslip.errors import FormatError
-from stickslip.files.table import (
-    LISTED,
-    Budget,
-    Column,
-    Options,
-    Table,
-    optional,
-    reading,
-    slices,
-    unique,
-)
+from stickslip.files.table import LISTED, Budget, Column, Options, Table, optional, reading, slices, unique
 
 NAMES = ("name", "joint_names")  # of a message whose lists have one number for each joint
 LATE = 0.1  # of the clock: a topic that is silent for longer at its beginning would cost these rows

@@ -197,14 +197,7 @@ def fmu_code(law: Law | CurvedLaw, formula: str, begins: Sequence[float], *, on_
 
 
 def model_description(
-    name: str,
-    token: str,
-    about: str,
-    *,
-    law: Law | CurvedLaw,
-    begins: Sequence[float],
-    exits: int,
-    turning: bool,
+    name: str, token: str, about: str, *, law: Law | CurvedLaw, begins: Sequence[float], exits: int, turning: bool
 ) -> str:
     """What a tool has to know of the model: its variables and their units, by the value references of fmu.c."""
     memory, sizes = list(law.memory), [f'nominal="{size!r}"' for size in sizes_of(law)]

@@ -360,8 +360,7 @@ class RigSettings(BaseModel):
     units: dict[str, str] = Field(default_factory=dict)
     sensors: dict[str, SensorSettings] = Field(default_factory=dict)
     normal: Annotated[
-        dict[str, Annotated[float | Estimate, _constant(LOAD, positive=True), AS_PAIR]],
-        BeforeValidator(_one_or_many),
+        dict[str, Annotated[float | Estimate, _constant(LOAD, positive=True), AS_PAIR]], BeforeValidator(_one_or_many)
     ] = Field(default_factory=dict)
     repair: tuple[Annotated[str, BeforeValidator(_repair)], ...] = ()
     devices: dict[str, dict[str, Any]] = Field(default_factory=dict)

@@ -155,15 +155,7 @@ def model_of(table: Tape, rtol: float) -> Model:
     order = degree(rtol)
     series, numbers = _code(table, order)
     return Model(
-        series,
-        numbers,
-        table.sums,
-        table.exits,
-        table.guards,
-        table.tones,
-        table.motion.period,
-        SHARE * rtol,
-        order,
+        series, numbers, table.sums, table.exits, table.guards, table.tones, table.motion.period, SHARE * rtol, order
     )
 
 

@@ -362,14 +362,7 @@ class _Place:
     """Where a march is, at an end or a begin of slip: clock, state and what is written there."""
 
     def __init__(
-        self,
-        own: _March,
-        clock: Array,
-        state: Array,
-        big: Array,
-        until: tuple[float, float],
-        steps: Steps,
-        work: Work,
+        self, own: _March, clock: Array, state: Array, big: Array, until: tuple[float, float], steps: Steps, work: Work
     ) -> None:
         self.own, self.plane, self.mass = own, own.plane, own.plane.system.mass
         self.clock, self.state, self.big, self.until, self.steps, self.work = clock, state, big, until, steps, work

@@ -21,19 +21,7 @@ from stickslip.laws.curved import Creeping
 from stickslip.oscillator import Oscillator
 from stickslip.solve.curved import CurvedTrajectory
 from stickslip.solve.tape import Tape, tape
-from stickslip.solve.taylor import (
-    ASINH,
-    EXP,
-    LINEAR,
-    LOG,
-    POWER,
-    PRODUCT,
-    QUOTIENT,
-    SQUARE,
-    STILL,
-    TANH,
-    Nodes,
-)
+from stickslip.solve.taylor import ASINH, EXP, LINEAR, LOG, POWER, PRODUCT, QUOTIENT, SQUARE, STILL, TANH, Nodes
 
 POINTS = 10  # of Gauss in a step, exact to order 20: the motion's own steps are of order 14 or 18
 ASIDE = 1e-30  # a step along the imaginary axis: the derivative is exact, since no difference is taken

@@ -427,14 +427,7 @@ NONE = Hunting(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 def servo_hunting(
-    law: Law,
-    *,
-    inertia: float,
-    kp: float,
-    ki: float,
-    kd: float,
-    most: float = math.inf,
-    fastest: float = math.inf,
+    law: Law, *, inertia: float, kp: float, ki: float, kd: float, most: float = math.inf, fastest: float = math.inf
 ) -> Hunting:
     r"""Does a joint or an axis hunt under :math:`\tau = -k_p x - k_i \int x\,dt - k_d \dot x` and dry friction?
 

@@ -184,12 +184,7 @@ NUMBERS = "results.json"
 
 
 def publish(
-    result: Any,
-    *,
-    folder: str | Path,
-    figures: bool = True,
-    wording: Callable[[str], str] = str,
-    **context: Any,
+    result: Any, *, folder: str | Path, figures: bool = True, wording: Callable[[str], str] = str, **context: Any
 ) -> Path:
     """Write ``report.html``, ``results.json``, the figures as SVG and PNG, and what else a result has into a folder.
 
