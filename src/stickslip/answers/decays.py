@@ -218,9 +218,8 @@ class Decay(Result):
     def beside(self) -> tuple[Estimate, ...]:
         """What is not quoted, and what the decrements say where they are not the best answer."""
         more = () if self.thesis is None or self.best is self.thesis else self.thesis.estimates
-        denied = (
-            [DENIED] if self.against < CLEAR or self.strays else []
-        )  # of another motion they may be off by ten deviations
+        # of another motion they may be off by ten deviations
+        denied = [DENIED] if self.against < CLEAR or self.strays else []
         decrements = (
             replace(estimate, name=f"{estimate.name}{BY_DECREMENTS}", status=Status(estimate.status, *denied))
             for estimate in more

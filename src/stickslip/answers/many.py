@@ -327,10 +327,8 @@ def _one_thread_each() -> Iterator[None]:
 def _by_cluster(answer: Callable[[Task], Row], tasks: Sequence[Task], address: str | None) -> Iterator[Row]:
     if not tasks:
         return
-    from stickslip.maps.engines import (  # systems and laws, which a record on this machine does not need
-        AHEAD,
-        client_of,
-    )
+    # systems and laws, which a record on this machine does not need
+    from stickslip.maps.engines import AHEAD, client_of
 
     with client_of(address) as client:
         from distributed import as_completed

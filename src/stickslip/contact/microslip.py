@@ -27,9 +27,8 @@ SHOWING = 0.4  # of a cycle: a ring over a line shows its mode where it lasts as
 RING_SAMPLES = 10  # and has as many samples
 THROUGH = 4.0  # variances that one ring through two may leave: 0.7 to 1.1 of 9 sticks of a rig, 140 through a slip
 MODE_RINGS = 24  # the longest of them that show it together
-ALIKE = (
-    0.9  # of the sticks, that hold as many: of 100 rigs at each noise (benchmarks/microslips.py) false ones never did
-)
+# of the sticks, that hold as many: of 100 rigs at each noise (benchmarks/microslips.py) false ones never did
+ALIKE = 0.9
 SWING = (1.0, 1.8)  # cycles after the beginning of a ring: the second tip, and where the ring after it is over
 LASTING = np.geomspace(0.01, 0.5, 40)  # of a cycle: micro-slips that are tried
 SPARE = 1.1  # times that: of 15 slips of up to 1.1 times it 2 were missed, of 90 of up to 1.5 none (1 % noise)

@@ -59,11 +59,8 @@ ADVICE = {
 WARM = ("warming", "thinning")
 # Of the variance of a temperature, its counts' and its noise's: a regression on it is low by as much.
 ROUGHLY = 0.02
-OPTIONAL: tuple[tuple[str, ...], ...] = (
-    WARM,
-    ("load",),
-    ("sine", "cosine"),
-)  # left out in this order where the motion can not tell all of them apart
+# left out in this order where the motion can not tell all of them apart
+OPTIONAL: tuple[tuple[str, ...], ...] = (WARM, ("load",), ("sine", "cosine"))
 
 
 Fitted = tuple[LeastSquares, tuple[str, ...], tuple[float, float]]  # with its terms and gravity's sine and cosine part

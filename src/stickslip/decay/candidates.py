@@ -21,10 +21,8 @@ EVALUATIONS = 60  # of one search
 PRECISION = 1e-6  # of the range: no record is better, no residual below it says anything
 CONVERGED = 1e-8  # relative change of the sum of squares, and of the parameters
 LOWEST = {"damping_ratio": 0.0, "dry_displacement": 0.0, "quadratic": 0.0, "rise": 0.0, "micro_slip": 0.0, "wear": -0.5}
-SHAPES = {
-    "stribeck_speed": (0.02, 1.0),
-    "exponent": (0.1, 1.0),
-}  # lowest and highest; speeds in units of the first speed
+# lowest and highest; speeds in units of the first speed
+SHAPES = {"stribeck_speed": (0.02, 1.0), "exponent": (0.1, 1.0)}
 ADDED = ("quadratic", "rise", "micro_slip")
 CLEAR = 10.0  # effect over noise above which the shape of a term is known
 HIGHEST = {"damping_ratio": 0.95, "rise": 1.0, "wear": 0.5}  # by half in a first amplitude is no wear any more

@@ -94,9 +94,8 @@ def plot_differences(decrement: Decrement, *, ax: Axes | None = None) -> Axes:
     """The amplitude differences on the exponential that viscous friction alone makes of them (thesis, Figure 6.2)."""
     ax = axes_of(ax)
     factor, unit = prefixed(decrement.differences, decrement.ring_down.unit)
-    apart = len(decrement.sd) - len(
-        decrement.differences
-    )  # 2: differences of extremes two apart; 1: sums of neighbours
+    # 2: differences of extremes two apart; 1: sums of neighbours
+    apart = len(decrement.sd) - len(decrement.differences)
     spread = np.hypot(decrement.sd[apart:], decrement.sd[:-apart])
     number = np.arange(1, len(decrement.differences) + 1)
     zeta = decrement.damping_ratio.value

@@ -29,9 +29,8 @@ TEX = (
     (r"\\gamma", "γ"), (r"\\sigma", "σ"), (r"\\delta", "δ"), (r"\\alpha", "α"), (r"\\(\w+)", r"\1"),
 )  # fmt: skip
 FIRST = "THESIS rigid 2.5Hz fk=1.1"
-BOUNDARY = [
-    0.103 + 0.01 * j for j in range(190)
-]  # frequency ratios, none an odd part of one, at which Den Hartog's line is drawn
+# frequency ratios, none an odd part of one, at which Den Hartog's line is drawn
+BOUNDARY = [0.103 + 0.01 * j for j in range(190)]
 MORE = ("law", "drive", "contacts")
 Array = NDArray[np.float64]
 GoOn = Callable[[float], None]

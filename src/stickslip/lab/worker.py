@@ -142,9 +142,8 @@ def serve(requests: BinaryIO, answers: BinaryIO) -> None:
 def main() -> None:
     """Serve on this process's own pipes; what else is printed goes to the error stream."""
     bound(RLIMIT_DATA=MEMORY)
-    warnings.simplefilter(
-        "ignore", RuntimeWarning
-    )  # what overflows is refused in a sentence; the terminal is the user's
+    # what overflows is refused in a sentence; the terminal is the user's
+    warnings.simplefilter("ignore", RuntimeWarning)
     with os.fdopen(os.dup(1), "wb") as answers:
         os.dup2(2, 1)
         serve(sys.stdin.buffer, answers)

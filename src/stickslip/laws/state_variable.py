@@ -24,9 +24,8 @@ RATES = (2.0, 80.0)  # of a guess, over the oscillation's angular frequency
 STEEPEST = 60.0  # of a guess, over the largest speed
 
 STILLEST = 1e-12  # of the speed at which friction turns: a logarithm of the speed wants one that is not zero
-LOGARITHMIC = (
-    100.0  # friction over direct effect from which asinh is a logarithm: its argument is above e^60, or nothing
-)
+# friction over direct effect from which asinh is a logarithm: its argument is above e^60, or nothing
+LOGARITHMIC = 100.0
 
 
 @parametric

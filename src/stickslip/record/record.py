@@ -26,16 +26,8 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
-DETAILS = (
-    "delay",
-    "noise",
-    "sensitivity",
-    "quantity",
-    "mount",
-    "inertia",
-    "discharge",
-    "gain_sd",
-)  # of a channel, that a user may know better than the file
+# of a channel, that a user may know better than the file
+DETAILS = ("delay", "noise", "sensitivity", "quantity", "mount", "inertia", "discharge", "gain_sd")
 RIG_UNITS = {"mass": "kg", "stiffness": "N/m", "damping": "N s/m"}
 MEASURABLE = 1e60  # in SI, as its inverse: beyond, the fourth power of a reading is no number any more
 

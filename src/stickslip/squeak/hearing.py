@@ -271,9 +271,8 @@ class Hearing:
         spans = []
         for first, last in self._one_pitch(line, tonal):
             stretch = median_filter(strength[first : last + 1], STEADY, mode="nearest")
-            unlike = stretch + LEANS * np.arange(
-                len(stretch)
-            )  # of two peaks of one height neither would count as lower
+            # of two peaks of one height neither would count as lower
+            unlike = stretch + LEANS * np.arange(len(stretch))
             padded = np.concatenate([[stretch.min() - DIP], unlike, [stretch.min() - DIP]])
             peaks, _ = find_peaks(padded, prominence=DIP)
             peaks = peaks - 1

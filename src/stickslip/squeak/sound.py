@@ -286,10 +286,8 @@ class Surface:
     slope: float
 
 
-SURFACES = {
-    "dry": Surface(20 / HEAVY, 2.3),
-    "wet": Surface(8 / HEAVY, -0.26),
-}  # 20 and 8 N (section 7.2); slopes chosen
+# 20 and 8 N (section 7.2); slopes chosen
+SURFACES = {"dry": Surface(20 / HEAVY, 2.3), "wet": Surface(8 / HEAVY, -0.26)}
 
 
 def squeak_rig(surface: str = "wet", load: float | str = HEAVY, *, amplitude: float = 8e-3) -> Structure:
