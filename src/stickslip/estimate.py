@@ -357,10 +357,7 @@ class Result:
         import pandas as pd
 
         names = [estimate.name for estimate in self.estimates]
-        rows = [
-            (estimate.value, *estimate.interval, estimate.sd, estimate.unit, estimate.method, str(estimate.status))
-            for estimate in self.estimates
-        ]
+        rows = [(e.value, *e.interval, e.sd, e.unit, e.method, str(e.status)) for e in self.estimates]
         return pd.DataFrame(rows, index=pd.Index(names, name="quantity"), columns=COLUMNS)
 
     def to_xarray(self) -> xr.Dataset:
@@ -387,12 +384,8 @@ def table_of(title: str, estimates: Iterable[Estimate]) -> str:
     for estimate in estimates:
         marks = [str(reasons.setdefault(doubt.words, len(reasons) + 1)) for doubt in doubts_of(estimate.status)]
         rows.append((*estimate.cells, " ".join(marks), estimate.method))
-    return html_table(
-        title,
-        ("quantity", "value", "95 % interval", "", "method"),
-        rows,
-        [f"{n} {reason}" for reason, n in reasons.items()],
-    )
+    notes = [f"{n} {reason}" for reason, n in reasons.items()]
+    return html_table(title, ("quantity", "value", "95 % interval", "", "method"), rows, notes)
 
 
 def plain(value: Any) -> Any:

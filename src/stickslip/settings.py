@@ -222,11 +222,8 @@ def _shown(value: object) -> str:
 def _mended(message: str) -> str:
     """What a model says of a value, in the words of a settings file."""
     sentence = message.removeprefix("Value error, ").replace("Input should", "it should")
-    sentence = (
-        sentence.replace("Tuple should", "it should")
-        .replace("String should", "it should")
-        .replace(" after validation", "")
-    )
+    for said, meant in (("Tuple should", "it should"), ("String should", "it should"), (" after validation", "")):
+        sentence = sentence.replace(said, meant)
     return sentence.replace("a valid dictionary", "a table").replace("a valid ", "a ")
 
 
@@ -268,11 +265,8 @@ def _not_toml(name: str, text: str, reason: str) -> ModelError:
     bare_point = re.search(r"(?:^|[=\[,\s])([-+]?)\.(\d+)", line)
     if bare_point:
         sign, digits = bare_point.groups()
-        return ModelError(
-            f"{name}, line {number}: '{line}'",
-            f"TOML does not take a number like {sign}.{digits}",
-            f"write {sign}0.{digits}",
-        )
+        rule = f"TOML does not take a number like {sign}.{digits}"
+        return ModelError(f"{name}, line {number}: '{line}'", rule, f"write {sign}0.{digits}")
     return ModelError(
         f"{name}, line {number}: '{line}'",
         f"this is not TOML ({re.sub(r' ?[(]at .*[)]', '', reason)})",

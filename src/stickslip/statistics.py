@@ -232,16 +232,8 @@ def mean_of_cycles(
         status = Status(*([Doubt.few(count, of)] if count < FEW_CYCLES else []))
         scatter = f"{present.std(ddof=1):.3g}{'' if unit == '1' else ' ' + unit}"
         check = f"{count} {of}s, scatter between them {scatter}"
-    return Estimate.normal(
-        name,
-        present.mean(),
-        sd=sd,
-        unit=unit,
-        method=method,
-        quantile=student(freedom),
-        status=status,
-        checks=(check, *checks),
-    )
+    more: dict[str, Any] = {"quantile": student(freedom), "status": status, "checks": (check, *checks)}
+    return Estimate.normal(name, present.mean(), sd=sd, unit=unit, method=method, **more)
 
 
 def disagreement(estimates: Sequence[Estimate]) -> float:

@@ -131,11 +131,8 @@ class Decay(Result):
     @property
     def viscous_residual(self) -> float | None:
         """What viscous damping alone leaves of the motion, over what it leaves together with dry friction (RMS)."""
-        fits = (
-            {}
-            if self.motion is None
-            else {candidate.name: candidate.fitted for candidate in self.motion.choice.candidates}
-        )
+        tried = () if self.motion is None else self.motion.choice.candidates
+        fits = {candidate.name: candidate.fitted for candidate in tried}
         if not {"viscous", "both"} <= set(fits) or fits["both"].cost == 0:
             return None
         return math.sqrt(fits["viscous"].cost / fits["both"].cost)

@@ -239,10 +239,7 @@ class Comparison(Answers):
         return tuple(result for result in self.results.values() if isinstance(result, Estimate))
 
     def _repr_html_(self) -> str:
-        first = [
-            (finding.name, next(iter(finding.quoted), None) if finding.level is None else finding.level)
-            for finding in self.findings
-        ]
+        first = [(f.name, next(iter(f.quoted), None) if f.level is None else f.level) for f in self.findings]
         rows = [(name, *(leading.cells if leading is not None else ("", "", ""))) for name, leading in first]
         rows += [("together", *estimate.cells) for estimate in self.estimates]
         return html_table("Comparison", ("record", "quantity", "value", "95 % interval"), rows)
@@ -293,14 +290,8 @@ def _with_numbers(result: Any, change: Callable[[Estimate], Estimate]) -> Any:
     if result is None:
         return None
     numbers = {field.name: getattr(result, field.name) for field in fields(result)}
-    return replace(
-        result,
-        **{
-            name: change(value)
-            for name, value in numbers.items()
-            if isinstance(value, Estimate) and value.name != DRIVEN
-        },
-    )
+    numbers = {name: value for name, value in numbers.items() if isinstance(value, Estimate) and value.name != DRIVEN}
+    return replace(result, **{name: change(value) for name, value in numbers.items()})
 
 
 def flagged(answer: Any, reason: Doubt | str) -> Any:

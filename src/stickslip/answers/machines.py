@@ -104,12 +104,8 @@ def analyze_joint(
     sticks = inquiry.ask("Sticks and slips", partial(find_sticks, whole, method="speed"), aside=True)
     results = {"joint": joint, "breakaway": breakaway, "backlash": backlash}
     results["sticks"] = with_doubt(sticks, TURNS)
-    assumed = {
-        key: channel.unit
-        for key, channel in log.channels.items()
-        if channel.assumed and key not in ("motor", "temperature")
-    }
-    unstated = [f"{key} is read as {unit}" for key, unit in assumed.items()]
+    assumed = {key: channel.unit for key, channel in log.channels.items() if channel.assumed}
+    unstated = [f"{key} is read as {unit}" for key, unit in assumed.items() if key not in ("motor", "temperature")]
     if unstated:
         doubt = f"nobody stated a unit: {' and '.join(unstated)}"
         results = {key: flagged(result, doubt) for key, result in results.items()}
@@ -227,10 +223,8 @@ def episodes(record: Record) -> Iterator[Record]:
 
 def _settings(joint: JointFriction, given: Mapping[str, Any]) -> dict[str, Any]:
     stated = {name: str(value) for name, value in given.items() if value is not None}
-    return {
-        **stated,
-        "torque": {"reference": "of the controller", "current": "of the current"}.get(joint.source, "measured"),
-    }
+    sources = {"reference": "of the controller", "current": "of the current"}
+    return {**stated, "torque": sources.get(joint.source, "measured")}
 
 
 def _with_friction(record: Record, joint: JointFriction) -> Record:

@@ -342,12 +342,8 @@ def _by_cluster(answer: Callable[[Task], Row], tasks: Sequence[Task], address: s
 
 
 def _cells(row: Row, names: Sequence[str]) -> Iterator[tuple[str, Any]]:
-    yield from (
-        ("file", row.name),
-        ("answer", row.answer or row.refusal),
-        ("same as", row.same_as),
-        ("sha256", row.key),
-    )
+    yield from (("file", row.name), ("answer", row.answer or row.refusal))
+    yield from (("same as", row.same_as), ("sha256", row.key))
     yield "normal load [N]", row.normal and row.normal.value
     estimates = {estimate.name: estimate for estimate in row.estimates}
     for name in names:

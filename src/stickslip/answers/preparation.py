@@ -400,11 +400,8 @@ def _doubt(record: Record, given: Record, rig: RigSettings, *, aligned: bool) ->
     unknown = [f"how {' and '.join(sensors)} {'is' if len(sensors) == 1 else 'are'} mounted"] if sensors else []
     if aligned:
         unknown.append(f"the delay of x{FOUND}")
-    unknown += [
-        f"the {name}{FOUND}"
-        for name in ("mass", "stiffness")
-        if getattr(rig, name) is None and getattr(record.rig, name, None) is not None
-    ]
+    absent = [name for name in ("mass", "stiffness") if getattr(rig, name) is None]
+    unknown += [f"the {name}{FOUND}" for name in absent if getattr(record.rig, name, None) is not None]
     if not unknown:
         return None
     listed = " and ".join(filter(None, (", ".join(unknown[:-1]), unknown[-1])))

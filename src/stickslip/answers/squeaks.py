@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -110,11 +111,8 @@ def analyze_squeaks(
         "quality": _quality(record, squeaks, inquiry),
         "impulses": inquiry.ask("Pulses", partial(impulsiveness, record, channel=squeaks.channel)),
     }
-    chosen = {
-        "channel": squeaks.channel,
-        "frequencies": list(squeaks.band),
-        **({"contact": contact} if contact else {}),
-    }
+    chosen: dict[str, Any] = {"channel": squeaks.channel, "frequencies": list(squeaks.band)}
+    chosen |= {"contact": contact} if contact else {}
     name = name or record_name(record)
     stated = None if normal is None else rig_settings({"normal": normal}, source="the call").normal_load(name)
     load = stated or normal_load(record, RigSettings(), name, inquiry.notes)

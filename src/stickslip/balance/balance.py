@@ -108,11 +108,8 @@ class Rig(Balance):
 
     def words(self, record: Record, method: str, width: float, *, one_filter: bool) -> list[str]:
         """What was assumed and how derivatives were taken, for the history."""
-        statements = [
-            "f = k z - k x - c v - m a"
-            if "z" in record
-            else "no channel z: the base is taken to be fixed, f = - k x - c v - m a"
-        ]
+        fixed = "no channel z: the base is taken to be fixed, f = - k x - c v - m a"
+        statements = ["f = k z - k x - c v - m a" if "z" in record else fixed]
         if "force" in record:
             statements.append("the applied force is added")
         measured = [name for name in ("v", "a") if name in record]
@@ -132,11 +129,8 @@ def known_constants(record: Record, **given: Any) -> dict[str, Any]:
     """The rig's constants as numbers, and its damper: as given, or as the friction was found with."""
     stated = {} if record.rig is None else record.rig.constants
     constants = {name: value for name, value in given.items() if value is not None}
-    numbers = {
-        name: Estimate.stated(name, constants[name], unit).value
-        for name, unit in RIG_UNITS.items()
-        if name in constants
-    }
+    units = {name: unit for name, unit in RIG_UNITS.items() if name in constants}
+    numbers = {name: Estimate.stated(name, constants[name], unit).value for name, unit in units.items()}
     return {**stated, **constants, **numbers}
 
 

@@ -285,11 +285,8 @@ def _per_mass(record: Record, rig: Rig, per_mass: Estimate, method: str, bandwid
     made = _known(record, replace(rig, stiffness=per_mass.value), method, method, bandwidth)  # of a mass of 1 kg
     last = made.history[-1]
     note = "neither mass nor stiffness is known: the friction per mass is all that can be said"
-    step = Step(
-        "friction_force",
-        {**last.arguments, "mass": None, "stiffness": None},
-        f"{note}; {_ratio(per_mass)}; {last.outcome}",
-    )
+    outcome = f"{note}; {_ratio(per_mass)}; {last.outcome}"
+    step = Step("friction_force", {**last.arguments, "mass": None, "stiffness": None}, outcome)
     sd = np.hypot(made["friction_sd"], per_mass.sd * np.abs(stretch(made)))
     kept = {name: made[name] for name in made if name not in ("friction", "friction_sd")}
     bare = replace(made, samples=kept, channels={name: made.channels[name] for name in kept}, history=made.history[:-1])

@@ -281,10 +281,8 @@ def _named(modes: Sequence[_Mode], channels: Sequence[str], mass: float | None, 
         ratio = float(np.abs(both[0].amplitude[1] / both[0].amplitude[0]))
     kinds = [_kind(mode, channels, ratio, known=mass is not None) for mode in modes]
     names = _names(modes, [name for name, _ in kinds], channels)
-    return [
-        _resonance(mode, name, _shown(mode, channels), evidence, status)
-        for mode, name, (_, evidence) in zip(modes, names, kinds, strict=True)
-    ]
+    described = zip(modes, names, kinds, strict=True)
+    return [_resonance(mode, name, _shown(mode, channels), evidence, status) for mode, name, (_, evidence) in described]
 
 
 def _names(modes: Sequence[_Mode], kinds: Sequence[str], channels: Sequence[str]) -> list[str]:
@@ -323,10 +321,8 @@ def _kind(mode: _Mode, channels: Sequence[str], ratio: float | None, *, known: b
 
 
 def _resonance(mode: _Mode, name: str, shown: tuple[str, ...], evidence: str, status: Status) -> Resonance:
-    more: dict[str, Any] = {
-        "method": "decaying oscillations of all channels after the tap, by least squares",
-        "status": status,
-    }
+    method = "decaying oscillations of all channels after the tap, by least squares"
+    more: dict[str, Any] = {"method": method, "status": status}
     return Resonance(
         name,
         Estimate.normal(f"frequency of the {name}", mode.frequency, sd=mode.sd[0], unit="Hz", **more),

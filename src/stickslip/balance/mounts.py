@@ -157,10 +157,8 @@ def _fitted(balance: _MeanLines, kinds: str) -> _Fitted:
         return _Fitted(kinds, float(np.sum(misfit(np.empty(0)) ** 2)), np.empty(0), np.empty((0, 0)))
     low, high = math.log(2 * balance.frequency[0]), math.log(2 * balance.frequency[-1])
     places = np.linspace(low, high, COARSE)
-    grid = [
-        np.array([value for place in chosen for value in (place, math.log(FIRST_DAMPING))])
-        for chosen in product(places, repeat=len(kinds))
-    ]
+    damping = math.log(FIRST_DAMPING)
+    grid = [np.array([[place, damping] for place in chosen]).ravel() for chosen in product(places, repeat=len(kinds))]
     grid.sort(key=lambda values: float(np.sum(np.abs(misfit(values)))))
     bounds = ([low - 1, math.log(1e-4)] * len(kinds), [high + 1, math.log(2.0)] * len(kinds))
     solve: Any = least_squares

@@ -322,11 +322,8 @@ def best_constants(
     wide = math.sqrt(max(1.0, misfit / freedom)) if freedom else 1.0
     doubt = [Doubt("mass, spring and frequency do not agree within what is known of them", "disagree")]
     status = Status(*doubt * (wide > NORMAL_95))
-    counted = (
-        f"{len(those)} value{'s' * (len(those) != 1)} of the {name}"
-        for name, those in (("mass", masses), ("spring", springs))
-        if those
-    )
+    both = (("mass", masses), ("spring", springs))
+    counted = (f"{len(those)} value{'s' * (len(those) != 1)} of the {name}" for name, those in both if those)
     method = f"least squares over {', '.join(counted)} and the natural frequency"
     made = [
         Estimate.normal(name, math.exp(log), sd=wide * part * math.exp(log), unit=unit, method=method, status=status)

@@ -368,14 +368,8 @@ class _Head:
         if before and begin > math.ceil(at - before * fs - 1e-6):
             self.short = f"{self.device.name} kept {kept:.3g} s before the trigger, not {before:g} s: it came too early"
         self.end = math.ceil(at + run.wanted.seconds * fs - 1e-6) if run.wanted.seconds else math.inf
-        self.tape = Tape(
-            self.device,
-            self.path,
-            begin=begin,
-            start=(begin - at) / fs,
-            log=run.wanted.log,
-            notes=_notes(run.wanted, kept),
-        )
+        start, notes = (begin - at) / fs, _notes(run.wanted, kept)
+        self.tape = Tape(self.device, self.path, begin=begin, start=start, log=run.wanted.log, notes=notes)
         while self.held:
             self._write(self.held.popleft())
 

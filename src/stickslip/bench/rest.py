@@ -174,11 +174,8 @@ def _bounded(levels: Array, weights: Array, count: float) -> tuple[Estimate, Est
         unsure = NORMAL_95 * math.sqrt(max(share * (1 - share), least) / size)
         ends = ndtri(np.clip([share - unsure, share, share + unsure], least, 1 - least))
         wide = count / (abs(ends[1]) - ndtri(max(least, UNSEEN / size)))
-        low, high, middle = (
-            min(edge, edge + wide * ends[0]),
-            max(edge, edge + wide * ends[2]),
-            edge + wide / 2 * ends[1],
-        )
+        low, high = min(edge, edge + wide * ends[0]), max(edge, edge + wide * ends[2])
+        middle = edge + wide / 2 * ends[1]
     method = "share of two counts" if len(levels) == 2 else "the one count"
     zero = Estimate("", float(middle), (float(low), float(high)), float(high - low) / (2 * NORMAL_95), "", method)
     return zero, Estimate("", 0.0, (0.0, float(wide)), float(wide) / 2, "", method)
@@ -191,10 +188,8 @@ def _rounded(levels: Array, weights: Array, count: float, level: float, sd: floa
 
     def cost(at: Array) -> float:
         spread = count * math.exp(at[1])
-        ends = (
-            (levels + count / 2 - level - count * at[0]) / spread,
-            (levels - count / 2 - level - count * at[0]) / spread,
-        )
+        shift = count * at[0]
+        ends = (levels + count / 2 - level - shift) / spread, (levels - count / 2 - level - shift) / spread
         return -float(weights @ np.log(np.maximum(ndtr(ends[0]) - ndtr(ends[1]), 1e-300)))
 
     start = np.array([0.0, math.log(max(0.2, math.sqrt(max(0.0, (sd / count) ** 2 - 1 / 12))))])

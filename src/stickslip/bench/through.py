@@ -338,10 +338,8 @@ class SimulatedBench:
         }  # fmt: skip
         truth["damping ratio by decrement"] = truth["damping ratio"]
         loaded = w * math.sqrt(system.mass / self._loaded.mass)
-        truth |= {
-            "added: natural frequency": loaded / math.tau,
-            "added: damping ratio": system.damping / (2 * loaded * self._loaded.mass),
-        }
+        truth |= {"added: natural frequency": loaded / math.tau}
+        truth |= {"added: damping ratio": system.damping / (2 * loaded * self._loaded.mass)}
         truth["added: damping ratio by decrement"] = truth["added: damping ratio"]
         if isinstance(law, CompliantContact):
             stiff, damping = system.stiffness + law.stiffness, system.damping + law.damping
@@ -390,10 +388,8 @@ class SimulatedBench:
     ) -> Sequence[float]:
         """Levels as they are really reached: blocks that do not sit, weights that are not what is written on them."""
         chance = self._chance(f"placed {at}{levels}")  # a weight is the same one each time; a block sits anew
-        return [
-            level * (1 + part * chance.standard_normal()) + bool(level) * seated * chance.standard_normal()
-            for level in levels
-        ]
+        draw = chance.standard_normal
+        return [level * (1 + part * draw()) + bool(level) * seated * draw() for level in levels]
 
     def _chance(self, name: str) -> np.random.Generator:
         return np.random.default_rng([self.seed, *name.encode()])

@@ -236,11 +236,8 @@ def _unbalanced(rest: complex, felt: complex, acceleration: complex, stretch: co
     turned = math.degrees(float(np.angle(felt / (felt - rest))))
     leaves = f"the motion leaves {abs(felt - rest):.3g} N, {turned:.0f} degrees apart"
     sentence = f"the load cell measures {abs(felt):.3g} N where {leaves}"
-    return (
-        f"{sentence}; {' or '.join(cures)} would balance them"
-        if cures
-        else f"{sentence}: a delay, a calibration or a sign"
-    )
+    cure = f"; {' or '.join(cures)} would balance them" if cures else ": a delay, a calibration or a sign"
+    return f"{sentence}{cure}"
 
 
 def energy_check(seen: Seen) -> Check:

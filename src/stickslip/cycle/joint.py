@@ -533,11 +533,8 @@ class Telling:
         misfits = [misfit for misfit in self.misfits if set(misfit.terms) & set(weights)]
         strays = [float(np.sqrt(np.mean((misfit.strays @ form) ** 2))) for misfit in misfits if misfit.strays.any()]
         beside = math.hypot(*(float(form @ column) for column in self.unsure), *strays, 0.0)
-        heat = (
-            {"warming": "N m/K", "thinning": "N m s/rad/K"}
-            if self.turning
-            else {"warming": "N/K", "thinning": "N s/m/K"}
-        )
+        heats = ("N m/K", "N m s/rad/K") if self.turning else ("N/K", "N s/m/K")
+        heat = dict(zip(("warming", "thinning"), heats, strict=True))
         units = {**(TURNING if self.turning else UNITS), "load": "1", "late": "s", **heat}
         kind = {"forward": "coulomb", "back": "coulomb", "sine": "coulomb", "cosine": "coulomb", "damping": "viscous"}
         unit = units[kind.get(next(iter(weights)), next(iter(weights)))]

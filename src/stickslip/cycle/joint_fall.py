@@ -98,10 +98,8 @@ class _Balance:
 
     def about(self, solution: Array) -> _Balance:
         """The same about what was found."""
-        share, *pull = (
-            float(solution[self.terms.index(term)]) if term in self.terms else 0.0
-            for term in ("load", "sine", "cosine")
-        )
+        known = dict(zip(self.terms, solution.tolist(), strict=False))
+        share, *pull = (known.get(term, 0.0) for term in ("load", "sine", "cosine"))
         return replace(self, share=share, pull=(pull[0], pull[1]))
 
     @property

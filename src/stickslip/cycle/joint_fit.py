@@ -274,10 +274,8 @@ def warmed(data: Sequence[JointData]) -> list[JointData]:
     if np.ptp(while_sliding) == 0 or error**2 > ROUGHLY * np.var(while_sliding):
         return list(data)
     about = float(np.mean(while_sliding))
-    return [
-        replace(one, terms=(*one.terms, *WARM), logs=tuple(replace(log, about=about) for log in one.logs))
-        for one in data
-    ]
+    centred = [tuple(replace(log, about=about) for log in one.logs) for one in data]
+    return [replace(one, terms=(*one.terms, *WARM), logs=logs) for one, logs in zip(data, centred, strict=True)]
 
 
 def _error_of(temperature: Array, fs: float) -> float:

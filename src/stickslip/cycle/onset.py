@@ -148,10 +148,8 @@ def presliding(record: Record, *, contact: str | None = None) -> Presliding:
     if verdict == "gives way" and not is_measured(record, "friction") and _blurred(strokes):
         verdict, evidence = "can not be told", f"{evidence}, as fast as the balance of forces lets a jump be seen"
     gives = verdict == "gives way"
-    sides = [
-        _inverse(slope, f"presliding stiffness {side}") if gives else None
-        for slope, (_, side) in zip(slopes, SIDES, strict=True)
-    ]
+    pairs = zip(slopes, SIDES, strict=True)
+    sides = [_inverse(slope, f"presliding stiffness {side}") if gives else None for slope, (_, side) in pairs]
     untold = verdict == "can not be told"
     slopes = [slope.unknown(evidence) if untold else slope.within(0.0, otherwise=evidence) for slope in slopes]
     status = evidence if untold else "ok"
@@ -359,11 +357,8 @@ def breakaway(record: Record, *, contact: str | None = None) -> Breakaway:
 
 
 def _level(borne: _Borne, strokes: Strokes, way: int, side: str) -> Estimate | None:
-    values = [
-        friction + way * strokes.offset
-        for pair, friction in zip(borne.strokes, borne.friction, strict=True)
-        if pair.way == way
-    ]
+    pairs = zip(borne.strokes, borne.friction, strict=True)
+    values = [friction + way * strokes.offset for pair, friction in pairs if pair.way == way]
     if not values:
         return None
     how = f"{borne.method}, mean of strokes"
@@ -404,12 +399,8 @@ def _borne(record: Record, strokes: Strokes) -> _Borne:
         "the pull is not what the contact bears: told from the pull to the balance of forces"
     )
     apart = float(np.median(peak.friction)) - float(np.median(pulled.friction))
-    return replace(
-        peak,
-        below=max(peak.below, apart + pulled.below),
-        above=max(peak.above, pulled.above - apart),
-        status=Status(sentence, peak.status),
-    )
+    below, above = max(peak.below, apart + pulled.below), max(peak.above, pulled.above - apart)
+    return replace(peak, below=below, above=above, status=Status(sentence, peak.status))
 
 
 def _strays(rested: Sequence[Stroke], strokes: Strokes, fs: float) -> float:

@@ -319,9 +319,6 @@ def _mean_of_both(forward: Estimate, back: Estimate, name: str) -> Estimate:
     if not (forward.known and back.known):
         return replace(forward if not forward.known else back, name=name)
     low, high = ((a + b) / 2 for a, b in zip(forward.interval, back.interval, strict=True))
-    mean, sd, method = (
-        (forward.value + back.value) / 2,
-        (forward.sd + back.sd) / 2,
-        f"mean of both directions, {forward.method}",
-    )
+    mean, sd = (forward.value + back.value) / 2, (forward.sd + back.sd) / 2
+    method = f"mean of both directions, {forward.method}"
     return Estimate(name, mean, (low, high), sd, forward.unit, method, doubtful.status, forward.checks)

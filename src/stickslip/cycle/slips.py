@@ -155,10 +155,8 @@ def slip_ringing(record: Record, *, contact: str | None = None) -> SlipRinging:
 
 def ringing_of(strokes: Sequence[Stroke], fs: float) -> SlipRinging | None:
     """How the friction of some strokes rings; None where it does not."""
-    forward, back = (
-        _direction([stroke for stroke in strokes if stroke.way == way], side, fs)
-        for way, side in ((1, "forward"), (-1, "back"))
-    )
+    own = {way: [stroke for stroke in strokes if stroke.way == way] for way in (1, -1)}
+    forward, back = _direction(own[1], "forward", fs), _direction(own[-1], "back", fs)
     if forward is None and back is None:
         return None
     difference = None if forward is None or back is None else _difference(forward[0], back[0])
@@ -177,10 +175,8 @@ def _difference(forward: Estimate, back: Estimate) -> Estimate:
     """Forward less back, its interval by both intervals' halves in squares."""
     value = forward.value - back.value
     (low, high), (under, over) = forward.interval, back.interval
-    below, above = (
-        math.hypot(forward.value - low, over - back.value),
-        math.hypot(high - forward.value, back.value - under),
-    )
+    below = math.hypot(forward.value - low, over - back.value)
+    above = math.hypot(high - forward.value, back.value - under)
     flags = [estimate.status for estimate in (forward, back) if estimate.status != "ok"]
     name, method = "ringing after slip begins, forward less back", "difference of both directions"
     interval, sd = (value - below, value + above), math.hypot(forward.sd, back.sd)
@@ -206,11 +202,8 @@ def _direction(strokes: Sequence[Stroke], side: str, fs: float) -> tuple[Estimat
     ):
         return None
     parts = np.array_split(np.arange(len(swings)), min(len(swings), PARTS))
-    without = [
-        _ring_of(_mode([swings[row] for row in range(len(swings)) if row not in part], mode.x, fs).x)
-        for part in parts
-        if len(parts) > 1
-    ]
+    rest = [[swing for row, swing in enumerate(swings) if row not in part] for part in parts if len(parts) > 1]
+    without = [_ring_of(_mode(others, mode.x, fs).x) for others in rest]
     degrees = np.array(
         [_ring_of(_mode([_swings(values, degree) for values in cuts], mode.x, fs, degree).x) for degree in DEGREES]
     )
@@ -478,21 +471,14 @@ def sliding_swing(record: Record, strokes: Sequence[Stroke], side: str) -> Estim
             squares.append((swing / stroke.level) ** 2 - noises[-1])
     if not squares:
         return None
-    square = mean_of_cycles(
-        f"swing of the friction while sliding {side}",
-        squares,
-        unit="1",
-        method="median deviation from the median, less the noise",
-    )
+    method = "median deviation from the median, less the noise"
+    square = mean_of_cycles(f"swing of the friction while sliding {side}", squares, unit="1", method=method)
     half = UNSURE * float(np.mean(noises))
     low, high = square.interval
     estimate = _root(replace(square, interval=(low - half, high + half), sd=float(np.hypot(square.sd, half / 2))))
     swings = f"the friction swings by {100 * estimate.value:.0f} % of its level while it slides: a vibration of the rig"
-    return (
-        replace(estimate, status=f"{swings} or a faulty record, no steady friction")
-        if estimate.value >= STEADY
-        else estimate
-    )
+    status = f"{swings} or a faulty record, no steady friction"
+    return replace(estimate, status=status) if estimate.value >= STEADY else estimate
 
 
 def _noise(record: Record) -> Array:

@@ -188,10 +188,8 @@ def fit_candidates(names: tuple[str, ...], blocks: BlockMeans, start: Array) -> 
         for other in fitted.values():
             within = set(other.motion.terms) < set(motion.terms) and other.motion.sticks_early <= motion.sticks_early
             if within and other.cost < min(candidate.cost for candidate in tries):
-                tries += [
-                    fit_motion(motion, blocks, s, hopeless=hopeless)
-                    for s in _shaped(motion, other.parameters.copy(), share=1e-3)
-                ]
+                shaped = _shaped(motion, other.parameters.copy(), share=1e-3)
+                tries += [fit_motion(motion, blocks, s, hopeless=hopeless) for s in shaped]
         fitted[name] = min(tries, key=lambda candidate: candidate.cost)
     return {name: fitted[name] for name in wanted}
 
@@ -231,11 +229,8 @@ def fit_motion(
         if tried[best].cost > hopeless:
             return tried[best]
         allowed = blocks.motion(tried[best].parameters)[2]
-        new = [
-            count
-            for count in dict.fromkeys((allowed, best - 1, best + 1, best - 2, best + 2))
-            if count > 0 and count not in tried
-        ]
+        near = dict.fromkeys((allowed, best - 1, best + 1, best - 2, best + 2))
+        new = [count for count in near if count > 0 and count not in tried]
         if not new:
             break
         for half_cycles in new:

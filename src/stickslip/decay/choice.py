@@ -509,11 +509,8 @@ def _directions(fitted: Fitted, best: Fitted) -> list[tuple[str, Array]]:
         jacobian = blocks.motion(parameters, free=(name,), half_cycles=fitted.half_cycles if dry else None)[1]
         return blocks.weighted(jacobian)[:, 0]
 
-    directions = [
-        (name, column(name))
-        for name in ("damping_ratio", "dry_displacement", "quadratic", "curvature")
-        if name not in terms
-    ]
+    wanted = ("damping_ratio", "dry_displacement", "quadratic", "curvature")
+    directions = [(name, column(name)) for name in wanted if name not in terms]
     if "micro_slip" not in terms:
         directions.append(("micro_slip", column("micro_slip", exponent=EXPONENT)))
     if dry and "rise" not in terms:

@@ -343,11 +343,8 @@ def _best_pair(x: Array, errors: Array, form: str) -> tuple[int, int]:
         alternate = ex.differences(x, form)[first + 1 :] * (-1.0) ** m * ex.differences(x, form)[first] > 0
         with np.errstate(invalid="ignore", divide="ignore"):
             worst = -np.log((1 - later) / (1 + off[first])) / (m * math.pi)
-        worst = np.where(
-            alternate & (later < 1) & (off[first] < math.inf),
-            worst,
-            np.where(alternate, 1e6 * (later + off[first]) / m, math.inf),
-        )
+        jumps = np.where(alternate, 1e6 * (later + off[first]) / m, math.inf)
+        worst = np.where(alternate & (later < 1) & (off[first] < math.inf), worst, jumps)
         if len(worst) and worst.min() < best:
             best, chosen = float(worst.min()), (first, int(m[np.argmin(worst)]))
     if not math.isfinite(best):

@@ -58,10 +58,8 @@ def damping_ratio(beta: float) -> float:
 def frictions_seen(damping: Estimate | None, dry_friction: Estimate | None) -> str:
     """The frictions that the intervals hold apart from zero, in words."""
     both = (("viscous", damping), ("dry", dry_friction))
-    return (
-        " and ".join(word for word, friction in both if friction is not None and friction.interval[0] > 0)
-        or "no friction"
-    )
+    shown = [word for word, friction in both if friction is not None and friction.interval[0] > 0]
+    return " and ".join(shown) or "no friction"
 
 
 def rate(extremes: ArrayLike, *, i: int, m: int, form: str = "immune") -> float:
@@ -301,11 +299,8 @@ def log_decrement(record: Record, *, channel: str | None = None) -> EnvelopeDeca
     slope = line.estimate(0, "damping ratio", "1", method)
     damping = slope.scaled(-1 / math.pi, "1")
     excess = 2 / math.pi * float(_dry(sizes, numbers)) / float(np.median(sizes))
-    status = (
-        "ok"
-        if excess < 0.1 * damping.value
-        else "the amplitudes do not fall as a power: dry friction is read as viscous"
-    )
+    biased = "the amplitudes do not fall as a power: dry friction is read as viscous"
+    status = "ok" if excess < 0.1 * damping.value else biased
     return EnvelopeDecay(damping, None, _frequency(ring_down, damping.value, method), method, LOGARITHMIC, status)
 
 
@@ -396,10 +391,8 @@ def extreme_decay(
     ring_down, sizes, numbers = _extremes(record, channel)
     signs = math.copysign(1.0, ring_down.amplitude) * (-1.0) ** numbers
     (beta, dry), (beta_sd, dry_sd) = _fitted_swings(sizes, numbers, signs, restoring)
-    common: dict[str, Any] = {
-        "method": f"least squares over {len(sizes)} extremes",
-        "quantile": student(max(1, len(sizes) - FREE)),
-    }
+    method, quantile = f"least squares over {len(sizes)} extremes", student(max(1, len(sizes) - FREE))
+    common: dict[str, Any] = {"method": method, "quantile": quantile}
     damping = Estimate.normal(
         "damping ratio", damping_ratio(beta), sd=beta_sd / (1 + beta**2) ** 1.5, unit="1", **common
     )
@@ -469,14 +462,8 @@ def hilbert_decay(record: Record, *, channel: str | None = None) -> EnvelopeDeca
     w = 2 * math.pi * ring_down.frequency
     damping = line.estimate(0, "damping ratio", "1", method).scaled(1 / w, "1")
     dry = line.estimate(1, "dry friction displacement", ring_down.unit, method)
-    return EnvelopeDecay(
-        damping,
-        dry.scaled(math.pi / (2 * w), ring_down.unit),
-        _frequency(ring_down, damping.value, method),
-        method,
-        HILBERT,
-        "ok",
-    )
+    dry, frequency = dry.scaled(math.pi / (2 * w), ring_down.unit), _frequency(ring_down, damping.value, method)
+    return EnvelopeDecay(damping, dry, frequency, method, HILBERT, "ok")
 
 
 def _fitted_swings(sizes: Array, numbers: Array, signs: Array, restoring: str) -> tuple[Array, Array]:

@@ -131,11 +131,8 @@ def fit_decay(
     groups = _releases_of(records, channel)
     ring_downs = [ring_down for group in groups for ring_down in group.ring_downs]
     others = named(candidates)
-    motions = (
-        tuple(motion_of(ring_down, restoring=restoring, candidates=others) for ring_down in ring_downs)
-        if others
-        else ()
-    )
+    asked = ring_downs if others else ()
+    motions = tuple(motion_of(ring_down, restoring=restoring, candidates=others) for ring_down in asked)
     known = constants(mass, stiffness, ring_downs[0].channel)
     history = tuple(step for record in records for step in record.history)
     notes = tuple(dict.fromkeys(note for group in groups for note in group.notes))
@@ -377,12 +374,5 @@ def _static(releases: list[Release], motion: _Motion, unit: str) -> Estimate:
     status = "ok" if rested else "the mass does not come to rest in the record: only an upper bound"
     if low > high:
         low, high, status = high, low, "the releases disagree on it: it changes, or the model does not hold"
-    return Estimate(
-        "static friction displacement",
-        (low + high) / 2,
-        (low, high),
-        (high - low) / math.sqrt(12),
-        unit,
-        method,
-        status,
-    )
+    middle, sd = (low + high) / 2, (high - low) / math.sqrt(12)
+    return Estimate("static friction displacement", middle, (low, high), sd, unit, method, status)

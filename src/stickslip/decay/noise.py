@@ -90,12 +90,8 @@ def find_noise(blocks: Blocks, fits: Array, samples: Array, step: float, kind: s
     level = math.sqrt(least * blocks.size)
     left = _left(samples, blocks, int(row[0]), row[3:]) if step > 0 else math.inf
     if kind == "quantised" or (kind is None and left < COARSE * step):
-        return Noise(
-            "quantised",
-            max(left, 0.3 * step),
-            f"counts of {step:.3g}",
-            lambda n: quantised(_single(samples, blocks), n, step),
-        )
+        counts = f"counts of {step:.3g}"
+        return Noise("quantised", max(left, 0.3 * step), counts, lambda n: quantised(_single(samples, blocks), n, step))
     if kind == "coloured" and len(blocks.means) <= SHORT:
         raise EstimateError(
             f"noise = 'coloured' of {len(blocks.means)} blocks",

@@ -95,12 +95,8 @@ class Dithered:
 
     def __post_init__(self) -> None:
         require_drive(self.drive)
-        require(
-            not isinstance(self.drive, Dithered),
-            "dither on a dithered drive",
-            "one tone is put on top",
-            "leave one out",
-        )
+        refusal = "dither on a dithered drive", "one tone is put on top", "leave one out"
+        require(not isinstance(self.drive, Dithered), *refusal)
         self.motion()
 
     def motion(self) -> Motion:

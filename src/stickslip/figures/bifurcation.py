@@ -359,10 +359,8 @@ def plot_boundary(boundary: Boundary, *, ax: Axes | None = None) -> Axes:
     ax = axes_of(ax)
     system = next(motion for motion in boundary.low if motion is not None).orbit.orbit.system
     free = np.array([motion is not None and motion.status == "not unique" for motion in boundary.low])
-    for chosen, face, label in (
-        (~free, BLUE, "bisection of exact runs"),
-        (free, "none", "of a family, from one start"),
-    ):
+    sides = ((~free, BLUE, "bisection of exact runs"), (free, "none", "of a family, from one start"))
+    for chosen, face, label in sides:
         if np.any(chosen & np.isfinite(boundary.values)):
             look: Any = {"color": BLUE, "markerfacecolor": face, "markersize": 4, "zorder": 3}
             ax.plot(boundary.places[chosen], boundary.values[chosen], "o", label=label, **look)

@@ -277,13 +277,8 @@ def plot_over_records(estimates: Sequence[Estimate], *, ax: Axes | None = None) 
     factor, unit = prefixed(values, estimates[0].unit)
     ends = np.array([estimate.interval for estimate in estimates])
     lengths = np.where(np.isfinite(ends), np.abs(ends - values[:, None]), 0.0).T
-    look: Any = {
-        "fmt": "o",
-        "color": BLUE,
-        "ms": 2,
-        "ecolor": SKY,
-        "elinewidth": 0.6 if len(estimates) < CROWD else 0.2,
-    }
+    look: Any = {"fmt": "o", "color": BLUE, "ms": 2, "ecolor": SKY}
+    look["elinewidth"] = 0.6 if len(estimates) < CROWD else 0.2
     ax.errorbar(np.arange(1, len(estimates) + 1), factor * values, factor * lengths, **look)
     ax.set_xlabel("record")
     ax.set_ylabel(axis_label(estimates[0].name, unit))

@@ -444,11 +444,9 @@ def _stage(run: Trajectory, times: Array) -> tuple[Any, list[_Scene], list[Any]]
     canvas = FigureCanvasAgg(figure)
     grid = figure.add_gridspec(shown + 1, 2, height_ratios=(*[1] * shown, 1.6), width_ratios=(1.5, 1))
     scenes = [_Scene(figure.add_subplot(grid[c, :]), run, c, times) for c in range(shown)]
-    dots = [
-        dot
-        for place, across in ((grid[-1, 0], "time"), (grid[-1, 1], "x"))
-        for dot in _background(figure.add_subplot(place), run, across, times)
-    ]
+    places = ((grid[-1, 0], "time"), (grid[-1, 1], "x"))
+    drawn = [_background(figure.add_subplot(place), run, across, times) for place, across in places]
+    dots = [dot for dots in drawn for dot in dots]
     canvas.draw()  # type: ignore[no-untyped-call]
     return canvas, scenes, dots
 

@@ -365,11 +365,8 @@ class Reading:
 
     def _raw(self, size: int) -> Iterator[dict[tuple[int, str], Array]]:
         """Blocks of the columns of all files, row beside row."""
-        streams = [
-            _even(_blocks(source, names, size), size)
-            for source, names in zip(self.sources, self._needed, strict=True)
-            if names
-        ]
+        pairs = zip(self.sources, self._needed, strict=True)
+        streams = [_even(_blocks(source, names, size), size) for source, names in pairs if names]
         numbers = [number for number, names in enumerate(self._needed) if names]
         rows = [0] * len(streams)
         while True:

@@ -130,11 +130,8 @@ def file_entry(path: Path) -> dict[str, str]:
     """Name, sum and folder of a file, that as it was typed, unless it says where this machine keeps it."""
     folder = printable(str(path.parent))
     with supplied(path):
-        return {
-            "name": printable(path.name),
-            **({} if folder == "." or path.is_absolute() else {"folder": folder}),
-            "sha256": checksum(path),
-        }
+        place = {} if folder == "." or path.is_absolute() else {"folder": folder}
+        return {"name": printable(path.name), **place, "sha256": checksum(path)}
 
 
 Key = tuple[int, str]  # the file's number and the column's name

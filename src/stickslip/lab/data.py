@@ -281,11 +281,8 @@ def schema_of(model: type[BaseModel]) -> dict[str, Any]:
 
     def whole(node: Any) -> Any:
         if isinstance(node, dict):
-            return (
-                whole(parts[node["$ref"].rpartition("/")[2]])
-                if "$ref" in node
-                else {k: whole(v) for k, v in node.items()}
-            )
+            part = node.get("$ref")
+            return whole(parts[part.rpartition("/")[2]]) if part else {k: whole(v) for k, v in node.items()}
         return [whole(item) for item in node] if isinstance(node, list) else node
 
     written: dict[str, Any] = whole(schema)
@@ -294,11 +291,8 @@ def schema_of(model: type[BaseModel]) -> dict[str, Any]:
 
 def object_of(**properties: str) -> dict[str, Any]:
     """The JSON schema of an object that has all of these."""
-    return {
-        "type": "object",
-        "required": list(properties),
-        "properties": {name: {"type": kind} for name, kind in properties.items()},
-    }
+    kinds = {name: {"type": kind} for name, kind in properties.items()}
+    return {"type": "object", "required": list(properties), "properties": kinds}
 
 
 FILE = object_of(id="string", name="string", size="integer")

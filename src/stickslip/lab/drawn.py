@@ -121,11 +121,8 @@ def read_case(state: Any) -> ss.systems.Case:
     contacts = len(case.system.contacts) if isinstance(case.system, ss.Structure) else 1
     masses = case.system.size if isinstance(case.system, ss.Structure) else 1
     cycles = case.duration * max(_frequency(case), 1 / case.duration)
-    for name, count, most in (
-        ("cycles", cycles, MOST_CYCLES),
-        ("contacts", contacts, MOST_CONTACTS),
-        ("masses", masses, MOST_MASSES),
-    ):
+    bounds = (("cycles", cycles, MOST_CYCLES), ("contacts", contacts, MOST_CONTACTS), ("masses", masses, MOST_MASSES))
+    for name, count, most in bounds:
         if count > most:
             raise ss.errors.ModelError(
                 f"{count:g} {name}", f"the page plays up to {most} {name}", "use stickslip simulate"

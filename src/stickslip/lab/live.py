@@ -151,11 +151,8 @@ class Session:
         self.orders: queue.Queue[Mapping[str, Any]] = queue.Queue()
         self.ending, self.failed = threading.Event(), ""
         system = getattr(device, "system", None)
-        own = (
-            {n: getattr(system, n) for n in ("mass", "stiffness", "damping")}
-            if isinstance(system, ss.Oscillator)
-            else {}
-        )
+        names = ("mass", "stiffness", "damping") if isinstance(system, ss.Oscillator) else ()
+        own = {name: getattr(system, name) for name in names}
         self.constants = {**own, **place.constants}
         self.monitor = bench.Monitor(device, self.constants)
         self.tape: bench.Tape | None = None

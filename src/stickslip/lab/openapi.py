@@ -59,16 +59,11 @@ def document(routes: Sequence[BaseRoute]) -> dict[str, Any]:
             {"name": name, "in": "path", "required": True, "schema": {"type": KINDS.get(kind, "string")}}
             for name, kind in re.findall(r"{(\w+)(?::(\w+))?}", route.path)
         ]
-        refusals = {
-            str(code): {"description": meaning, "content": {"application/json": {"schema": ERROR}}}
-            for code, meaning in REFUSALS.items()
-        }
+        content = {"application/json": {"schema": ERROR}}
+        refusals = {str(code): {"description": meaning, "content": content} for code, meaning in REFUSALS.items()}
         for method in sorted((route.methods or set()) - {"HEAD"}):
-            place[method.lower()] = {
-                **description,
-                "parameters": inputs,
-                "responses": {**refusals, **description["responses"]},
-            }
+            responses = {**refusals, **description["responses"]}
+            place[method.lower()] = {**description, "parameters": inputs, "responses": responses}
     return {
         "openapi": "3.1.0",
         "info": {"title": "stickslip lab", "version": ss.__version__},

@@ -80,18 +80,14 @@ async def _parts(
     for number, begin in enumerate(coarse, start=1):
         part = xs[begin : begin + STRIP]
         values[begin : begin + STRIP] = await _values_of(socket, request, names, part, ys, want="sweep")
-        yield (
-            {"level": "coarse", "done": number, "of": len(coarse)},
-            {"x": part, "y": ys, "values": values[begin : begin + STRIP].ravel()},
-        )
+        part_values = values[begin : begin + STRIP].ravel()
+        yield {"level": "coarse", "done": number, "of": len(coarse)}, {"x": part, "y": ys, "values": part_values}
     strips = _changing(values) if request["measure"] in COUNTED else []
     for number, (i, begin, end) in enumerate(strips, start=1):
         x, y = xs[i : i + 2], ys[begin:end]
         finer = await _values_of(socket, request, names, x, y, want="refine")
-        yield (
-            {"level": "fine", "done": number, "of": len(strips)},
-            {"x": _finer(x), "y": _finer(y), "values": finer.ravel()},
-        )
+        arrays = {"x": _finer(x), "y": _finer(y), "values": finer.ravel()}
+        yield {"level": "fine", "done": number, "of": len(strips)}, arrays
 
 
 def _finer(values: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -65,12 +65,8 @@ def questions(channels: set[str], records: int) -> dict[str, dict[str, Any]]:
 
 
 def _question(able: bool, why: str, needs: list[str], may: list[str]) -> dict[str, Any]:
-    return {
-        "able": able,
-        "why": "" if able else why,
-        "needs": needs,
-        "may": [name for name in may if name not in needs],
-    }
+    optional = [name for name in may if name not in needs]
+    return {"able": able, "why": "" if able else why, "needs": needs, "may": optional}
 
 
 def _one(query: Query, number: int) -> tuple[dict[str, Any], list[str]]:
@@ -164,10 +160,8 @@ class Thinned:
 
     def curves(self) -> dict[str, Array]:
         """The values of each channel, least and greatest in turn."""
-        return {
-            name: np.concatenate(blocks).ravel() if self.width > 1 else np.concatenate(blocks)[:, 0]
-            for name, blocks in self._kept.items()
-        }
+        kept = {name: np.concatenate(blocks) for name, blocks in self._kept.items()}
+        return {name: values.ravel() if self.width > 1 else values[:, 0] for name, values in kept.items()}
 
 
 def extremes(values: Array, width: int) -> Array:
@@ -188,14 +182,8 @@ def curve(record: str, channel: str, unit: str, time: Array, measured: Array, fi
         middles = time[::width][: -(-len(time) // width)]
         time = np.repeat(middles, 2)
         measured, fitted = extremes(measured, width).ravel(), extremes(fitted, width).ravel()
-    return {
-        "record": record,
-        "channel": channel,
-        "unit": unit,
-        "time": numbers(time),
-        "measured": numbers(measured),
-        "fitted": numbers(fitted),
-    }
+    values = {"time": numbers(time), "measured": numbers(measured), "fitted": numbers(fitted)}
+    return {"record": record, "channel": channel, "unit": unit, **values}
 
 
 def numbers(values: Iterable[float]) -> list[float | None]:

@@ -349,10 +349,8 @@ def _start(law: Law | CurvedLaw, names: Mapping[str, str]) -> str:
 
 
 def _force(modes: Modes, names: Mapping[str, str]) -> str:
-    cases = [
-        f"    case {_token(mode.name)}: return {'in->hold' if mode.friction is None else _text(mode.friction, names)};"
-        for mode in modes
-    ]
+    friction = {mode.name: "in->hold" if mode.friction is None else _text(mode.friction, names) for mode in modes}
+    cases = [f"    case {_token(name)}: return {text};" for name, text in friction.items()]
     return "\n".join([
         "double friction_force(const friction_state *s, const friction_motion *in)", "{", "    (void)in;",
         "    switch (s->mode) {", *cases, "    }", "    return 0.0;", "}", "",

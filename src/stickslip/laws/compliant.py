@@ -73,11 +73,8 @@ class CompliantContact:
     @classmethod
     def hypotheses(cls) -> tuple[Hypothesis, ...]:
         """A contact that gives way."""
-        return (
-            Hypothesis(
-                "compliant", Family("compliant", "that of a compliant contact"), guesses, _from_coulomb, ("Coulomb",)
-            ),
-        )
+        family = Family("compliant", "that of a compliant contact")
+        return (Hypothesis("compliant", family, guesses, _from_coulomb, ("Coulomb",)),)
 
     def own_formula(self) -> str:
         """The formula, with how the contact moves in slip by this rule."""
@@ -215,15 +212,10 @@ class InertialContact:
         force = {"stretch": self.stiffness, "v": self.damping, "u": -self.damping}
         level = static_level(self.static, self.kinetic)
         borne = {"stretch": self.stiffness, "v": self.damping, "face_acceleration": -self.mass}
-        exits = (
-            Exit({**borne, "1": -level}, "forward"),
-            Exit({**{name: -value for name, value in borne.items()}, "1": -level}, "back"),
-        )
-        return (
-            self._slip("back", -1, force),
-            Mode("stuck", "microstick", 0, force, exits, {"stretch": {"v": 1.0}}),
-            self._slip("forward", 1, force),
-        )
+        opposite = {name: -value for name, value in borne.items()}
+        exits = Exit({**borne, "1": -level}, "forward"), Exit({**opposite, "1": -level}, "back")
+        stuck = Mode("stuck", "microstick", 0, force, exits, {"stretch": {"v": 1.0}})
+        return self._slip("back", -1, force), stuck, self._slip("forward", 1, force)
 
     def _slip(self, name: str, side: int, force: Row) -> Mode:
         push = {key: value / self.mass for key, value in force.items()}

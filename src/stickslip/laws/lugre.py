@@ -73,16 +73,8 @@ class LuGre(Sliding):
     @classmethod
     def hypotheses(cls) -> tuple[Hypothesis, ...]:
         """Bristles."""
-        return (
-            Hypothesis(
-                "LuGre",
-                Family("LuGre", "that of bristles (LuGre)"),
-                _guesses,
-                _from_compliant,
-                ("compliant", "Stribeck"),
-                _next_to,
-            ),
-        )
+        family = Family("LuGre", "that of bristles (LuGre)")
+        return (Hypothesis("LuGre", family, _guesses, _from_compliant, ("compliant", "Stribeck"), _next_to),)
 
     @property
     def memory(self) -> Mapping[str, Row]:

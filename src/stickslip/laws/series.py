@@ -260,11 +260,8 @@ class InSeries:
             push = {"x": self.stiffness, "v": self.damping, self.slider: -stiff}
             speed = _sum((1 / resisting, push), (-1 / resisting, own))
             moved = _moved(mode, {self.slider: 1.0}, speed)
-            return replace(
-                moved,
-                friction=_sum((1.0, own), (along, {self.slider: 1.0}), (slope, speed)),
-                rates={**moved.rates, self.slider: speed},
-            )
+            friction = _sum((1.0, own), (along, {self.slider: 1.0}), (slope, speed))
+            return replace(moved, friction=friction, rates={**moved.rates, self.slider: speed})
         if resisting < 0 or slope != 0:
             raise ModelError(
                 f"a friction slope of {slope:g} N s/m behind damping = {self.damping:g} N s/m",

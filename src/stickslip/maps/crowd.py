@@ -63,14 +63,8 @@ def crowds(plan: Plan, number: int) -> Iterator[tuple[Index, Systems | None, dic
         used, its = np.unique(law[rows], return_inverse=True)
         moved, whose = np.unique(drive[rows], return_inverse=True)
         *numbers, base = values[own[rows]].T
-        systems = oscillators(
-            [laws[j].law for j in used],
-            its,
-            [drives[j].drive for j in moved],
-            whose,
-            numbers=np.array(numbers),
-            on_base=base == 1.0,
-        )
+        law_list, drive_list = [laws[j].law for j in used], [drives[j].drive for j in moved]
+        systems = oscillators(law_list, its, drive_list, whose, numbers=np.array(numbers), on_base=base == 1.0)
         yield rows, systems, {**plan.start, **_starts(plan, steps[rows])}
 
 
@@ -89,10 +83,8 @@ def _numbers(kinds: Sequence[Any]) -> Index:
 
 def _different(plan: Plan, steps: Index, part: str) -> tuple[list[Any], Index]:
     """The systems that differ in one part (the law, the drive, or the oscillator's own), and which each point has."""
-    own = [
-        [j for j, name in enumerate(axis.names) if not name.startswith(START) and _part(plan, name) == part]
-        for axis in plan.axes
-    ]
+    named = [[(j, name) for j, name in enumerate(axis.names) if not name.startswith(START)] for axis in plan.axes]
+    own = [[j for j, name in names if _part(plan, name) == part] for names in named]
     columns = [number for number, names in enumerate(own) if names]
     shape = [plan.shape[number] for number in columns]
     keys, which = np.unique(_flat(steps[:, columns], shape), return_inverse=True)

@@ -154,11 +154,8 @@ def placed(
     system: System, start: Mapping[str, float | str], axes: tuple[Axis, ...], steps: Sequence[int]
 ) -> tuple[System, dict[str, float | str]]:
     """The system and the start at one point of the grid."""
-    given = {
-        name: value
-        for axis, step in zip(axes, steps, strict=True)
-        for name, value in zip(axis.names, axis.values[step], strict=True)
-    }
+    pairs = zip(axes, steps, strict=True)
+    given = dict(pair for axis, step in pairs for pair in zip(axis.names, axis.values[step], strict=True))
     own = {name: value for name, value in given.items() if not name.startswith(START)}
     begun = {name.removeprefix(START): value for name, value in given.items() if name.startswith(START)}
     return (changed(system, own) if own else system), {**start, **begun}

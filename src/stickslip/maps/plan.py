@@ -91,10 +91,8 @@ class Plan:
     def slices(self, number: int) -> tuple[slice, ...]:
         """Where a block lies in the grid."""
         tile = np.unravel_index(number, self.tiles)
-        return tuple(
-            slice(int(t) * chunk, min((int(t) + 1) * chunk, count))
-            for t, chunk, count in zip(tile, self.chunks, self.shape, strict=True)
-        )
+        spans = zip(tile, self.chunks, self.shape, strict=True)
+        return tuple(slice(int(t) * chunk, min((int(t) + 1) * chunk, count)) for t, chunk, count in spans)
 
     def points(self, number: int) -> list[tuple[int, ...]]:
         """The steps along each axis of every point of a block, in its own order."""
@@ -202,11 +200,8 @@ def _asked(code: CodeType) -> set[str]:
 
 
 def _bytecode(code: CodeType) -> tuple[Any, ...]:
-    return (
-        code.co_code.hex(),
-        *code.co_names,
-        *(_bytecode(c) if isinstance(c, CodeType) else c for c in code.co_consts),
-    )
+    own = (_bytecode(c) if isinstance(c, CodeType) else c for c in code.co_consts)
+    return (code.co_code.hex(), *code.co_names, *own)
 
 
 def _content(value: Any) -> str:
@@ -338,10 +333,8 @@ def _axis(system: System, name: str, column: Any, source: str, lines: list[str])
             f"{len(names)} parameters that change together have as many values at each step",
             "write a list of lists",
         )
-    columns = [
-        _values(system, part, list(own), source, lines)
-        for part, own in zip(names, zip(*rows, strict=True), strict=True)
-    ]
+    pairs = zip(names, zip(*rows, strict=True), strict=True)
+    columns = [_values(system, part, list(own), source, lines) for part, own in pairs]
     return names, list(zip(*columns, strict=True))
 
 

@@ -295,11 +295,8 @@ def require_end(plan: Plan, steps: tuple[int, ...]) -> None:
         simulate(system, cycles=plan.settle + plan.cycles, start=start)
     except Endless as endless:
         value, rule, step = endless.args
-        place = ", ".join(
-            f"{name} = {axis.values[j][k]}"
-            for axis, j in zip(plan.axes, steps, strict=True)
-            for k, name in enumerate(axis.names)
-        )
+        pairs = list(zip(plan.axes, steps, strict=True))
+        place = ", ".join(f"{name} = {axis.values[j][k]}" for axis, j in pairs for k, name in enumerate(axis.names))
         raise SolveError(f"{value}, with {place}", rule, step) from endless
     except SolveError:
         return  # a motion that grows without bound or chatters in time has its place on a map

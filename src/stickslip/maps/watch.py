@@ -339,13 +339,8 @@ def _read(row, state, tones, time):
 @compiled(**OPTIONS)
 def _count(i, count, motion, clock, settled, given, sums):
     """Count the pieces just written."""
-    linear, period, state, unit, pieces = (
-        motion.model.linear,
-        motion.model.period,
-        motion.state,
-        motion.unit,
-        motion.pieces,
-    )
+    linear, period, state = motion.model.linear, motion.model.period, motion.state
+    unit, pieces = motion.unit, motion.pieces
     look, paths, one = given.look, given.wants[PATHS] == 1, given.wants[ONE]
     n, tones = state.shape[0], linear.tones
     moving = motion.work[6, :n]

@@ -199,10 +199,8 @@ class Stamps:
     @property
     def sound(self) -> bool:
         """Whether nothing is wrong with the stamps."""
-        return not (
-            self.held
-            or any(map(len, (self.repeated, self.backward, self.gaps, self.slower, self.uneven, self.missing)))
-        )
+        flaws = (self.repeated, self.backward, self.gaps, self.slower, self.uneven, self.missing)
+        return not (self.held or any(map(len, flaws)))
 
 
 def inspect(stamps: Array) -> Stamps:

@@ -386,11 +386,8 @@ def _identifier(name: str) -> str:
 
 def _stated(**arguments: Any) -> dict[str, Any]:
     """The arguments that were given, for the history."""
-    return {
-        key: dict(value) if isinstance(value, Mapping) else value
-        for key, value in arguments.items()
-        if value is not None
-    }
+    stated = {key: value for key, value in arguments.items() if value is not None}
+    return {key: dict(value) if isinstance(value, Mapping) else value for key, value in stated.items()}
 
 
 def _not_a(wanted: str, value: object) -> RecordError:

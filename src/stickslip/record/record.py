@@ -231,17 +231,12 @@ class Record:
         units, arrays, channels = dict(units or {}), {}, {}
         for name, values in samples.items():
             usual = VOCABULARY[name].units[0] if name in VOCABULARY else "1"
-            unit = parse_unit(
-                units.get(name, usual),
-                expect=usual if name in VOCABULARY and len(VOCABULARY[name].units) == 1 else None,
-            )
+            one = name in VOCABULARY and len(VOCABULARY[name].units) == 1
+            unit = parse_unit(units.get(name, usual), expect=usual if one else None)
             arrays[name] = np.asarray(values, dtype=float) * unit.scale + unit.zero
             channels[name] = Channel(name, unit.si, described(name, unit.si), source="array")
-        step = Step(
-            "Record.of",
-            {"fs": fs, "units": {n: c.unit for n, c in channels.items()}},
-            f"{len(arrays)} arrays in memory",
-        )
+        stated = {name: channel.unit for name, channel in channels.items()}
+        step = Step("Record.of", {"fs": fs, "units": stated}, f"{len(arrays)} arrays in memory")
         return cls(arrays, channels, float(fs), start, (step,), None, truth or {})
 
     # ---- reading
@@ -327,12 +322,8 @@ class Record:
         """This record with a channel added or replaced; `values` in `unit` (SI)."""
         channel = Channel(checked_name(name), unit, described(name, unit), source, noise=noise)
         samples = {**self.samples, name: np.asarray(values, dtype=float)}
-        return replace(
-            self,
-            samples=samples,
-            channels={**self.channels, name: channel},
-            history=(*self.history, *([step] if step else [])),
-        )
+        history = self.history if step is None else (*self.history, step)
+        return replace(self, samples=samples, channels={**self.channels, name: channel}, history=history)
 
     def with_details(self, name: str, /, **details: Any) -> Record:
         """This record with details of a channel stated: ``delay``, ``noise``, ``mount`` ...; see :class:`Channel`."""

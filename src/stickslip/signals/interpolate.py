@@ -226,10 +226,8 @@ def without_delays(record: Record, *channels: str, question: str = "taking delay
             "correct the delays, in seconds, or give a longer record",
         )
     rows = np.arange(first, last, dtype=float)
-    moved = {
-        name: band_limited(values, rows + shifts[name]) if name in shifts else values[first:last]
-        for name, values in record.samples.items()
-    }
+    kept = {name: values[first:last] for name, values in record.samples.items()}
+    moved = kept | {name: band_limited(record.samples[name], rows + shift) for name, shift in shifts.items()}
     step = Step(
         "without_delays", {"delays": delays}, f"delays taken out; {last - first} of {len(record)} rows reached by all"
     )

@@ -215,11 +215,8 @@ def _from_stamps(record: Record, fs: float, reason: str, longest: float | None =
         beside = ~finite[nearest] | ~finite[nearest - 1]
         samples[name] = np.where(unknown | beside, np.nan, filled)
     count = int(np.sum(unknown))
-    left = (
-        f"; {count} samples in gaps over {1e3 * limit:.4g} ms are NaN ({in_words(flaws.runs_of(unknown))})"
-        if count
-        else ""
-    )
+    runs = in_words(flaws.runs_of(unknown))
+    left = f"; {count} samples in gaps over {1e3 * limit:.4g} ms are NaN ({runs})" if count else ""
     dropped = int(np.sum(~keep))
     left += f"; {dropped} samples with repeated or missing stamps dropped" if dropped else ""
     outcome = f"{len(record)} samples interpolated onto {len(grid)} at {fs:.6g} Hz by their stamps ({reason}){left}"

@@ -207,12 +207,8 @@ def local_maxima(wavelets: xr.DataArray, *, prominence: float = 3.0, span: float
         stands[cut] = np.minimum(stands[cut], heights[cut] - floor)
     stands = np.minimum(stands, heights + span)  # lower, nothing is known of the map
     kept = [n for n in range(len(rows)) if stands[n] >= prominence]
-    maxima = [
-        LocalMaximum(
-            float(times[columns[n]]), float(frequencies[rows[n]]), float(modulus[rows[n], columns[n]]), float(stands[n])
-        )
-        for n in kept
-    ]
+    columns_of = (times[columns], frequencies[rows], modulus[rows, columns], stands)
+    maxima = [LocalMaximum(*(float(values[n]) for values in columns_of)) for n in kept]
     return tuple(sorted(maxima, key=lambda ridge: ridge.time))
 
 

@@ -150,12 +150,8 @@ def energy(run: Trajectory) -> Energy:
     first = run.states[0, len(mass) : 2 * len(mass)]
     last = run.sample([run.duration], ("v",))[0][:, 0]
     kinetic = float(last @ mass @ last - first @ mass @ first) / 2
-    return Energy(
-        kinetic,
-        float(np.sum(w * given)),
-        float(np.sum(w * taken)),
-        float(np.sum(w * (np.abs(given) + np.abs(taken)))) + abs(kinetic),
-    )
+    given_, taken_ = float(np.sum(w * given)), float(np.sum(w * taken))
+    return Energy(kinetic, given_, taken_, float(np.sum(w * (np.abs(given) + np.abs(taken)))) + abs(kinetic))
 
 
 def _matrix(part: ArrayLike, size: int) -> Array:

@@ -298,15 +298,8 @@ def _basis(p: int) -> _Basis:
         return np.array([np.pad(part.coef, (0, WIDTH - len(part.coef))) for part in parts])
 
     rates = [2 * speed.deriv() for speed in speeds]
-    return _Basis(
-        at(shares),
-        at(speeds),
-        at(rates),
-        at(ways),
-        powers(speeds),
-        powers(ways),
-        np.vander(time(points), WIDTH)[:, ::-1],
-    )
+    stretches = np.vander(time(points), WIDTH)[:, ::-1]
+    return _Basis(at(shares), at(speeds), at(rates), at(ways), powers(speeds), powers(ways), stretches)
 
 
 @cache

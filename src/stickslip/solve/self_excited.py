@@ -153,11 +153,8 @@ def self_excited(system: System, table: Table, start: Mapping[str, float | str],
     duration = transient * scale
     for _ in range(8):
         motion = stretch(system, table, state, mode, span=(0.0, duration))
-        ends = [
-            j
-            for j in range(1, len(motion.modes))
-            if table.modes[motion.modes[j - 1]].friction is None and motion.exits[j - 1] >= 0
-        ]
+        held = [table.modes[mode].friction is None for mode in motion.modes]
+        ends = [j for j in range(1, len(motion.modes)) if held[j - 1] and motion.exits[j - 1] >= 0]
         if len(ends) > 2:
             first, last = ends[-2], ends[-1]
             own = slice(0, table.physical if isinstance(table, Tape) else 2 * table.degrees)
@@ -236,10 +233,8 @@ def _turns(motion: CurvedTrajectory) -> list[float]:
 
     v, ends = motion.steps.states[:, 1], motion.steps.starts
     rises = np.flatnonzero((v[:-1] < 0) & (v[1:] >= 0))[-MOST - 1 :]
-    return [
-        float(brentq(lambda t: motion.sample([t], ("v",))[0][0, 0], ends[j], ends[j + 1], xtol=1e-15 * ends[j + 1]))
-        for j in rises
-    ]
+    spans = [(ends[j], ends[j + 1]) for j in rises]
+    return [float(brentq(lambda t: motion.sample([t], ("v",))[0][0, 0], *span, xtol=1e-15 * span[1])) for span in spans]
 
 
 def _multipliers(motion: Trajectory, first: int, last: int) -> Complex:

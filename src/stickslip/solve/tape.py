@@ -498,10 +498,8 @@ class _Builder:
     def exits(self, joints: Any, parts: Any, leaving: Any, quantities: Any) -> Exits:
         """How each mode may end, and what of the state an end sets anew."""
         target = [number for joint in joints for number in joint.targets]
-        speeds = [
-            self.contacts[c].left(parts[j][c], exit_, parts[t][c])
-            for (j, c, exit_), t in zip(leaving, target, strict=True)
-        ]
+        pairs = zip(leaving, target, strict=True)
+        speeds = [self.contacts[c].left(parts[j][c], exit_, parts[t][c]) for (j, c, exit_), t in pairs]
         reset = np.tile(np.eye(self.size), (len(leaving), 1, 1))
         for e, ((j, c, exit_), t) in enumerate(zip(leaving, target, strict=True)):
             contact = self.contacts[c]
@@ -528,10 +526,8 @@ class _Builder:
     def stilled(self, stuck: Mapping[int, float]) -> Array:
         """The state with the velocities of some contacts told, and no more of them left but for rounding."""
         one = self.row(({}, 1.0))
-        columns = {
-            c: (self.contacts[c].tangent, (self.row(self.faced(c, 1)) + speed * one)[None])
-            for c, speed in stuck.items()
-        }
+        faces = {c: (self.row(self.faced(c, 1)) + speed * one)[None] for c, speed in stuck.items()}
+        columns = {c: (self.contacts[c].tangent, face) for c, face in faces.items()}
         return np.asarray(stilled(np.eye(self.size)[None], self.degrees, columns)[0])
 
 

@@ -474,11 +474,8 @@ class Trajectory:
 
     def _repr_html_(self) -> str:
         counts = {"events": len(self.events), **self.event_counts()}
-        rows = [
-            ("simulated", f"{self.duration:g} s"),
-            ("ended", self.status),
-            *((k, str(n)) for k, n in counts.items()),
-        ]
+        counted = ((kind, str(n)) for kind, n in counts.items())
+        rows = [("simulated", f"{self.duration:g} s"), ("ended", self.status), *counted]
         return html_table(f"Trajectory of {type(self.system).__name__}", ("", ""), rows)
 
     def __repr__(self) -> str:

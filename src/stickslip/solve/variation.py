@@ -170,18 +170,14 @@ class Variation:
                 aside = state.astype(np.complex128)
                 aside[i] += 1j * ASIDE
                 slope[:, i] = _picked(own, wanted[0], mode, aside).imag / ASIDE
-            change = [
-                (_picked(one, rows, mode, state) - value) / self.step
-                for one, rows in zip(near, wanted[1:], strict=True)
-            ]
+            pairs = zip(near, wanted[1:], strict=True)
+            change = [(_picked(one, rows, mode, state) - value) / self.step for one, rows in pairs]
         return _Along(value, slope, np.stack(change, axis=1))
 
     def rates(self, mode: int, state: Array) -> _Along:
         """The rates of a mode along states."""
-        wanted = [
-            list(zip(one.watched.rate[mode].tolist(), one.watched.factor[mode].tolist(), strict=True))
-            for one in self.tapes
-        ]
+        rows = [(one.watched.rate[mode].tolist(), one.watched.factor[mode].tolist()) for one in self.tapes]
+        wanted = [list(zip(*pair, strict=True)) for pair in rows]
         return self.along(wanted, mode, state)
 
 

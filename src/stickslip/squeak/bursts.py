@@ -566,10 +566,8 @@ def _of_one_contact(bursts: list[Squeak]) -> list[Squeak]:
     if not why:
         return bursts
     evidence = f"of sound alone: {why}"
-    return [
-        replace(burst, kind="tonal", friction="not told", evidence=evidence) if burst in alone else burst
-        for burst in bursts
-    ]
+    alike: dict[str, Any] = {"kind": "tonal", "friction": "not told", "evidence": evidence}
+    return [replace(burst, **alike) if burst in alone else burst for burst in bursts]
 
 
 def _unlike_a_contact(bursts: list[Squeak], claimed: list[Squeak]) -> str:

@@ -86,11 +86,8 @@ class LimitCycle:
         if not self.vibrates:
             return f"LimitCycle: {self.status}"
         named = {"sticks": self.stick_share, "lifted": self.separation_share}
-        shares = [
-            f"{name} {', '.join(f'{one:.3g}' for one in parts)} of the time"
-            for name, parts in named.items()
-            if any(parts)
-        ]
+        spans = {name: ", ".join(f"{one:.3g}" for one in parts) for name, parts in named.items() if any(parts)}
+        shares = [f"{name} {parts} of the time" for name, parts in spans.items()]
         head = f"LimitCycle: {self.status}, {self.frequency:.5g} Hz, contacts slide {self.amplitude:.4g} m to and fro"
         return "\n  ".join([head, *shares])
 

@@ -120,11 +120,8 @@ class Hearing:
         around = np.clip(peak, lowest + AROUND, count - 1 - AROUND) + np.arange(-AROUND, AROUND + 1)[:, None]
         around = np.clip(around, 0, count - 1)
         beside = np.nanmedian(np.where(np.abs(around - peak) > LOBE, power[around, columns], np.nan), axis=0)
-        own = sum(
-            power[np.clip(order * peak + step, 0, count - 1), columns]
-            for order in range(1, HARMONICS + 1)
-            for step in range(-LOBE, LOBE + 1)
-        )
+        lobes = [(order, step) for order in range(1, HARMONICS + 1) for step in range(-LOBE, LOBE + 1)]
+        own = sum(power[np.clip(order * peak + step, 0, count - 1), columns] for order, step in lobes)
         whole = np.maximum(power.sum(axis=0), np.finfo(float).tiny)
         lobe = sum(power[np.clip(peak + step, 0, count - 1), columns] for step in range(-LOBE, LOBE + 1))
         tonal = (_decibel(strong) - _decibel(beside) > STANDS_OUT) & (np.minimum(own / whole, 1) > OF_POWER)
@@ -455,11 +452,8 @@ def clipped_rows(record: Record, channel: str) -> list[tuple[int, int]]:
 def _cut_tops(values: Array) -> list[tuple[int, int]]:
     top, span = float(values.max()), float(np.ptp(values))
     runs = _runs(values == top)
-    edges = [
-        (values[first - 1], values[last])
-        for first, last in runs
-        if last - first >= HELD and 0 < first < last < len(values)
-    ]
+    long = [(first, last) for first, last in runs if last - first >= HELD and 0 < first < last < len(values)]
+    edges = [(values[first - 1], values[last]) for first, last in long]
     if len(edges) < HELD or top - float(np.median(edges)) < LEAP * span:
         return []
     return [(first, last - 1) for first, last in runs]

@@ -148,11 +148,8 @@ def _title(name: str) -> str:
 
 
 def _tables(done: Commissioned) -> list[Table]:
-    rows = [
-        [step.title, step.todo, _short(done, step)]
-        for step in STEPS
-        if step.name in done.results or step.name in done.refused
-    ]
+    asked = [step for step in STEPS if step.name in done.results or step.name in done.refused]
+    rows = [[step.title, step.todo, _short(done, step)] for step in asked]
     tables = [Table("What was done", ("question", "at the rig", "answer"), rows)]
     truth = any(done.true_value(estimate.name, name) is not None for name, estimate in _numbers(done))
     heads = ("step", "quantity", "value", "95 % interval", *(["true value"] if truth else []))
@@ -331,15 +328,8 @@ def _runs(tour: Tour) -> Table:
         cells = [value_of(one) if (one := _of(estimates, name)) else "–" for name in names]
         cells.append(_static_over_sliding(_of(estimates, "static over sliding friction")))
         rows.append([f"{run.frequency:g} Hz", f"{1e3 * run.amplitude:g} mm", run.why, *cells])
-    heads = (
-        "base",
-        "amplitude",
-        "what for",
-        "sliding friction",
-        "contact holds",
-        "contact stiffness",
-        "static over sliding",
-    )
+    of_contact = ("sliding friction", "contact holds", "contact stiffness", "static over sliding")
+    heads = ("base", "amplitude", "what for", *of_contact)
     note = (
         "Each run has its own section below, with intervals and figures. The contact holds in its sticks, and briefly "
         "as it turns round; –: not asked, or not told by that run."

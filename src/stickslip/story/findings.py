@@ -182,14 +182,8 @@ def of_several(estimates: Sequence[Estimate], *, record: Record | None = None) -
     if record is None:
         return Story("Estimates", lines=lines, data=data)
     faults = record.check()
-    return Story.of_record(
-        record_name(record),
-        record,
-        headline=leading(faults),
-        lines=lines,
-        faults=[str(fault) for fault in faults],
-        data=data,
-    )
+    own: dict[str, Any] = {"headline": leading(faults), "lines": lines, "faults": [str(fault) for fault in faults]}
+    return Story.of_record(record_name(record), record, data=data, **own)
 
 
 LEADING = {  # of each question the quantities of the short table; of others those of most records

@@ -154,11 +154,8 @@ def _headline(findings: Findings) -> Iterator[str]:
         yield from _of_loops(findings)
     regression = findings.regression
     if regression is not None and regression.viscous is not None and regression.coulomb is not None:
-        share = (
-            f"; {100 * regression.residual:.1f} % of it is left unexplained"
-            if math.isfinite(regression.residual)
-            else ""
-        )
+        left = regression.residual
+        share = f"; {100 * left:.1f} % of it is left unexplained" if math.isfinite(left) else ""
         yield (
             f"An inertia of {value_of(regression.inertia)}, viscous friction of {value_of(regression.viscous)} and "
             f"dry friction of {value_of(regression.coulomb)} explain the measured force{share}."
@@ -254,11 +251,8 @@ def of_sticks(findings: Findings) -> str:
     if sticks.share.value < RARELY:
         return "it hardly ever sticks"
     often = sticks.per_cycle.value
-    stops = (
-        f", with {often:.2g} stop{'' if often == 1 else 's'} in each cycle"
-        if math.isfinite(often) and often > 0
-        else ""
-    )
+    some = math.isfinite(often) and often > 0
+    stops = f", with {often:.2g} stop{'' if often == 1 else 's'} in each cycle" if some else ""
     share = interval_of(sticks.share) if high - low > 0.01 else value_of(sticks.share)
     return f"it {'sticks' if stands(sticks.share.status) else 'seems to stick'} {share} of the time{stops}"
 
@@ -277,11 +271,8 @@ def _of_breakaway(breakaway: Breakaway) -> Iterator[str]:
         yield f"At breakaway it seems to bear {most} times as much as while it slides."
         return
     more = "more than" if low > 1 + ALIKE else "less than" if high < 1 - ALIKE else "about as much as"
-    sides = " and ".join(
-        f"{value_of(estimate)} {estimate.name.split()[-1]}"
-        for estimate in (breakaway.forward, breakaway.back)
-        if estimate
-    )
+    both = [estimate for estimate in (breakaway.forward, breakaway.back) if estimate]
+    sides = " and ".join(f"{value_of(estimate)} {estimate.name.split()[-1]}" for estimate in both)
     yield (
         f"At breakaway it bears {sides}: {more} while it slides ({value_of(ratio)} times, 95 %: {interval_of(ratio)})."
     )
@@ -373,11 +364,8 @@ def of_map(findings: TimeFrequency) -> Story:
 def _of_channel(findings: TimeFrequency) -> Iterator[str]:
     """What a channel holds over time and frequency, in a few sentences."""
     if findings.mechanism is not None:
-        sure = (
-            f" (probability {findings.mechanism.probability:.2f})"
-            if math.isfinite(findings.mechanism.probability)
-            else ""
-        )
+        probability = findings.mechanism.probability
+        sure = f" (probability {probability:.2f})" if math.isfinite(probability) else ""
         yield sentence(f"{findings.mechanism.name}{sure}: {findings.mechanism.reason.rstrip('.')}.")
     if findings.transition is not None:
         ring = findings.transition

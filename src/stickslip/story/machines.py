@@ -261,11 +261,8 @@ def write_joint(folder: Path, *, joint: JointFriction) -> None:
     (folder / "joint").mkdir()
     turning = joint.level.unit == "N m"
     law, line = joint_law(joint), LinearSlope(joint.level.value, slope=max(joint.viscous.value, 0.0))
-    lost = (
-        ""
-        if law == line
-        else f"<!-- its friction rises to {law.breakaway:.4g} {joint.level.unit} at rest, not here -->\n"
-    )
+    rises = f"<!-- its friction rises to {law.breakaway:.4g} {joint.level.unit} at rest, not here -->\n"
+    lost = "" if law == line else rises
     (folder / "joint" / "dynamics.urdf").write_text(f"{lost}{urdf_dynamics(line)}\n", encoding="utf-8")
     for form, file in FILES.items():
         try:

@@ -343,11 +343,8 @@ def _command(record: Record, question: str, options: Sequence[str], read: Mappin
     read = _read(record) if read is None else read
     if not read.get("files"):
         return []
-    command = [
-        "stickslip",
-        question,
-        "+".join(f"{file['folder']}/{file['name']}" if "folder" in file else file["name"] for file in read["files"]),
-    ]
+    places = [f"{file['folder']}/{file['name']}" if "folder" in file else file["name"] for file in read["files"]]
+    command = ["stickslip", question, "+".join(places)]
     for option in READING:
         stated = read.get(option)
         if isinstance(stated, Mapping):

@@ -69,10 +69,8 @@ def _data(findings: Findings) -> dict[str, Any]:
 
 def _together(comparison: Comparison) -> dict[str, Any]:
     """The conditions and what they say together, for JSON."""
-    rows = [
-        {**plain(vars(condition)), "normal": condition.normal and condition.normal.value}
-        for condition in comparison.conditions
-    ]
+    loads = [condition.normal and condition.normal.value for condition in comparison.conditions]
+    rows = [{**plain(vars(c)), "normal": load} for c, load in zip(comparison.conditions, loads, strict=True)]
     conditions = [{**row, "trend": condition.trend} for row, condition in zip(rows, comparison.conditions, strict=True)]
     return {"conditions": conditions, "verdicts": comparison.verdicts}
 

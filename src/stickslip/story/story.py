@@ -393,11 +393,8 @@ class Story:
     @property
     def opening(self) -> list[str]:
         """What is read first, in this order: what every number hangs on, and the answer."""
-        return [
-            sentence
-            for sentence in self.headline
-            if sentence and (isinstance(sentence, Caution) or sentence == self.answer)
-        ]
+        own = [sentence for sentence in self.headline if isinstance(sentence, Caution) or sentence == self.answer]
+        return [sentence for sentence in own if sentence]
 
     @property
     def others(self) -> list[str]:
@@ -413,11 +410,8 @@ class Story:
         rows.sort(key=lambda flag: min(map(order.index, flag.names)))
         reasons, kinds = {row.reason for row in rows}, {row.kind for row in rows} - {""}
         plain = [caution if isinstance(caution, Caution) else Caution(caution) for caution in self.cautions]
-        others = [
-            remark
-            for remark in plain
-            if remark.reason not in reasons and remark.kind not in kinds and remark.reason.casefold() not in headline
-        ]
+        others = [remark for remark in plain if remark.reason not in reasons and remark.kind not in kinds]
+        others = [remark for remark in others if remark.reason.casefold() not in headline]
         return [*rows, *(other for other in others if not other.names), *(other for other in others if other.names)]
 
     def marks(self, line: Line) -> str:
@@ -433,11 +427,8 @@ class Story:
     def how(self, line: Line) -> list[str]:
         """How a row was found and checked; what an earlier row says in the same words is told there."""
         texts = (line.method, *line.checks)
-        first = {
-            text: other.name
-            for other in reversed(self.lines[: self.lines.index(line)])
-            for text in (other.method, *other.checks)
-        }
+        before = reversed(self.lines[: self.lines.index(line)])
+        first = {text: other.name for other in before for text in (other.method, *other.checks)}
         rows = dict.fromkeys(first[text] for text in texts if text in first)
         return [*(f"as {row}" for row in rows), *(text for text in texts if text not in first)]
 
