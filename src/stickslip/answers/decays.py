@@ -101,9 +101,8 @@ class Decay(Result):
         if self.motion is not None and self.against < CLEAR and self.motion.choice.status == "ok":
             return self.motion
         swings = cast(BothFrictions | None, self.older.get(EXTREMES))  # of extremes alone, and they tell both
-        best = next(
-            (answer for answer in (self.waveform, self.thesis, self.motion, swings) if answer is not None), None
-        )
+        answers = (self.waveform, self.thesis, self.motion, swings)
+        best = next((answer for answer in answers if answer is not None), None)
         assert best is not None
         return best
 
@@ -473,9 +472,7 @@ def _jointly(findings: Sequence[Findings], way: dict[str, Any]) -> DecayFit:
 def _shared(findings: Sequence[Findings]) -> dict[str, list[Estimate]]:
     """What records of one oscillator share, of each record; not what stands in different units."""
     shared = {name: [getattr(finding.decay.best, name) for finding in findings] for name in SHARED}
-    return {
-        name: estimates for name, estimates in shared.items() if len({estimate.unit for estimate in estimates}) == 1
-    }
+    return {name: several for name, several in shared.items() if len({estimate.unit for estimate in several}) == 1}
 
 
 def _apart(findings: Sequence[Findings]) -> dict[str, float]:

@@ -298,9 +298,8 @@ def without(record: Record, *names: str) -> Record:
     kept = [name for name in record if name not in names]
     if not kept or len(kept) == len(record.samples):
         return record
-    return replace(
-        record, samples={name: record[name] for name in kept}, channels={n: record.channels[n] for n in kept}
-    )
+    samples = {name: record[name] for name in kept}
+    return replace(record, samples=samples, channels={name: record.channels[name] for name in kept})
 
 
 def _weighed(record: Record, rig: RigSettings, inquiry: Inquiry) -> RigSettings:
@@ -431,10 +430,8 @@ def chosen_method(record: Record, rig: RigSettings) -> tuple[str, str]:
     """
     helps = [name for name in ("a", "load") if name in record]
     if len(record) > AT_ONCE:
-        return (
-            "smoother",
-            f"{len(record)} samples are many; the method fusion takes them all together if it is asked to",
-        )
+        why = f"{len(record)} samples are many; the method fusion takes them all together if it is asked to"
+        return "smoother", why
     known = [name for name in helps if described(record.channels[name])]
     if known and rig.contact == "ground":
         return "fusion", f"{' and '.join(helps)} beside x: all sensors together by a Kalman smoother"

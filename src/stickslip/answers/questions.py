@@ -370,9 +370,7 @@ def _reasons(
         yield NO_BASE, (*BY_FORCE, "sticks")
     if unknown:
         yield unknown, BY_FORCE
-    if unstated := [
-        f"{name} is read as {channel.unit}" for name, channel in record.channels.items() if channel.assumed
-    ]:
+    if unstated := [f"{name} is read as {known.unit}" for name, known in record.channels.items() if known.assumed]:
         yield f"nobody stated a unit: {' and '.join(unstated)}", (*BY_FORCE, "regression", "asymmetric", "pull")
     if strays := [error.value for error in refusals if error.kind == STRAYING]:
         yield f"{strays[0]}: a mass, a spring or a sensor is not as stated, or the contact no spring", ONSETS

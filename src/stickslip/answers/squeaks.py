@@ -301,9 +301,7 @@ def _verdicts(conditions: Sequence[Condition]) -> list[str]:
             "alone is not enough."
         )
     rising = [condition for condition in loud if condition.trend == "rises"]
-    return verdicts + [
-        f"{sentence} though friction rises with speed." for sentence in _say(rising, "squeaks", "squeak")
-    ]
+    return verdicts + [f"{names} though friction rises with speed." for names in _say(rising, "squeaks", "squeak")]
 
 
 def _answering(conditions: Sequence[Condition], answer: str) -> list[Condition]:

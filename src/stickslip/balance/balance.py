@@ -325,9 +325,8 @@ def pulled_slider(record: Record, *, channel: str = "load") -> Pull:
         )
     falls = (bottoms - tops) / record.fs
     rises = (tops[1:] - bottoms[:-1]) / record.fs
-    shape = mean_of_cycles(
-        "rise over fall", rises / falls.mean(), unit="1", method="how long the force rises over how long it falls"
-    )
+    method = "how long the force rises over how long it falls"
+    shape = mean_of_cycles("rise over fall", rises / falls.mean(), unit="1", method=method)
     sticks = shape.value > SLOW
     rate = _rate(record[channel], record.fs, bottoms[:-1], tops[1:], f"{unit}/s")
     if not sticks:

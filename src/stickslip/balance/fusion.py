@@ -85,9 +85,8 @@ def fuse(record: Record, balance: Balance, sensors: Sequence[str]) -> Fused:
         _smoothed(record.rows(rows.start, rows.stop), balance, {n: v[rows] for n, v in known.items()}, inside)
         for rows, inside in _blocks(len(record))
     ]
-    friction, friction_sd, velocity, velocity_sd, acceleration = (
-        np.concatenate(p) for p in zip(*candidates, strict=True)
-    )
+    parts = (np.concatenate(part) for part in zip(*candidates, strict=True))
+    friction, friction_sd, velocity, velocity_sd, acceleration = parts
     return Fused(friction, friction_sd, velocity, velocity_sd, acceleration, lost)
 
 
@@ -208,9 +207,8 @@ class Held:
         readings = np.where(second[:, None], np.nan, sensed.readings[rows])
         halved = np.interp(rows + second / 2, np.arange(len(holds)), sensed.push)
         unknown = np.where(holds, (CALM * level) ** 2, level**2)[rows]
-        return cls(
-            model, replace(sensed, readings=readings, push=halved, stray=0.0), (holds + 2 * bends)[rows], unknown
-        )
+        sensed = replace(sensed, readings=readings, push=halved, stray=0.0)
+        return cls(model, sensed, (holds + 2 * bends)[rows], unknown)
 
     def log_likelihood(self, stiffness: float, damping: float) -> float:
         """Of all readings, were the contact so stiff [N/m] and damped [N s/m]."""

@@ -122,9 +122,8 @@ def impact_test(record: Record, *, mass: Constant | None = None, tapped: bool = 
     slips = f"what rings is no sum of decaying oscillations: {residual:.2g} times the noise is left over (slips?)"
     status = Status(*doubts, *[Doubt(slips, "slips")] * (residual > MISFIT))
     named = _named(modes, channels, known, status)
-    return ImpactTest(
-        tuple(named), record.start + ringing.first / record.fs, len(ringing.values) / record.fs, residual, status
-    )
+    begin, lasts = record.start + ringing.first / record.fs, len(ringing.values) / record.fs
+    return ImpactTest(tuple(named), begin, lasts, residual, status)
 
 
 @dataclass(frozen=True, eq=False)

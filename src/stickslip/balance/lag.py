@@ -145,9 +145,8 @@ def sensor_delay(
             "check whether the channels are named right",
         )
     if order and not _alike(alignment):
-        turned = _fit(
-            [replace(pair, first=pair.second, second=pair.first, noise=pair.noise[::-1]) for pair in pairs], None
-        )
+        swapped = [replace(pair, first=pair.second, second=pair.first, noise=pair.noise[::-1]) for pair in pairs]
+        turned = _fit(swapped, None)
         if _alike(turned[0]):
             raise EstimateError(
                 f"{channels[0]} follows {channels[1]} as {channels[1]} should follow {channels[0]}",
@@ -311,9 +310,8 @@ def _by_residual(record: Record, channels: tuple[str, str]) -> SensorDelay:
         f"half a sample, {half:.3g} s; in a run with friction it is the friction: use the phase"
     )
     method = "least residual of the balance without friction"
-    of_delay = Estimate(
-        f"delay of {channels[1]} behind {channels[0]}", delay, (delay - half, delay + half), half, "s", method, status
-    )
+    name, interval = f"delay of {channels[1]} behind {channels[0]}", (delay - half, delay + half)
+    of_delay = Estimate(name, delay, interval, half, "s", method, status)
     name, none = f"gain of {channels[1]} over {channels[0]}", math.nan
     of_gain = Estimate(name, none, (none, none), none, "1", method, "not found this way")
     return SensorDelay(of_delay, of_gain, None, None, (), channels, "residual", status)

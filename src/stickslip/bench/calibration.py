@@ -253,9 +253,8 @@ def spring_by_weights(
         f"displacement under {len(calibration.levels)} weights",
         checks=(f"off a straight line by {100 * calibration.nonlinearity.value:.2g} %",),
     )
-    return SpringByWeights(
-        replace(stiffness, status=calibration.status), calibration.reference, calibration.levels, calibration.status
-    )
+    stiffness, status = replace(stiffness, status=calibration.status), calibration.status
+    return SpringByWeights(stiffness, calibration.reference, calibration.levels, status)
 
 
 @dataclass(frozen=True)

@@ -138,9 +138,8 @@ def _inertia(record: Record, decay: DecayFit) -> Estimate:
     turn, start = 2 * math.pi * decay.frequency.value, decay.release_time.value
     rows = record.time > start
     time = record.time[rows] - start
-    wave = np.exp(
-        (1j * math.sqrt(max(0.0, 1 - decay.damping_ratio.value**2)) - decay.damping_ratio.value) * turn * time
-    )
+    zeta = decay.damping_ratio.value
+    wave = np.exp((1j * math.sqrt(max(0.0, 1 - zeta**2)) - zeta) * turn * time)
     design = np.column_stack([wave.real, -wave.imag, np.ones(len(time))])
     inverse = np.linalg.inv(design.T @ design)
     (x, _), (load, sd) = (_amplitude(design, inverse, record[name][rows]) for name in ("x", "load"))
@@ -163,9 +162,8 @@ def _amplitude(design: Array, inverse: Array, values: Array) -> tuple[complex, f
     """Complex amplitude of a decaying oscillation in a channel, and the deviation of its real part."""
     fit = inverse @ (design.T @ values)
     residual = values - design @ fit
-    sd = math.sqrt(
-        float(inverse[0, 0]) * float(residual @ residual) / len(residual) * max(1.0, correlation_time(residual))
-    )
+    square = float(inverse[0, 0]) * float(residual @ residual)
+    sd = math.sqrt(square / len(residual) * max(1.0, correlation_time(residual)))
     return complex(fit[0], fit[1]), sd
 
 
@@ -415,9 +413,8 @@ def onto_stick(record: Record, *, mass: Constant, stiffness: Constant) -> OntoSt
     coupled = coupled_mode(ringing)
     turn, of_mass = (2 * math.pi * coupled.frequency.value) ** 2, weight.value
     value = of_mass * turn - spring.value
-    sd = math.hypot(
-        2 * of_mass * turn * coupled.frequency.spread / coupled.frequency.value, turn * weight.sd, spring.sd
-    )
+    share = 2 * of_mass * turn * coupled.frequency.spread / coupled.frequency.value
+    sd = math.hypot(share, turn * weight.sd, spring.sd)
     contact = Estimate.normal(
         "contact stiffness", value, sd=sd, unit="N/m", method="mass times coupled frequency squared, less the spring"
     ).within(0.0)
@@ -428,9 +425,7 @@ def onto_stick(record: Record, *, mass: Constant, stiffness: Constant) -> OntoSt
 
 def coupled_mode(ringing: ImpactTest) -> Resonance:
     """What rings of mass and contact; what hardly swings follows the other modes' misfit."""
-    return min(
-        ringing.resonances, key=lambda one: (one.damping.value > DEAD, COUPLED not in one.name, one.frequency.spread)
-    )
+    return min(ringing.resonances, key=lambda r: (r.damping.value > DEAD, COUPLED not in r.name, r.frequency.spread))
 
 
 def _stop(record: Record) -> int:

@@ -90,9 +90,8 @@ class Task:
         try:
             for one in device.inputs:
                 volts = min(VOLTS, one.limit / one.scale)
-                self.task.ai_channels.add_ai_voltage_chan(
-                    f"{device.device}/{one.terminal}", min_val=-volts, max_val=volts
-                )
+                at = f"{device.device}/{one.terminal}"
+                self.task.ai_channels.add_ai_voltage_chan(at, min_val=-volts, max_val=volts)
             buffered, mode = round(HELD * device.fs), kinds.AcquisitionType.CONTINUOUS
             self.task.timing.cfg_samp_clk_timing(device.fs, sample_mode=mode, samps_per_chan=buffered)
             self.reader = vendors("nidaqmx.stream_readers").AnalogMultiChannelReader(self.task.in_stream)

@@ -73,9 +73,7 @@ class AtRest(Result):
     @property
     def estimates(self) -> tuple[Estimate, ...]:
         """Zero, noise and drift of each."""
-        return tuple(
-            estimate for sensor in self.sensors.values() for estimate in (sensor.zero, sensor.noise, sensor.drift)
-        )
+        return tuple(number for sensor in self.sensors.values() for number in (sensor.zero, sensor.noise, sensor.drift))
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON."""
@@ -339,9 +337,8 @@ def _fitted(time: Array, blocks: Array, before: Mask, after: Mask, at: float, un
             "put a heavier weight on",
         )
     span = float(t[behind][-1] - t[behind][0])
-    begin = np.array(
-        [zero, high - zero, max(1e-3 / span, math.log(abs(high - zero) / max(noise, abs(y[-1] - zero))) / span)]
-    )
+    rate = math.log(abs(high - zero) / max(noise, abs(y[-1] - zero))) / span
+    begin = np.array([zero, high - zero, max(1e-3 / span, rate)])
     solve: Any = least_squares
     fit = solve(lambda p: (model(p) - y) / noise, begin, x_scale=[noise, abs(begin[1]), 1 / span])
     residual = y - model(fit.x)

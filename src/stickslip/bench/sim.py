@@ -242,9 +242,8 @@ class SimStream:
         chance = np.random.default_rng(device.seed)
         seeds = [np.random.default_rng(chance.integers(2**63)) for _ in device.rig.sensors]
         pairs = zip(device.rig.sensors, seeds, strict=True)
-        self.readings = [
-            _Reading(sensor, self.march, self.rate, rng) for sensor, rng in pairs if sensor.channel in names
-        ]
+        wanted = [(sensor, rng) for sensor, rng in pairs if sensor.channel in names]
+        self.readings = [_Reading(sensor, self.march, self.rate, rng) for sensor, rng in wanted]
         self.began = time.monotonic()
 
     def __enter__(self) -> Self:
@@ -499,9 +498,8 @@ def build(name: str, settings: Mapping[str, Any], folder: Path) -> Sim:
     faults = tuple(Fault(f.kind, f.at, f.duration or math.inf, f.channel) for f in given.faults)
     limits = {key: value for key, value in given.shaker.model_dump().items() if value is not None}
     system, start = _system(given.system, folder)
-    return Sim(
-        system, start, rig, given.fs, given.fast, faults, Output("base", "m", **limits), given.seed, name, given.stated
-    )
+    base = Output("base", "m", **limits)
+    return Sim(system, start, rig, given.fs, given.fast, faults, base, given.seed, name, given.stated)
 
 
 def _system(given: str | dict[str, Any] | None, folder: Path) -> tuple[System, Mapping[str, float | str]]:

@@ -120,9 +120,8 @@ class _Settings(BaseModel):
 def listed() -> Sequence[str]:
     """The cards of this computer that hear."""
     cards = vendors("sounddevice").query_devices()
-    return tuple(
-        f"{card['name']} ({card['max_input_channels']} inputs)" for card in cards if card["max_input_channels"]
-    )
+    inputs = "max_input_channels"
+    return tuple(f"{card['name']} ({card[inputs]} inputs)" for card in cards if card[inputs])
 
 
 def build(name: str, settings: Mapping[str, Any], folder: Path) -> Card:

@@ -533,9 +533,8 @@ def _channel(stated: str, zero: float, gain: Estimate | None) -> str:
 
 def _pm(estimate: Estimate) -> str:
     """Value and standard uncertainty, as the settings read them."""
-    digits = max(
-        2, 2 + math.ceil(math.log10(max(1.0, abs(estimate.value) / max(estimate.sd, 1e-12 * abs(estimate.value)))))
-    )
+    within = max(estimate.sd, 1e-12 * abs(estimate.value))
+    digits = max(2, 2 + math.ceil(math.log10(max(1.0, abs(estimate.value) / within))))
     return f"{estimate.value:.{min(digits, 12)}g} ± {estimate.sd:.2g} {estimate.unit}"
 
 

@@ -97,9 +97,8 @@ class Seen:
         if self.lost or ended - began < LONG_ENOUGH:
             return []
         pace = float(f"{(last - first) / (ended - began):.3g}")
-        return (
-            [] if abs(pace / fs - 1) < OFF_PACE else [f"they came at {pace:g} Hz by this computer's clock: correct fs"]
-        )
+        off = [f"they came at {pace:g} Hz by this computer's clock: correct fs"]
+        return [] if abs(pace / fs - 1) < OFF_PACE else off
 
 
 class Tape:
@@ -256,8 +255,7 @@ def _about(
         **notes,
     }
     channels = {one.name: one.channel for one in device.inputs}
-    blank = Record(
-        {name: np.zeros(1) for name in channels}, channels, device.fs, start, (Step("acquire", arguments),), log=log
-    )
+    samples, history = {name: np.zeros(1) for name in channels}, (Step("acquire", arguments),)
+    blank = Record(samples, channels, device.fs, start, history, log=log)
     scales = [one.scale for one in device.inputs]
     return {**record_to_metadata(blank), "type": kind.newbyteorder("<").str, "scales": scales}

@@ -395,9 +395,8 @@ class SimulatedBench:
         return np.random.default_rng([self.seed, *name.encode()])
 
     def _read(self, signals: dict[str, Callable[[Array], Array]], duration: float) -> Record:
-        return self.rig.read(
-            signals, duration=duration, fs=self.fs, rng=self._chance("/".join(signals) + f"{duration}")
-        )
+        rng = self._chance("/".join(signals) + f"{duration}")
+        return self.rig.read(signals, duration=duration, fs=self.fs, rng=rng)
 
     def _levels(self, source: str, levels: Sequence[float], hold: float = 2.0) -> Record:
         return self._read({source: functools.partial(_levels, levels, hold)}, hold * len(levels))

@@ -227,12 +227,10 @@ def range_checks(record: Record, names: Sequence[str]) -> list[Check]:
         top = float(np.abs(record[name]).max())
         message = f"{name} is held at the end of its range in {int(mask.sum())} of {len(mask)} samples"
         sentence = message if cut is None else cut.message
-        checks.append(
-            Check(f"range of {name}", top, top, record.channels[name].unit, math.inf, FAILS, sentence.rstrip("."))
-        )
-    return checks or [
-        Check("range of the sensors", math.nan, math.nan, "1", math.nan, HOLDS, "none stands at the end of its range")
-    ]
+        unit = record.channels[name].unit
+        checks.append(Check(f"range of {name}", top, top, unit, math.inf, FAILS, sentence.rstrip(".")))
+    none = "none stands at the end of its range"
+    return checks or [Check("range of the sensors", math.nan, math.nan, "1", math.nan, HOLDS, none)]
 
 
 def sampling_check(record: Record, seen: Seen) -> Check:

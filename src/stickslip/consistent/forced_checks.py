@@ -113,9 +113,8 @@ class Seen:
     @property
     def balance(self) -> Amplitudes:
         """The strongest lines as read, for mix-ups."""
-        values = {
-            name: complex(read[:, self.at].mean()) for name, read in self.lines.amplitudes.items() if name not in RATES
-        }
+        amplitudes = {name: read for name, read in self.lines.amplitudes.items() if name not in RATES}
+        values = {name: complex(read[:, self.at].mean()) for name, read in amplitudes.items()}
         stated = {name: unit for name, channel in self.stated_channels.items() if (unit := _unit_read(channel))}
         return Amplitudes(values, self.angular, self.rig, self.damper, self.tolerance, self.contact, stated)
 

@@ -250,9 +250,8 @@ class _Fit:
         if free.any():
             corners = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
             options: dict[str, Any] = {"initial_simplex": corners, "xatol": 1e-3, "maxiter": 80}
-            start = start + scale * np.where(
-                free, minimize(cost, corners[0], method="Nelder-Mead", options=options).x, 0.0
-            )
+            better = minimize(cost, corners[0], method="Nelder-Mead", options=options).x
+            start = start + scale * np.where(free, better, 0.0)
         lag, give = float(start[0]), max(self.none, math.exp(start[1]))
         return lag, give, math.sqrt(self.left(lag, give) / (self.inside.stop - self.inside.start))
 

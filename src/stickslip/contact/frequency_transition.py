@@ -210,9 +210,8 @@ def _none(value: str, rule: str) -> EstimateError:
 def _stretches(window: Window, pole: complex, fs: float) -> list[slice]:
     """The rows of a window that ring for sure."""
     cycle = 2 * math.pi / pole.imag * fs
-    inner = [
-        slice(math.ceil(piece.first + AFTER * cycle), math.floor(piece.last - BEFORE * cycle)) for piece in window.rings
-    ]
+    after, before = AFTER * cycle, BEFORE * cycle
+    inner = [slice(math.ceil(piece.first + after), math.floor(piece.last - before)) for piece in window.rings]
     return [rows for rows in inner if rows.stop - rows.start >= max(8, LEAST_RING * cycle)]
 
 
@@ -262,9 +261,8 @@ def _fitted(windows: tuple[Window, ...], ringing: Ringing) -> Mode | None:
     method = f"one decaying mode, least squares over {rings} rings"
     checks = (f"{len(used)} sticks",)
     hertz, sd = pole.imag / (2 * math.pi), math.sqrt(spread[1, 1]) / (2 * math.pi)
-    frequency = Estimate.normal(
-        "transition frequency", hertz, sd=sd, unit="Hz", method=method, quantile=quantile, checks=checks
-    )
+    name = "transition frequency"
+    frequency = Estimate.normal(name, hertz, sd=sd, unit="Hz", method=method, quantile=quantile, checks=checks)
     ratio, sd = -pole.real / abs(pole), math.sqrt(float(slope @ spread @ slope))
     damping = Estimate.normal("transition damping ratio", ratio, sd=sd, unit="1", method=method, quantile=quantile)
     return Mode(pole, frequency, damping, math.sqrt(variance), tuple(window for window, _ in used), tau)
@@ -335,9 +333,8 @@ def _local_maxima(record: Record, channel: str, ringing: Ringing, pooled: Mode) 
         low, middle, high = np.log(np.maximum(ridge[peak - 1 : peak + 2], 1e-300)).tolist()
         bend = low - 2 * middle + high
         higher = bend < 0 and middle >= max(low, high)
-        maxima.append(
-            float(wanted[peak] * (wanted[1] / wanted[0]) ** (0.5 * (low - high) / bend)) if higher else math.nan
-        )
+        refined = float(wanted[peak] * (wanted[1] / wanted[0]) ** (0.5 * (low - high) / bend)) if higher else math.nan
+        maxima.append(refined)
     return maxima
 
 

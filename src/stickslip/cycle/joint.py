@@ -522,9 +522,8 @@ class Telling:
             what = f"a zero of the {read} that is off by {abs(shift.value):.3g} {shift.unit}"
             doubts = [Doubt(f"{what}, or a constant load, would look the same", SHIFTED, lesser=True)]
         forward, back = (self.one(way).within(0.0) for way in ("forward", "back"))
-        return replace(forward, status=Status(forward.status, *doubts)), replace(
-            back, status=Status(back.status, *doubts)
-        )
+        forward, back = (replace(side, status=Status(side.status, *doubts)) for side in (forward, back))
+        return forward, back
 
     def sum(self, weights: dict[str, float], name: str) -> Estimate:
         """A sum of coefficients."""
@@ -547,9 +546,8 @@ class Telling:
             f"condition number {self.fit.condition:.3g}",
             f"residuals are worth {self.fit.independent:.0f} independent samples",
         )
-        return self.fit.combined(
-            row, name, unit, f"{how}, windows within strokes", beside=beside, status=status, checks=checks
-        )
+        method = f"{how}, windows within strokes"
+        return self.fit.combined(row, name, unit, method, beside=beside, status=status, checks=checks)
 
     def _partner(self, index: int) -> str:
         """The term whose coefficient goes with this one most."""

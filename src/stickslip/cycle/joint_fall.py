@@ -292,6 +292,5 @@ def _weighed(balance: _Balance, solved: _Solved, curves: Array, halves: Array) -
 
 def _spans(curves: Array) -> Array:
     """How much of the logarithm of the speed each curve stands for."""
-    return np.concatenate(
-        [np.gradient(np.log(curves[curves[:, 1] == exponent, 0])) for exponent in dict.fromkeys(curves[:, 1])]
-    )
+    speeds = [curves[curves[:, 1] == exponent, 0] for exponent in dict.fromkeys(curves[:, 1])]
+    return np.concatenate([np.gradient(np.log(speed)) for speed in speeds])

@@ -346,9 +346,8 @@ def _torqued(record: Record, constants: dict[str, Estimate]) -> Record:
         constant = constants["torque_constant"]
         step = Step("regress_joint", {"torque_constant": constant.value}, "torque of the current")
         unit = "N m" if turning(record) else "N"
-        record = record.with_channel(
-            "force", constant.value * record["current"], unit=unit, source="current", step=step
-        )
+        force = constant.value * record["current"]
+        record = record.with_channel("force", force, unit=unit, source="current", step=step)
     if "force" in record:
         require_fit(record, "force", length="rad" if position == "theta" else "m", question=QUESTION)
         return record

@@ -60,9 +60,8 @@ class Window:
     def at(self, values: Array, rows: Rows, order: int = 0) -> Array:
         """The same at some rows: no other is computed."""
         rough = five_point_difference(values, order) * self.fs**order
-        return np.asarray(
-            np.lib.stride_tricks.sliding_window_view(rough, 2 * self.half + 1)[rows - self.half] @ self.weights
-        )
+        windows = np.lib.stride_tricks.sliding_window_view(rough, 2 * self.half + 1)
+        return np.asarray(windows[rows - self.half] @ self.weights)
 
     def within(self, side: Array) -> Mask:
         """Where it lies within one stroke."""

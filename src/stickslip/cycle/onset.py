@@ -348,9 +348,8 @@ def breakaway(record: Record, *, contact: str | None = None) -> Breakaway:
     status = borne.status
     rings = ringing_of(strokes.strokes, record.fs) if is_measured(record, "friction") else None  # a balance rings too
     heard = (None, None, None) if rings is None else (rings.forward, rings.back, rings.difference)
-    swings = [
-        sliding_swing(record, [stroke for stroke in borne.strokes if stroke.way == way], side) for way, side in SIDES
-    ]
+    own = {way: [stroke for stroke in borne.strokes if stroke.way == way] for way, _ in SIDES}
+    swings = [sliding_swing(record, own[way], side) for way, side in SIDES]
     forward, back = (_flagged(level, status) for level in levels)
     ratio = _flagged(ratio, status) or ratio
     return Breakaway(forward, back, ratio, *heard, swings[0], swings[1], len(borne.strokes), status)

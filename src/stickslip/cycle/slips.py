@@ -492,6 +492,5 @@ def _root(square: Estimate) -> Estimate:
     """The square root of an estimate that can not be below zero."""
     possible = square.within(0.0, otherwise="its noise is larger than all that the friction swings by")
     low, high = (float(np.sqrt(end)) for end in possible.interval)
-    return replace(
-        possible, value=float(np.sqrt(possible.value)), interval=(low, high), sd=(high - low) / (2 * NORMAL_95)
-    )
+    value, sd = float(np.sqrt(possible.value)), (high - low) / (2 * NORMAL_95)
+    return replace(possible, value=value, interval=(low, high), sd=sd)

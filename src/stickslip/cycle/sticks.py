@@ -360,9 +360,8 @@ def _slip(before: Hold, after: Hold, first: float, last: float) -> list[StickEve
 
 
 def _event(kind: str, begin: tuple[float, float], end: tuple[float, float], whole: bool) -> StickEvent:
-    return StickEvent(
-        float(begin[0]), kind, float(end[0] - begin[0]), bool(whole), float(begin[1]), math.hypot(begin[1], end[1])
-    )
+    sd = math.hypot(begin[1], end[1])
+    return StickEvent(float(begin[0]), kind, float(end[0] - begin[0]), bool(whole), float(begin[1]), sd)
 
 
 def _share_of(events: tuple[StickEvent, ...], cycles: Cycles, motion: Motion) -> Estimate:

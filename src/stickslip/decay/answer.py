@@ -413,9 +413,8 @@ def ends_together(fits: list[Together], level: float, count: int) -> Array:
                 p = extreme(fit.objective, fit.p, fit.value, which, side, level)
                 if p is None:
                     aim = np.eye(len(fit.p))[which]
-                    reached.append(
-                        fit.p[which] + side * math.sqrt((level - fit.value) * solve(fit.curvature, aim)[which])
-                    )
+                    step = math.sqrt((level - fit.value) * solve(fit.curvature, aim)[which])
+                    reached.append(fit.p[which] + side * step)
                 else:
                     (reached if fit.possible(p) else beyond).append(p[which])
             answer[which, column] = side * max((side * end for end in reached or beyond), default=math.inf)

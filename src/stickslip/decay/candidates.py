@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -75,9 +76,8 @@ class BlockMeans:
         self, parameters: Array, *, free: tuple[str, ...] = (), half_cycles: int | None = None
     ) -> tuple[Array, Array, int]:
         """:func:`free_decay` at these blocks."""
-        return free_decay(
-            self.times, parameters, free=free, restoring=self.restoring, half_cycles=half_cycles, spread=self.spread
-        )
+        more: Any = {"restoring": self.restoring, "half_cycles": half_cycles, "spread": self.spread}
+        return free_decay(self.times, parameters, free=free, **more)
 
     def until(self, time: float) -> BlockMeans:
         """The blocks up to an instant."""

@@ -365,12 +365,10 @@ def kept_by_all(choices: Sequence[Choice]) -> tuple[str, ...]:
     A true candidate is rejected once in twenty, however many releases look for it (Bonferroni). Least is up to twice
     the best residual of all releases together.
     """
-    tried = {
-        candidate.name: [choice.candidate(candidate.name) for choice in choices] for candidate in choices[0].candidates
-    }
-    kept = tuple(
-        name for name, candidates in tried.items() if len(choices) * min(one.p_value for one in candidates) >= SIZE
-    )
+    names = [candidate.name for candidate in choices[0].candidates]
+    tried = {name: [choice.candidate(name) for choice in choices] for name in names}
+    least = {name: min(one.p_value for one in candidates) for name, candidates in tried.items()}
+    kept = tuple(name for name, p_value in least.items() if len(choices) * p_value >= SIZE)
     costs = {name: sum(one.fitted.cost for one in candidates) for name, candidates in tried.items()}
     return kept or tuple(name for name, cost in costs.items() if cost <= NEAR**2 * min(costs.values()))
 

@@ -342,9 +342,8 @@ def linear_decrement(record: Record, *, channel: str | None = None) -> EnvelopeD
     method = f"linear decrement over {len(sizes)} extremes"
     dry = line.estimate(0, "dry friction displacement", ring_down.unit, method).scaled(-0.5, ring_down.unit)
     bent = np.polyfit(numbers, sizes, 2)[0] * numbers[-1] ** 2
-    status = (
-        "ok" if abs(bent) < 0.1 * sizes[0] else "the amplitudes do not fall on a line: viscous damping is read as dry"
-    )
+    biased = "the amplitudes do not fall on a line: viscous damping is read as dry"
+    status = "ok" if abs(bent) < 0.1 * sizes[0] else biased
     return EnvelopeDecay(None, dry, _frequency(ring_down, 0.0, method), method, LINEAR, status)
 
 
@@ -393,12 +392,10 @@ def extreme_decay(
     (beta, dry), (beta_sd, dry_sd) = _fitted_swings(sizes, numbers, signs, restoring)
     method, quantile = f"least squares over {len(sizes)} extremes", student(max(1, len(sizes) - FREE))
     common: dict[str, Any] = {"method": method, "quantile": quantile}
-    damping = Estimate.normal(
-        "damping ratio", damping_ratio(beta), sd=beta_sd / (1 + beta**2) ** 1.5, unit="1", **common
-    )
-    displacement = Estimate.normal("dry friction displacement", dry, sd=dry_sd, unit=ring_down.unit, **common).within(
-        0.0
-    )
+    sd = beta_sd / (1 + beta**2) ** 1.5
+    damping = Estimate.normal("damping ratio", damping_ratio(beta), sd=sd, unit="1", **common)
+    name = "dry friction displacement"
+    displacement = Estimate.normal(name, dry, sd=dry_sd, unit=ring_down.unit, **common).within(0.0)
     return EnvelopeDecay(
         damping,
         displacement,

@@ -260,9 +260,8 @@ def _mean(
     order = np.argsort(-share)
     # a candidate too unlikely for the interval, or one without a possible end, still has its share in the mean
     ends = np.column_stack([np.minimum(ends[:, 0], values), np.maximum(ends[:, 1], values)])
-    return _Motion(
-        values, spread, ends, tuple((half_cycles[k], float(share[k])) for k in order), tuple(motions[k] for k in order)
-    )
+    shares = tuple((half_cycles[k], float(share[k])) for k in order)
+    return _Motion(values, spread, ends, shares, tuple(motions[k] for k in order))
 
 
 def _answer(

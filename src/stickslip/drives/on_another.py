@@ -155,9 +155,8 @@ class Later:
     def motion(self) -> Motion:
         """The drive's signals as they are at that instant, and its knots ahead."""
         own = self.drive.motion()
-        tones = tuple(
-            (c, s, omega, math.remainder(phase + omega * self.time, 2 * math.pi)) for c, s, omega, phase in own.tones
-        )
+        shifted = ((c, s, omega, phase + omega * self.time) for c, s, omega, phase in own.tones)
+        tones = tuple((c, s, omega, math.remainder(phase, 2 * math.pi)) for c, s, omega, phase in shifted)
         start = _moved(own.rates, own.start, self.time)
         for cosine, sine, _, phase in tones:
             start |= {cosine: math.cos(phase), sine: math.sin(phase)}
@@ -165,9 +164,8 @@ class Later:
         if knots is not None:
             last = int(np.searchsorted(knots[:, 0], self.time, side="right")) - 1
             rates = {name: own.rates.get(name, {}) for name in own.knotted}
-            now = _moved(
-                rates, dict(zip(own.knotted, map(float, knots[last, 1:]), strict=True)), self.time - knots[last, 0]
-            )
+            values = dict(zip(own.knotted, map(float, knots[last, 1:]), strict=True))
+            now = _moved(rates, values, self.time - knots[last, 0])
             ahead = knots[last + 1 :] - np.append(self.time, np.zeros(len(own.knotted)))
             knots = np.vstack([[0.0, *(now[name] for name in own.knotted)], ahead])
         return replace(own, start=start, tones=tones, knots=knots, end=own.end - self.time)

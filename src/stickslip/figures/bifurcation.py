@@ -173,9 +173,8 @@ def plot_stability(stability: xr.Dataset, *, labels: tuple[str, str] | None = No
         axes.clabel(lines, fmt=lambda level: f"{level:.3g} 1/s", fontsize=7, colors=INK)
     first, second = names if labels is None else labels
     axes.set(xlabel=second, ylabel=first)
-    shown = [
-        Patch(facecolor=STATES[known[k]], alpha=FILLED, edgecolor=FAINT, label=known[k]) for k in np.unique(places)
-    ]
+    seen = [known[k] for k in np.unique(places)]
+    shown = [Patch(facecolor=STATES[name], alpha=FILLED, edgecolor=FAINT, label=name) for name in seen]
     legend_above(axes, handles=shown, columns=2)
     return figure
 
@@ -237,9 +236,8 @@ def _follow(top: Axes, bottom: Axes, diagram: Bifurcation, factor: float, *, dot
 
 def _beside(top: Axes, diagram: Bifurcation, factor: float) -> None:
     """Motions from other starts, and branches that lose their stability."""
-    others = [
-        (value, motion) for value, several in zip(diagram.values, diagram.beside, strict=True) for motion in several
-    ]
+    beside = zip(diagram.values, diagram.beside, strict=True)
+    others = [(value, motion) for value, several in beside for motion in several]
     for number, (value, motion) in enumerate(others):
         label = "beside, from another start" if not number else None
         heights = factor * motion.points[:, 0]

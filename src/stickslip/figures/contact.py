@@ -282,9 +282,7 @@ def plot_coefficients(coefficients: Coefficients, *, ax: Axes | None = None) -> 
 def plot_triboscopy(coefficients: Coefficients, *, ax: Axes | None = None) -> Axes:
     """Friction over load at each place of the stroke, cycle after cycle, the mean of both directions."""
     ax = axes_of(ax)
-    both = np.where(
-        np.isnan(coefficients.forward + coefficients.back), np.nan, (coefficients.forward + coefficients.back) / 2
-    )
+    both = (coefficients.forward + coefficients.back) / 2
     factor, unit = (1e3, "mm") if coefficients.unit == "m" else (1.0, coefficients.unit)
     low, high = np.nanquantile(both, [0.02, 0.98])
     last = len(next(iter(coefficients.of_cycles.values())))

@@ -110,9 +110,8 @@ def plot_differences(decrement: Decrement, *, ax: Axes | None = None) -> Axes:
     look: Any = {"fmt": "o", "color": INK, "markersize": 3.5, "linewidth": 0.9, "zorder": 3, "label": label}
     ax.errorbar(number, factor * decrement.differences, yerr=1.96 * factor * spread, **look)
     ax.axhline(0, color=FAINT, linewidth=0.8)
-    ax.set(
-        xlabel="number i of the extreme", ylabel=axis_label("X(i+1) - X(i-1)" if apart == 2 else "X(i-1) + X(i)", unit)
-    )
+    label = "X(i+1) - X(i-1)" if apart == 2 else "X(i-1) + X(i)"
+    ax.set(xlabel="number i of the extreme", ylabel=axis_label(label, unit))
     legend_above(ax, columns=2)
     return ax
 
@@ -128,9 +127,8 @@ def plot_bounds(decrement: Decrement) -> Figure:
         (factor * bounds.dry, factor * bounds.dry_first_order, factor * bounds.dry_worst, axis_label("x_k", unit)),
     )
     for ax, (value, first_order, worst, label) in zip(axes, rows, strict=True):
-        ax.fill_between(
-            bounds.m, value - worst, value + worst, color=ORANGE, alpha=0.2, linewidth=0, label="exact worst case"
-        )
+        look: Any = {"color": ORANGE, "alpha": 0.2, "linewidth": 0, "label": "exact worst case"}
+        ax.fill_between(bounds.m, value - worst, value + worst, **look)
         for side in (1, -1):
             text = "to first order" if side == 1 else None
             ax.plot(bounds.m, value + side * first_order, color=BLUE, linestyle="--", linewidth=1.0, label=text)

@@ -366,9 +366,8 @@ def plates_of(atlas: Any, system: System | None = None) -> tuple[Plate, ...]:
     plates = []
     for name, variable in (drawn or {"status": "status"}).items():
         ax, (values, label, _) = plot_map(atlas, variable=variable, system=system), _shown(atlas, variable)
-        line = (
-            " Line: Den Hartog's boundary, below which sliding does not stop." if ax.get_legend() and ax.lines else ""
-        )
+        below = " Line: Den Hartog's boundary, below which sliding does not stop."
+        line = below if ax.get_legend() and ax.lines else ""
         white = _white(atlas, values)
         left = f" {white[0].upper()}{white[1:]}." if white else ""
         plates.append(plate(name, partial(_itself, ax), f"{label[0].upper()}{label[1:]}", caption + line + left))

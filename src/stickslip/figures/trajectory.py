@@ -259,9 +259,8 @@ def plates_of(run: Trajectory) -> tuple[Plate, ...]:
     if first > 0:
         plates.append(captioned("run", "whole-run", partial(plot_motion, run), shaded=shaded))
     span = "As long as it moves" if run.status == "at rest" else "The last cycles"
-    plates.append(
-        captioned("run", "motion", partial(plot_motion, run, first=first, last=last), span=span, shaded=shaded)
-    )
+    motion = partial(plot_motion, run, first=first, last=last)
+    plates.append(captioned("run", "motion", motion, span=span, shaded=shaded))
     contacts, masses = contacts_of(run), len(run.labels("x"))
     for c in range(min(contacts, MOST_DRAWN)):
         number, of = (f"-{c + 1}", f", contact {c + 1}") if contacts > 1 else ("", "")
@@ -283,9 +282,8 @@ def _shade(ax: Axes, run: Trajectory, first: float, last: float, contact: int) -
     for kind, (label, colour, opacity) in _KINDS.items():
         spans = stretches(run, kind, first=first, last=last, contact=contact)
         if 0 < len(spans) <= MOST_SHADES:
-            ax.broken_barh(
-                spans.tolist(), (low, high - low), color=colour, alpha=opacity, linewidth=0, zorder=0, label=label
-            )
+            look: Any = {"color": colour, "alpha": opacity, "linewidth": 0, "zorder": 0, "label": label}
+            ax.broken_barh(spans.tolist(), (low, high - low), **look)
     ax.set_ylim(low, high)
 
 

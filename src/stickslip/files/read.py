@@ -381,9 +381,8 @@ class Reading:
                 )
             if not lengths or not lengths[0]:
                 return
-            yield {
-                (number, name): v for number, block in zip(numbers, blocks, strict=True) for name, v in block.items()
-            }
+            parts = zip(numbers, blocks, strict=True)
+            yield {(number, name): values for number, block in parts for name, values in block.items()}
 
     def _clock(self, data: Mapping[tuple[int, str], Array], first: int, known: float | None = None) -> Clock:
         """The one clock of these rows, which begin at row `first` of the files."""

@@ -36,9 +36,8 @@ def described(
         if status != 204:
             given["content"] = {gives: {"schema": answer or {}}}
         operation: dict[str, Any] = {"summary": summary, "responses": {str(status): given}}
-        operation["parameters"] = [
-            {"name": name, "in": "query", "schema": schema} for name, schema in (query or {}).items()
-        ]
+        schemas = (query or {}).items()
+        operation["parameters"] = [{"name": name, "in": "query", "schema": schema} for name, schema in schemas]
         if body is not None:
             operation["requestBody"] = {"required": True, "content": {media: {"schema": body}}}
         endpoint.openapi = operation  # type: ignore[attr-defined]

@@ -93,9 +93,8 @@ async def _parts(
 def _finer(values: NDArray[np.float64]) -> NDArray[np.float64]:
     """Each interval halved as often as a border is."""
     part = 2**HALVINGS
-    finer: NDArray[np.float64] = np.interp(
-        np.arange((len(values) - 1) * part + 1) / part, np.arange(len(values)), values
-    )
+    at = np.arange((len(values) - 1) * part + 1) / part
+    finer: NDArray[np.float64] = np.interp(at, np.arange(len(values)), values)
     return finer
 
 

@@ -236,9 +236,8 @@ def _natural(unit: str, seen: Observed) -> float:
 
 def hypotheses() -> dict[str, Hypothesis]:
     """What records are asked to choose from, by name: rigid contacts, then others, the simplest of both first."""
-    known = [
-        hypothesis for law in registered().values() if hasattr(law, "hypotheses") for hypothesis in law.hypotheses()
-    ]
+    telling = [law for law in registered().values() if hasattr(law, "hypotheses")]
+    known = [hypothesis for law in telling for hypothesis in law.hypotheses()]
     return {kind.name: kind for kind in sorted(known, key=lambda kind: kind.family is not RIGID)}
 
 

@@ -120,9 +120,8 @@ def _guesses(seen: Observed) -> list[LuGre]:
     force = _bristles(seen, stiffness, speed, excess)
     best = int(np.argmin(np.mean((force - seen.friction[:, None]) ** 2, axis=0)))
     static = seen.level * (1 + float(excess[best]))
-    return [
-        LuGre(seen.level, static, speed=float(speed[best]), stiffness=float(stiffness[best]), damping=contact.damping)
-    ]
+    curve = {"speed": float(speed[best]), "stiffness": float(stiffness[best]), "damping": contact.damping}
+    return [LuGre(seen.level, static, **curve)]
 
 
 def _from_compliant(simpler: Mapping[str, Searched]) -> list[LuGre]:

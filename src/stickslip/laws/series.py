@@ -347,9 +347,8 @@ class ElastoSlip:
                 "one of each an element",
                 "complete it",
             )
-        pairs = sorted(
-            zip(map(float, self.stiffnesses), map(float, self.forces), strict=True), key=lambda p: p[1] / p[0]
-        )
+        rows = zip(map(float, self.stiffnesses), map(float, self.forces), strict=True)
+        pairs = sorted(rows, key=lambda p: p[1] / p[0])
         object.__setattr__(self, "stiffnesses", tuple(k for k, _ in pairs))
         object.__setattr__(self, "forces", tuple(f for _, f in pairs))
 

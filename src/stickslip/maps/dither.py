@@ -373,9 +373,8 @@ def _designed(
     angular = 2 * math.pi * best.frequency
     with_it = search.stick(best.amplitude, best.frequency)
     inertia = search.system.mass * angular
-    speed = (
-        best.amplitude * {"face": angular, "base": search.system.stiffness / inertia, "force": 1 / inertia}[search.on]
-    )
+    speeds = {"face": angular, "base": search.system.stiffness / inertia, "force": 1 / inertia}
+    speed = best.amplitude * speeds[search.on]
     small, large = (averaged_friction(search.system, frequency=best.frequency, speed=n * speed) for n in (1, LARGE))
     averaged = np.column_stack([small, large[:, 2]])
     checks = [

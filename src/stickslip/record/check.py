@@ -223,9 +223,7 @@ def _pairs(first: Rows, width: int = 1) -> Runs:
 def _unstated(record: Record) -> list[Fault]:
     """The clock and the channels whose unit nobody stated, with what they span in the one that was taken."""
     finite = {name: record[name][np.isfinite(record[name])] for name, entry in record.channels.items() if entry.assumed}
-    spans = {
-        name: (record.channels[name].unit, float(np.ptp(values))) for name, values in finite.items() if len(values)
-    }
+    spans = {name: (record.channels[name].unit, float(np.ptp(v))) for name, v in finite.items() if len(v)}
     if not spans:
         return _clock_unstated(record)
     names, units = list(spans), _listed([unit for unit, _ in spans.values()])
@@ -320,9 +318,8 @@ def _shape_faults(name: str, unit: str, values: Array, *, felt: bool) -> list[Fa
     spikes = flaws.spikes(values)
     if spikes:
         what = _several(_count(spikes), "sample that stands off as a spike", "samples that stand off as spikes")
-        faults.append(
-            _fault("spike", name, spikes, what, f'replace them with remove_spikes(record, "{name}")', "spikes")
-        )
+        cure = f'replace them with remove_spikes(record, "{name}")'
+        faults.append(_fault("spike", name, spikes, what, cure, "spikes"))
         values = flaws.held_over(values, flaws.rows_of(spikes, len(values)))
     cut = _clipped(name, unit, values) if felt else None
     if cut is not None:
@@ -336,9 +333,8 @@ def _shape_faults(name: str, unit: str, values: Array, *, felt: bool) -> list[Fa
     rise = flaws.drift(values)
     if rise > DRIFT:
         what = f"a drift of {rise:.2g} times the oscillation's amplitude over the record"
-        faults.append(
-            _fault("drift", name, everywhere, what, f'take it off with remove_drift(record, "{name}")', "drift")
-        )
+        cure = f'take it off with remove_drift(record, "{name}")'
+        faults.append(_fault("drift", name, everywhere, what, cure, "drift"))
     return faults
 
 
@@ -353,9 +349,8 @@ def _clipped(name: str, unit: str, values: Array) -> Fault | None:
     if not cut:
         return None
     what = _several(_count(cut), "sample", "samples") + f" clipped near {_number(values[cut[0][0]], '.4g', unit)}"
-    return _fault(
-        "clipped", name, cut, what, f'mark or rebuild them with restore_clipped(record, "{name}")', "clipping"
-    )
+    cure = f'mark or rebuild them with restore_clipped(record, "{name}")'
+    return _fault("clipped", name, cut, what, cure, "clipping")
 
 
 def _number(value: float, digits: str, unit: str) -> str:

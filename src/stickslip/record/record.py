@@ -295,11 +295,8 @@ class Record:
         for name in names:
             bad = np.flatnonzero(~np.isfinite(self.samples[name]))
             if len(bad):
-                many = (
-                    f"{len(bad)} values that are not numbers, the first"
-                    if len(bad) > 1
-                    else "a value that is no number"
-                )
+                several = f"{len(bad)} values that are not numbers, the first"
+                many = several if len(bad) > 1 else "a value that is no number"
                 raise RecordError(
                     f"channel {name} has {many} at row {bad[0]}",
                     f"{question} needs numbers throughout",
@@ -333,9 +330,8 @@ class Record:
                 f"{', '.join(sorted(unknown))} of channel {name}", f"the details are {', '.join(DETAILS)}", "choose one"
             )
         channels = {**self.channels, name: replace(self.channels[name], **details)}
-        return replace(
-            self, channels=channels, history=(*self.history, Step("with_details", {"name": name, **details}))
-        )
+        step = Step("with_details", {"name": name, **details})
+        return replace(self, channels=channels, history=(*self.history, step))
 
     def with_log(self, log: Log | Mapping[str, Any]) -> Record:
         """This record with what was written down beside it; entries stated before stay where they are not named.
@@ -373,9 +369,8 @@ class Record:
         part = slice(*slice(first, last).indices(len(self)))
         samples = {name: values[part] for name, values in self.samples.items()}
         start = float(self.time[part.start]) if part.start < len(self) else self.start
-        step = Step(
-            "rows", {"first": first, "last": last}, f"{len(range(*part.indices(len(self))))} of {len(self)} rows kept"
-        )
+        kept = len(range(*part.indices(len(self))))
+        step = Step("rows", {"first": first, "last": last}, f"{kept} of {len(self)} rows kept")
         return self.with_samples(samples, step, start=start, stamps=None if self.stamps is None else self.stamps[part])
 
     def between(self, first: float, last: float) -> Record:

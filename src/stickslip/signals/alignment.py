@@ -362,9 +362,8 @@ def _terms(mount: tuple[float, float] | None) -> tuple[float, float]:
 def merged(parts: Iterable[Lines]) -> Lines:
     """The clear lines of all stretches that tell something of a delay or a mount, of what their own stretch tells."""
     clear = [part.chosen(part.clear).telling for part in parts]
-    lines = Lines(
-        *(np.concatenate([getattr(chosen, field.name) for chosen in clear], axis=-1) for field in fields(Lines))
-    )
+    columns = ([getattr(chosen, field.name) for chosen in clear] for field in fields(Lines))
+    lines = Lines(*(np.concatenate(column, axis=-1) for column in columns))
     if len(lines.turn) < 2:
         raise EstimateError(
             "no line of the spectra stands above the noise of either channel",

@@ -228,9 +228,8 @@ def without_delays(record: Record, *channels: str, question: str = "taking delay
     rows = np.arange(first, last, dtype=float)
     kept = {name: values[first:last] for name, values in record.samples.items()}
     moved = kept | {name: band_limited(record.samples[name], rows + shift) for name, shift in shifts.items()}
-    step = Step(
-        "without_delays", {"delays": delays}, f"delays taken out; {last - first} of {len(record)} rows reached by all"
-    )
+    outcome = f"delays taken out; {last - first} of {len(record)} rows reached by all"
+    step = Step("without_delays", {"delays": delays}, outcome)
     result = record.with_samples(moved, step, start=record.start + first / record.fs)
     punctual = {name: replace(record.channels[name], delay=0.0) for name in delays}
     return replace(result, channels={**record.channels, **punctual})

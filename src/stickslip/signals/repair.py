@@ -75,9 +75,8 @@ def repair_clock(record: Record, *, fs: float | None = None, trust: str | None =
     orderly = not (clock.held or len(clock.repeated) or len(clock.backward) or len(clock.missing))
     reason = "as asked"
     if trust is None:
-        trust, reason = (
-            _trusted(record, record.stamps) if orderly else ("samples", "the stamps stand still, repeat or go back")
-        )
+        disorder = "samples", "the stamps stand still, repeat or go back"
+        trust, reason = _trusted(record, record.stamps) if orderly else disorder
     if trust == "stamps":
         return _from_stamps(record, fs or 1 / clock.step, reason)
     if not clock.held and np.ptp(line.late) > 4 * clock.step:  # a clock set anew while recording
@@ -104,9 +103,8 @@ def _relabelled(record: Record, line: Line, fs: float | None, reason: str) -> Re
         f"{len(record)} samples put on a uniform clock of {quoted}; "
         f"the stamps lay within {late:.3g} ms of each other about it ({reason})"
     )
-    return record.with_samples(
-        record.samples, Step("repair_clock", arguments, outcome, "clock"), fs=rate, start=line.start
-    )
+    step = Step("repair_clock", arguments, outcome, "clock")
+    return record.with_samples(record.samples, step, fs=rate, start=line.start)
 
 
 def _trusted(record: Record, stamps: Array) -> tuple[str, str]:
@@ -115,9 +113,8 @@ def _trusted(record: Record, stamps: Array) -> tuple[str, str]:
     for name in record:
         values = record[name]
         if np.isfinite(values).all():
-            by_stamps, by_rows = (
-                _unsmoothness(values, times) for times in (stamps, np.arange(len(values), dtype=float))
-            )
+            rows = np.arange(len(values), dtype=float)
+            by_stamps, by_rows = (_unsmoothness(values, times) for times in (stamps, rows))
             if min(by_stamps, by_rows) > 0:
                 ratios.append(by_stamps / by_rows)
     ratio = float(np.exp(np.mean(np.log(ratios)))) if ratios else 1.0
@@ -369,9 +366,8 @@ def restore_clipped(record: Record, channel: str, *, method: str = "rebuild", le
         runs = flaws.runs_of(np.abs(values) >= level)
     arguments = {"channel": channel, "method": method, "level": level}
     if not runs:
-        return record.with_samples(
-            record.samples, Step("restore_clipped", arguments, "no sample was clipped", "clipping")
-        )
+        step = Step("restore_clipped", arguments, "no sample was clipped", "clipping")
+        return record.with_samples(record.samples, step)
     cut = flaws.rows_of(runs, len(record))
     count = f"{int(cut.sum())} clipped samples of {channel} ({in_words(runs)})"
     if method == "mark":
@@ -381,9 +377,8 @@ def restore_clipped(record: Record, channel: str, *, method: str = "rebuild", le
     rebuilt = np.where(cut, sign * np.maximum(sign * bridge(values, cut), sign * values), values)
     beyond = float(np.max(np.abs(rebuilt - values)))
     outcome = f"{count} rebuilt by autoregression, by up to {beyond:.3g} {unit}: a guess, not a measurement"
-    return _mended(
-        record, {**record.samples, channel: rebuilt}, Step("restore_clipped", arguments, outcome, "clipping")
-    )
+    step = Step("restore_clipped", arguments, outcome, "clipping")
+    return _mended(record, {**record.samples, channel: rebuilt}, step)
 
 
 def remove_drift(record: Record, channel: str, *, order: int | None = None) -> Record:

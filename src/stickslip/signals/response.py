@@ -62,9 +62,8 @@ class Response:
 
         own = [r * value(other, p) for p, r in zip(self.poles, self.residues, strict=True)]
         others = [r * value(self, p) for p, r in zip(other.poles, other.residues, strict=True)]
-        return Response(
-            (*self.poles, *other.poles), (*own, *others), self.direct * other.direct, self.leak + other.leak
-        )
+        poles, direct = (*self.poles, *other.poles), self.direct * other.direct
+        return Response(poles, (*own, *others), direct, self.leak + other.leak)
 
 
 def resonance(frequency: float, damping: float) -> Response:

@@ -313,11 +313,8 @@ def _fold(map_: _Map, last: _Look, tangent: Array, length: float) -> _Look | Non
     low, high, best = 0.0, length, None
     at_low, at_high = last.turn, math.nan
     for turn in range(80):
-        middle = (
-            (low + high) / 2
-            if turn % 3 == 0 or at_high != at_high
-            else low + (high - low) * at_low / (at_low - at_high)
-        )
+        halved = turn % 3 == 0 or at_high != at_high
+        middle = (low + high) / 2 if halved else low + (high - low) * at_low / (at_low - at_high)
         look = _correct(map_, last.point + middle * tangent, last.after, tangent)
         if look is None:
             return best

@@ -200,11 +200,8 @@ def run_curved(
         run.total = last.offsets[-1] + last.lengths[-1] + _lasting(last.laps[-1], table.motion.period)
     if status == "complete":
         tell(1.0)
-        status = (
-            "at rest"
-            if march.rests(run.model.series, run.model.numbers, run.mode, run.state, run.work.step)
-            else status
-        )
+        rests = march.rests(run.model.series, run.model.numbers, run.mode, run.state, run.work.step)
+        status = "at rest" if rests else status
     return _assembled(table, run, status)
 
 

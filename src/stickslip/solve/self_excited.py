@@ -168,9 +168,8 @@ def self_excited(system: System, table: Table, start: Mapping[str, float | str],
         duration *= 2
     none = np.full(table.physical, np.nan, dtype=np.complex128)
     steady = len(motion.modes) == 1 or motion.durations[-1] > 0.5 * duration
-    return SteadyState(
-        "rest" if steady and table.modes[motion.modes[-1]].side == 0 else "not periodic", math.nan, 0, motion, none
-    )
+    status = "rest" if steady and table.modes[motion.modes[-1]].side == 0 else "not periodic"
+    return SteadyState(status, math.nan, 0, motion, none)
 
 
 def _slid_on(motion: Trajectory) -> SteadyState | None:

@@ -298,9 +298,8 @@ def _through(motion: Variation, piece: int, states: tuple[Array, Array], tangent
     run, table, (state, after) = motion.run, motion.tapes[0], states
     mode, following, e = int(run.modes[piece - 1]), int(run.modes[piece]), int(run.exits[piece - 1])
     before, behind = motion.rates(mode, state).value, motion.rates(following, after).value
-    quantity = motion.along(
-        [[(int(one.exits.node[e]), float(one.exits.factor[e]))] for one in motion.tapes], mode, state
-    )
+    exits = [[(int(one.exits.node[e]), float(one.exits.factor[e]))] for one in motion.tapes]
+    quantity = motion.along(exits, mode, state)
     speed = float(quantity.slope[0, :, 0] @ before[:, 0])
     late = (
         -(quantity.slope[0, :, 0] @ tangent + quantity.change[0, :, 0]) / speed if speed else np.zeros(len(motion.near))

@@ -394,9 +394,8 @@ class _Listener:
 
     def _levels(self, rows: slice) -> dict[str, float]:
         references = {name: REFERENCES[self.record.channels[name].unit] for name in self.vibrations}
-        return {
-            name: level(values[rows], references[name], fs=self.record.fs) for name, values in self.vibrations.items()
-        }
+        fs = self.record.fs
+        return {name: level(values[rows], references[name], fs=fs) for name, values in self.vibrations.items()}
 
     def _kind(self, part: Span, harmonics: tuple[tuple[float, float], ...]) -> tuple[str, str, str]:
         """Its kind, whether friction makes it, and why."""

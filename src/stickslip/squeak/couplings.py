@@ -311,9 +311,8 @@ class _Work:
         energies: dict[str, Estimate | None] = dict.fromkeys(ENERGIES)
         if "friction" in record and "v" in record:
             friction, velocity = self.tone("friction"), self.tone("v")
-            energies["energy_per_cycle"] = self.mean(
-                -friction * velocity, "energy that friction gives the vibration in a cycle"
-            )
+            name = "energy that friction gives the vibration in a cycle"
+            energies["energy_per_cycle"] = self.mean(-friction * velocity, name)
             taken = record["friction"] * record["v"]
             energies["dissipated_per_cycle"] = self.mean(taken, "energy that friction takes from the motion in a cycle")
         if "friction" in record and "torsion_velocity" in record and lever is not None:
@@ -321,9 +320,8 @@ class _Work:
             energies["energy_to_torsion"] = self.mean(work, "energy that friction gives the torsion in a cycle")
         if "normal" in record and "normal_acceleration" in record:
             work = -self.tone("normal") * self.integrated("normal_acceleration")
-            energies["energy_to_normal"] = self.mean(
-                work, "energy that the normal force gives the normal motion in a cycle"
-            )
+            name = "energy that the normal force gives the normal motion in a cycle"
+            energies["energy_to_normal"] = self.mean(work, name)
         return energies
 
     @property

@@ -247,9 +247,8 @@ def _rest(stiffness: Array, rubbing: Sequence[Rubbing]) -> tuple[tuple[float, ..
             unpressed = tuple(r.preload for r in rubbing)
             return (math.nan,) * len(place), unpressed, "no spring holds it: the loads are those before it slides"
         pairs = zip(rubbing, loads, strict=True)
-        residual = stiffness @ place + sum(
-            ((load - r.preload) * r.normal + r.at(load) * r.tangent for r, load in pairs), 0
-        )
+        forces = ((load - r.preload) * r.normal + r.at(load) * r.tangent for r, load in pairs)
+        residual = stiffness @ place + sum(forces, 0)
         step = np.linalg.solve(steep, residual)
         place = place - step
         if np.linalg.norm(step) <= np.finfo(float).eps * np.linalg.norm(place):

@@ -223,18 +223,16 @@ def _headline(batch: Batch, leading: Sequence[str]) -> Iterator[str]:
     yield f"{answered} of {len(batch.rows)} records answer{bounds}."
     copies = [row for row in batch.rows if row.same_as]
     if copies:
-        yield Caution(
-            _several(copies, "are copies of others", "is a copy of another", lambda row: f"{row.name} of {row.same_as}")
-        )
+        texts = "are copies of others", "is a copy of another"
+        yield Caution(_several(copies, *texts, lambda row: f"{row.name} of {row.same_as}"))
     refused = [row for row in batch.rows if row.refusal]
     if refused:
         yield Caution(_several(refused, "give no answer", "gives no answer", lambda row: row.refusal.rstrip(".")))
 
 
 def _range(name: str, estimates: Sequence[Estimate]) -> str:
-    low, middle, high = (
-        value_of(estimates[0], float(v)) for v in np.percentile([e.value for e in estimates], [0, 50, 100])
-    )
+    percentiles = np.percentile([e.value for e in estimates], [0, 50, 100])
+    low, middle, high = (value_of(estimates[0], float(value)) for value in percentiles)
     return f"{name} {low} to {high}, median {middle}, in {len(estimates)}"
 
 

@@ -296,9 +296,8 @@ def check_folder(folder: Path) -> None:
 
 
 def _strangers(folder: Path) -> list[str]:
-    present = {
-        path.relative_to(folder).as_posix() for path in folder.rglob("*") if not path.is_dir() or path.is_symlink()
-    }
+    paths = (path for path in folder.rglob("*") if not path.is_dir() or path.is_symlink())
+    present = {path.relative_to(folder).as_posix() for path in paths}
     try:
         numbers = json.loads((folder / NUMBERS).read_text(encoding="utf-8"))
         ours = set(numbers["files"]) if numbers["program"] == PROGRAM else set()

@@ -198,9 +198,8 @@ def _of_level(findings: Findings) -> str:
     doubt = "" if stands(level.status) else f", which is not to be trusted ({level.status})"
     if level.interval[0] == 0:
         return f"no sliding friction is resolved: it is below {value_of(level, level.interval[1])} (95 %){doubt}"
-    how = (
-        ", not tried on twins" if findings.untried else ", with your constants exact" if _taken_exact(findings) else ""
-    )
+    exact = ", with your constants exact" if _taken_exact(findings) else ""
+    how = ", not tried on twins" if findings.untried else exact
     if findings.untried and _uncertain(findings.record):
         how += ", which would count how sure your constants are"
     sure = f"95 %{how}"

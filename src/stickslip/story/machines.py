@@ -45,9 +45,8 @@ def of_tribometer(findings: Findings) -> Story:
 
 def of_tribometers(comparison: Comparison) -> Story:
     """Several tests."""
-    rows = [
-        (one.name, *(value_of(getattr(one.tribometer, name)) for name in DEFINITIONS)) for one in comparison.findings
-    ]
+    tests = [(one.name, one.tribometer) for one in comparison.findings]
+    rows = [(name, *(value_of(getattr(test, kind)) for kind in DEFINITIONS)) for name, test in tests]
     table = Table("Tests", ("test", *(name.replace("_", " ") for name in DEFINITIONS)), rows)
     mean: Estimate = comparison.plateau
     sentence = f"Over {len(rows)} tests the coefficient of friction is {value_of(mean)} (95 %: {interval_of(mean)})."

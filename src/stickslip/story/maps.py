@@ -74,9 +74,8 @@ def _counts(atlas: Any) -> dict[str, int]:
     """How many motions ended in what."""
     status = atlas["status"]
     codes, meanings = status.attrs.get("flag_values", ()), status.attrs.get("flag_meanings", "").split()
-    return {
-        word.replace("_", " "): int(np.sum(status.values == code)) for code, word in zip(codes, meanings, strict=True)
-    }
+    counts = [int(np.sum(status.values == code)) for code in codes]
+    return {word.replace("_", " "): count for word, count in zip(meanings, counts, strict=True)}
 
 
 def _headline(atlas: Any) -> list[str]:
@@ -163,9 +162,7 @@ def _along(diagram: Bifurcation) -> Iterator[str]:
 
 def of_stability(stability: Stability) -> Story:
     """Whether steady sliding lasts, mode by mode."""
-    rows = [
-        (f"{mode.frequency:.5g} Hz", f"{mode.growth:.4g} 1/s", f"{mode.damping_ratio:.3g}") for mode in stability.modes
-    ]
+    rows = [(f"{m.frequency:.5g} Hz", f"{m.growth:.4g} 1/s", f"{m.damping_ratio:.3g}") for m in stability.modes]
     tone = f"at {stability.frequency:.5g} Hz"
     if not stability.stable:
         answer = f"Steady sliding is unstable by {stability.mechanism}: a vibration {tone} {stability.course}."

@@ -295,9 +295,8 @@ def completed(findings: Findings, question: str = "analyze", options: Sequence[s
     clock = next((file["seconds"] for file in read.get("files", ()) if file.get("seconds")), "")
     if clock and not read.get("fs"):
         read["time"] = f"{clock} [s]"
-    missing = [
-        word for name in findings.results.get("lacking", ()) for word in (f"--{name}", f"VALUE {RIG_UNITS[name]}")
-    ]
+    lacking = findings.results.get("lacking", ())
+    missing = [word for name in lacking for word in (f"--{name}", f"VALUE {RIG_UNITS[name]}")]
     if not (missing or assumed or clock):
         return ""
     return _again(findings, question, read, findings.settings, (*options, *missing))

@@ -234,9 +234,8 @@ def outcome(case: Case, *, progress: Callable[[float], object] | None = None) ->
 
 def default_rate(run: Trajectory) -> float:
     """A sampling rate [Hz] that shows the fastest of drive, system and contact, on a round number."""
-    fastest = max(
-        (1 / cycle_of(run), *(tone[2] / (2 * math.pi) for tone in run.table.motion.tones), _fastest_contact(run) / 8)
-    )
+    tones = (tone[2] / (2 * math.pi) for tone in run.table.motion.tones)
+    fastest = max((1 / cycle_of(run), *tones, _fastest_contact(run) / 8))
     wanted = A_PERIOD * fastest
     size = 10.0 ** math.floor(math.log10(wanted))
     rate = next(step * size for step in (1, 2, 5, 10) if step * size >= wanted * (1 - 1e-9))
@@ -402,9 +401,8 @@ def holding(run: Trajectory) -> str:
         count = (1 + int(begins.sum()) - bool(cut)) / cycles
         often = {1.0: "once", 2.0: "twice"}.get(count, f"{count:.2g} times")
         share = float(spans[:, 1].sum()) / (cycles * cycle)
-        holds.append(
-            f"{verb} {often} {each}, {100 * share:.2g} % of the time" if share < 1 - 1e-9 else f"{verb} throughout"
-        )
+        part = f"{verb} {often} {each}, {100 * share:.2g} % of the time"
+        holds.append(part if share < 1 - 1e-9 else f"{verb} throughout")
     return f"{late}he mass {_listed(holds) if holds else 'slides without a stop'}."
 
 

@@ -212,9 +212,8 @@ def _cautions(findings: Findings) -> list[str]:
     for place, burst in enumerate(findings.squeaks.bursts):
         for doubt in doubts_of(burst.status):
             spoilt.setdefault(doubt.words, []).append(str(place + 1))
-    return lines + [
-        f"Burst{'s' if len(places) > 1 else ''} {', '.join(places)}: {part}." for part, places in spoilt.items()
-    ]
+    named = ((f"Burst{'s' if len(places) > 1 else ''} {', '.join(places)}", part) for part, places in spoilt.items())
+    return lines + [f"{bursts}: {part}." for bursts, part in named]
 
 
 def _tables(findings: Findings) -> Iterator[Table]:

@@ -184,9 +184,8 @@ def faulty(faults: Sequence[Fault], *, of: str = "") -> Iterator[Caution]:
     if others:
         more = len(others) - 1
         those = f" ({more} more fault{'s' * (more > 1)} in the record)" if more else ""
-        yield Caution(
-            f"{of}{others[0]}{those}" if more or of else f"The check-up found 1 fault in the record: {others[0]}"
-        )
+        one = f"The check-up found 1 fault in the record: {others[0]}"
+        yield Caution(f"{of}{others[0]}{those}" if more or of else one)
 
 
 def leading(faults: Iterable[Fault]) -> list[Caution]:
