@@ -11,6 +11,7 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
+import click
 import numpy as np
 import pytest
 import scipy.io
@@ -18,6 +19,7 @@ from click.testing import CliRunner, Result
 
 import stickslip as ss
 from stickslip.cli.program import main
+from stickslip.cli.terminal import ARGUMENTS, spoken
 
 PROGRAM = Path(sys.executable).with_name("stickslip")
 FS = 500.0
@@ -494,6 +496,7 @@ def interrupted(*arguments):
     os.kill(os.getpid(), signal.SIGINT)
 folder.write_figures = interrupted
 from stickslip.cli.program import main
+from stickslip.cli.terminal import ARGUMENTS, spoken
 main()
 """
 
@@ -537,3 +540,25 @@ def _processor_seconds(command: list[object]) -> float:
     subprocess.run([str(part) for part in command], capture_output=True, check=True)
     ended = resource.getrusage(resource.RUSAGE_CHILDREN)
     return ended.ru_utime + ended.ru_stime - begun.ru_utime - begun.ru_stime
+
+
+def test_a_next_step_names_what_the_command_at_hand_has() -> None:
+    """`simulate --set mass=-1` asked to correct --mass, and `analyze` for a frequency= that it does not take."""
+    assert 'correct --set "mass=VALUE"' in run("simulate", "FD-1", "--set", "mass=-1").stderr
+    assert 'raise --set "static=VALUE"' in run("simulate", "FD-1", "--set", "law.static=0.1").stderr
+    Path("short.csv").write_text("".join(f"{t:.4f},{np.sin(t):.6f}\n" for t in TIME[:200]))
+    short = run("analyze", "short.csv", "--time", "#1 [s]", "--channels", "x=#2 [m]", "--channels", "z=#2 [m]", *RIG)
+    assert "or frequency= in Python" in short.stderr
+
+
+NAMES = ("mass", "stiffness", "frequency", "channel", "fs", "static", "budget", "torque_constant", "normal", "rows")
+
+
+@pytest.mark.parametrize("command", [name for name, one in main.commands.items() if not isinstance(one, click.Group)])
+def test_no_command_is_told_of_an_option_that_it_has_not(command: str) -> None:
+    own = {option for parameter in main.commands[command].params for option in parameter.opts}
+    with main.make_context("stickslip", [command, "--help"], resilient_parsing=True) as context:
+        context.meta[ARGUMENTS] = [command]
+        told = [spoken(f"correct {name}=, or leave it out") for name in NAMES]
+    assert {word.strip(",") for text in told for word in text.split() if word.startswith("--")} <= own
+    assert spoken("correct mass=") == "correct --mass", "outside of a command"

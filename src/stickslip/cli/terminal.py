@@ -183,11 +183,10 @@ _SPOKEN = (
     (r'\bchannels=\{"(\w+)": "([^"]*)"\}', r'--channels "\1=\2"'),
     (r'\btime="([^"]*)"', r'--time "\1"'),
     (r'\bfriction_force\(record, \.\.\., method="(\w+)"\)', r"--method \1"),
-    (
-        r"\b(channels|channel|frequencies|normal|rows|units|fs|time|delimiter|decimal|method|damper|contact|mass|stiffness|lever|calibration)=(?=\W|$)",
-        r"--\1",
-    ),
+    (r"\brows=\((\d+), (\d+)\)", r"--rows \1:\2"),
 )
+_NAMED = re.compile(r"\b([a-z_]+)=(?=[\s,.;:)]|$)")  # an argument of a function, to be given or corrected
+IN_PYTHON = {"budget", "rtol"}  # of a simulation, and no parameter of a system
 
 
 def spoken(sentence: object) -> str:
@@ -201,7 +200,29 @@ def spoken(sentence: object) -> str:
     text = re.sub(r'\b(\w+)\(record(?:, "(\w+)")?\)', repair, text)
     for phrase, option in _SPOKEN:
         text = re.sub(phrase, option, text)
-    return text
+    options = _options()
+
+    def typed(argument: re.Match[str]) -> str:
+        option = f"--{argument[1].replace('_', '-')}"
+        if not options or option in options:
+            return option
+        settable = "--set" in options and argument[1] not in IN_PYTHON
+        return f'--set "{argument[1]}=VALUE"' if settable else f"{argument[0]} in Python"
+
+    return _NAMED.sub(typed, text)
+
+
+def _options() -> set[str]:
+    """The options of the command that was typed; none outside of one."""
+    context = click.get_current_context(silent=True)
+    if context is None:
+        return set()
+    command: click.Command = context.find_root().command
+    for word in context.meta.get(ARGUMENTS, ()):
+        if isinstance(command, click.Group):
+            command = command.commands.get(word, command)
+    own = command.commands.values() if isinstance(command, click.Group) else [command]
+    return {option for one in own for parameter in one.params for option in parameter.opts}
 
 
 def print_json(results: Mapping[str, Any]) -> None:
