@@ -356,8 +356,8 @@ def _torqued(record: Record, constants: dict[str, Estimate]) -> Record:
         raise RecordError(
             f"no torque: the record has {', '.join(record)}, and {lacks} is missing",
             f"{QUESTION} needs a torque: measured, of a current with its constant, or of a controller with its gains",
-            'name the column of the torque, as in channels={"force": "COLUMN [N m]"}, give --torque-constant of a current, '
-            "or --kp with the reference",
+            'name the column of the torque, as in channels={"force": "COLUMN [N m]"}, give --torque-constant of a '
+            "current, or --kp with the reference",
         )
     return record
 
