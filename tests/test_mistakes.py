@@ -151,6 +151,15 @@ def test_what_moves_otherwise_than_the_mass_is_no_base() -> None:
         assert "is the motion of the base" not in ask("analyze", path, *RIG).output
 
 
+def test_check_names_what_analyze_names() -> None:
+    """It found nothing wrong with a file of which analyze named a unit."""
+    Path("rig.toml").write_text("mass = 2\nstiffness = 3000\ndamping = 1\n")
+    path = written("t [s],x [um],z [mm],a [g]", x=1e3, z=1e3, a=1 / 9.80665)
+    assert "Probably x is in mm, not in um" in " ".join(CliRunner().invoke(main, ["check", str(path)]).stdout.split())
+    right_one = CliRunner().invoke(main, ["check", str(written("t [s],x [m],z [m],a [m/s^2]"))])
+    assert "nothing wrong was found" in right_one.stdout
+
+
 def test_units_that_two_slips_have_left_out_are_to_be_filled_in() -> None:
     """No single slip makes x and z in mm agree with an a in g: read as SI they told a friction a thousand times too
     large, and the command that was to mend it stated what could not be true."""

@@ -44,7 +44,10 @@ def check(file: str, **options: Any) -> None:
                 require_described(record)
             say(f"{record!r}")
             say(f"- {spoken(f'read: {record.history[0].outcome}')}")
-            for fault in [str(fault) for fault in record.check()] or ["nothing wrong was found"]:
+            faults = [str(fault) for fault in record.check()]
+            if (wrong := ss.answers.stated_wrongly([record], rig=rig)) is not None:
+                faults.append(ss.summary(wrong).answer)
+            for fault in faults or ["nothing wrong was found"]:
                 say(f"- {spoken(fault)}")
     for error in refused[:-1]:
         complain(spoken(error))
