@@ -151,6 +151,15 @@ def test_what_moves_otherwise_than_the_mass_is_no_base() -> None:
         assert "is the motion of the base" not in ask("analyze", path, *RIG).output
 
 
+def test_what_is_unsure_of_mounts_is_said_once() -> None:
+    """The delay's own caution was repeated in a note, and the mounts that are not stated in another."""
+    named = ["--channels", "x=plate [mm]", "--channels", "z=base [mm]", "--channels", "a=acc [g]"]
+    told = " ".join(ask("analyze", EXAMPLE, *named, "--mass", "2.42", "--stiffness", "2310", "--all").stdout.split())
+    for words in ("what a mount of a delays", "mounted is not stated"):
+        assert told.count(words) == 1
+    assert "no mount is stated" not in told
+
+
 def test_check_names_what_analyze_names() -> None:
     """It found nothing wrong with a file of which analyze named a unit."""
     Path("rig.toml").write_text("mass = 2\nstiffness = 3000\ndamping = 1\n")

@@ -359,7 +359,7 @@ def _aligned(record: Record, inquiry: Inquiry) -> tuple[Record, SensorDelay | No
         return record, lag
     late = -lag.delay.value
     if lag.status != "ok" and not (REPEATS in kinds(lag.status) and kinds(lag.status) <= {REPEATS, HIDDEN}):
-        inquiry.notes.append(f"The delay of x against a, {1e3 * late:.3g} ms, is not taken out: {lag.status}.")
+        inquiry.notes.append(f"The delay of x against a, {1e3 * late:.3g} ms, is not taken out: it is not sure.")
         return record, lag
     if abs(late) < SURE * lag.delay.sd:
         return record, lag
@@ -437,7 +437,7 @@ def chosen_method(record: Record, rig: RigSettings) -> tuple[str, str]:
         return "fusion", f"{' and '.join(helps)} beside x: all sensors together by a Kalman smoother"
     why = "there is neither an accelerometer nor a load cell"
     if helps:
-        why = f"of {' and '.join(helps)} no mount is stated: state it to have all sensors put together"
+        why = f"state the mount of {' and '.join(helps)} to have all sensors put together"
     if helps and rig.contact == "base":
         why = "the contact is on the moving base"
     return "smoother", f"{why}: the displacement differentiated by a smoother"
