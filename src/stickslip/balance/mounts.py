@@ -249,11 +249,8 @@ def _fused(record: Record, rig: dict[str, Any], question: str) -> Acceleration:
     sd, values = float(np.median(fusion.friction_sd)) / balance.mass, fusion.acceleration
     noise = max(SWINGS * sd, ROUNDED * float(values.std()))
     step = Step("acceleration_of_mass", {"sensors": sensors}, "by a smoother that knows the stated mounts")
-    kept = replace(
-        record,
-        samples={n: v for n, v in record.samples.items() if n != "a"},
-        channels={n: c for n, c in record.channels.items() if n != "a"},
-    )
+    samples = {name: values for name, values in record.samples.items() if name != "a"}
+    kept = replace(record, samples=samples, channels={n: c for n, c in record.channels.items() if n != "a"})
     made = kept.with_channel("a", values, unit="m/s^2", source="acceleration_of_mass", noise=noise, step=step)
     unstated = "" if record.channels["a"].mount is not None else _mount_of(compared, record.fs)
     doubt = "; ".join(filter(None, [_late(compared), unstated])) or _too_loud("a", noise / float(values.std()))

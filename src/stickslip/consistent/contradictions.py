@@ -209,11 +209,8 @@ def silent(record: Record, names: Sequence[str]) -> dict[str, str]:
 
 def silence_checks(record: Record, why: Mapping[str, str]) -> list[Check]:
     """That a channel tells nothing: one that does not change can not be true, of one with gaps nothing is known."""
-    return [
-        Check(f"{name} is heard", math.nan, math.nan, "1", math.nan, UNTOLD if gaps else FAILS, reason)
-        for name, reason in why.items()
-        for gaps in [not np.isfinite(record[name]).all()]
-    ]
+    verdicts = {name: FAILS if np.isfinite(record[name]).all() else UNTOLD for name in why}
+    return [Check(f"{n} is heard", math.nan, math.nan, "1", math.nan, verdicts[n], reason) for n, reason in why.items()]
 
 
 def range_checks(record: Record, names: Sequence[str]) -> list[Check]:
@@ -241,11 +238,9 @@ def sampling_check(record: Record, seen: Seen) -> Check:
     force = record[source] - np.mean(record[source])
     level = float(np.median(np.abs(force)))
     signs = np.sign(force) * (np.abs(force) > CROSSED * level)
-    turning = [
-        (first, last)
-        for first, last in zip(*stretches(signs == 0), strict=True)
-        if first > 0 and last < len(signs) and signs[first - 1] * signs[last] < 0
-    ]
+    pairs = zip(*stretches(signs == 0), strict=True)
+    spans = [(first, last) for first, last in pairs if first > 0 and last < len(signs)]
+    turning = [(first, last) for first, last in spans if signs[first - 1] * signs[last] < 0]
     sides = signs[signs != 0]
     turns = int(np.sum(sides[1:] * sides[:-1] < 0))
     if not turns:

@@ -327,15 +327,8 @@ def momentum_check(seen: Seen) -> Check:
     else:
         return untold(name, "neither an accelerometer nor a load cell that keeps its charge, with mass and stiffness")
     sd = math.hypot(seen.sd(np.asarray(left - right)), seen.tolerance * size)
-    return compared(
-        name,
-        float(np.mean(left)),
-        float(np.mean(right)),
-        sd=sd,
-        unit=unit,
-        holds="what acts on the mass has no mean over whole cycles",
-        fails=sentence,
-    )
+    holds = "what acts on the mass has no mean over whole cycles"
+    return compared(name, float(np.mean(left)), float(np.mean(right)), sd=sd, unit=unit, holds=holds, fails=sentence)
 
 
 def zero_off(seen: Seen) -> Slip | None:

@@ -144,12 +144,9 @@ def transition_of(ringing: Ringing, mass: Constant | None, stiffness: Constant |
     unit = record.channels[channel].unit
     frequency, damping = pooled.possible(ringing.fs)
     wavelet = _by_wavelet([stick.wavelet_frequency for stick in sticks])
-    amplitude = mean_of_cycles(
-        "transition amplitude",
-        [stick.amplitude.value for stick in sticks],
-        unit=unit,
-        method="of the first ring of each stick, at its begin; mean of sticks",
-    )
+    sizes = [stick.amplitude.value for stick in sticks]
+    method = "of the first ring of each stick, at its begin; mean of sticks"
+    amplitude = mean_of_cycles("transition amplitude", sizes, unit=unit, method=method)
 
     doubt = ringing.doubt or not_one_mode(ringing)
 

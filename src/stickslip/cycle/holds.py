@@ -167,12 +167,8 @@ def _hold_at_each_turn(
         if hold is None or slope == 0:
             continue
         end, end_sd = hold
-        yield Hold(
-            trace.start + begin / trace.fs,
-            trace.start + end / trace.fs,
-            float(trace.velocity_sd[turn]) / abs(slope * trace.fs),
-            end_sd / trace.fs,
-        )
+        begin_sd = float(trace.velocity_sd[turn]) / abs(slope * trace.fs)
+        yield Hold(trace.start + begin / trace.fs, trace.start + end / trace.fs, begin_sd, end_sd / trace.fs)
         free = math.ceil(end)
 
 

@@ -302,11 +302,8 @@ def _heard(data: JointData, fit: LeastSquares, terms: tuple[str, ...]) -> bool:
     columns = data.columns(terms, coefficient(fit, terms, "load"), (0.0, 0.0))
     others, late = columns[:, :-1], columns[:, -1]
     beside = late - others @ np.linalg.lstsq(others, late, rcond=None)[0]
-    noises = [
-        noise_level(log.torque, window.fs) * window.noise_of_derivative(1)
-        for log in data.logs
-        if log.torque is not None and (window := log.sliding.window)
-    ]
+    torques = [(log.torque, log.sliding.window) for log in data.logs if log.torque is not None and log.sliding.window]
+    noises = [noise_level(torque, window.fs) * window.noise_of_derivative(1) for torque, window in torques]
     return float(np.mean(beside**2)) > HEARD * float(np.mean(np.square(noises)))
 
 

@@ -188,12 +188,8 @@ def _compliance(strokes: Sequence[Stroke], name: str, unit: str) -> Estimate:
             "a line through the build-up of friction needs more",
             "sample faster",
         )
-    return mean_of_cycles(
-        name,
-        [slope for _, slope in lines],
-        unit=unit,
-        method=f"displacement on friction, {LOW:g} to {HIGH:g} of its level, mean of strokes",
-    )
+    method = f"displacement on friction, {LOW:g} to {HIGH:g} of its level, mean of strokes"
+    return mean_of_cycles(name, [slope for _, slope in lines], unit=unit, method=method)
 
 
 def _backlash(strokes: Strokes) -> Estimate | None:

@@ -208,12 +208,8 @@ def _direction(strokes: Sequence[Stroke], side: str, fs: float) -> tuple[Estimat
         [_ring_of(_mode([_swings(values, degree) for values in cuts], mode.x, fs, degree).x) for degree in DEGREES]
     )
     frequency, damping = _averaged(degrees, np.reshape(without, (-1, 2)), len(cuts), side)
-    amplitude = mean_of_cycles(
-        f"amplitude of that ringing over the friction, {side}",
-        amplitudes,
-        unit="1",
-        method="where each slip begins, mean of strokes",
-    )
+    name, method = f"amplitude of that ringing over the friction, {side}", "where each slip begins, mean of strokes"
+    amplitude = mean_of_cycles(name, amplitudes, unit="1", method=method)
     return frequency, damping, amplitude
 
 

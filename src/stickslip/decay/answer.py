@@ -264,15 +264,9 @@ def _static(candidate: Candidate, ring_down: RingDown) -> Estimate:
     low = max(_pull(fitted, fitted.half_cycles) - error, 0.0) if ring_down.stopped else 0.0
     high = _pull(fitted, fitted.half_cycles - 1) + error
     status = "ok" if ring_down.stopped else "the mass does not come to rest in the record: only an upper bound"
-    return Estimate(
-        "static friction displacement",
-        (low + high) / 2,
-        (low, high),
-        (high - low) / math.sqrt(12),
-        ring_down.unit,
-        "between where it stayed and where it last turned",
-        status,
-    )
+    middle, sd = (low + high) / 2, (high - low) / math.sqrt(12)
+    method = "between where it stayed and where it last turned"
+    return Estimate("static friction displacement", middle, (low, high), sd, ring_down.unit, method, status)
 
 
 def _pull(fitted: Fitted, half_cycles: int) -> float:

@@ -176,15 +176,8 @@ class Candidate:
             reach = student(freedom) * sd
             low, high = value - math.hypot(reach, min(0.0, *moves)), value + math.hypot(reach, max(0.0, *moves))
             sd = (high - low) / (2 * NORMAL_95)
-        return Estimate(
-            name or parameter,
-            factor * value,
-            (factor * low, factor * high),
-            factor * sd,
-            unit,
-            f"least squares, {self.fitted.motion.words}",
-            self._status,
-        )
+        interval, method = (factor * low, factor * high), f"least squares, {self.fitted.motion.words}"
+        return Estimate(name or parameter, factor * value, interval, factor * sd, unit, method, self._status)
 
     @cached_property
     def damping_per_drift(self) -> float:

@@ -179,13 +179,9 @@ def _described(ring_down: RingDown, record: Record) -> RingDown:
 def _from(ring_down: RingDown, first: int) -> RingDown:
     """The ring-down from row `first` on."""
     kept = ring_down.turns >= first
-    return replace(
-        ring_down,
-        first=ring_down.first + first / ring_down.fs,
-        samples=ring_down.samples[first:],
-        turns=ring_down.turns[kept] - first,
-        sound=ring_down.sound[kept],
-    )
+    samples, turns = ring_down.samples[first:], ring_down.turns[kept] - first
+    begin = ring_down.first + first / ring_down.fs
+    return replace(ring_down, first=begin, samples=samples, turns=turns, sound=ring_down.sound[kept])
 
 
 def _from_motion(ring_down: RingDown) -> RingDown:

@@ -117,18 +117,9 @@ def joined(path: Path, streams: Sequence[Stream], notes: Sequence[str] = ()) -> 
 def _titles(streams: Sequence[Stream]) -> list[list[str]]:
     """Of each stream its columns' names: those of joints as they are, others, and what clashes, after the topic."""
     often = Counter(name for stream in streams if stream.named for name in stream.columns)
-    titles = iter(
-        unique(
-            [
-                "time",
-                *(
-                    name if stream.named and often[name] == 1 else f"{stream.topic}/{name}"
-                    for stream in streams
-                    for name in stream.columns
-                ),
-            ]
-        )[1:]
-    )
+    columns = [(stream, name) for stream in streams for name in stream.columns]
+    named = [name if one.named and often[name] == 1 else f"{one.topic}/{name}" for one, name in columns]
+    titles = iter(unique(["time", *named])[1:])
     return [[next(titles) for _ in stream.columns] for stream in streams]
 
 

@@ -148,13 +148,8 @@ class PositionLoad(Rigid):
             Exit({"f": 1.0, "1": -self.kinetic, "x": -self.gradient}, "forward"),
             Exit({"f": -1.0, "1": -self.kinetic, "x": -self.gradient}, "back"),
         )
-        return (
-            self._slip("back", -1),
-            Mode("stuck", "stick", 0, None, stuck),
-            self._slip("forward", 1),
-            self._lifted("back", "forward", -1),
-            self._lifted("forward", "back", 1),
-        )
+        lifted = self._lifted("back", "forward", -1), self._lifted("forward", "back", 1)
+        return (self._slip("back", -1), Mode("stuck", "stick", 0, None, stuck), self._slip("forward", 1), *lifted)
 
     def _slip(self, name: str, side: int) -> Mode:
         friction = {"1": side * self.kinetic, "x": side * self.gradient}

@@ -389,15 +389,8 @@ def _designed(
             "stands still"
         )
     low, high = best.too_small, best.amplitude
-    amplitude = Estimate(
-        "dither amplitude",
-        high,
-        (low, high),
-        (high - low) / math.sqrt(12),
-        unit,
-        f"bisection of exact runs of {search.duration:.4g} s, and 5 %",
-        Status(*_lost(best)),
-    )
+    sd, method = (high - low) / math.sqrt(12), f"bisection of exact runs of {search.duration:.4g} s, and 5 %"
+    amplitude = Estimate("dither amplitude", high, (low, high), sd, unit, method, Status(*_lost(best)))
     rows = tuple((f, math.nan if amplitude is None else amplitude.amplitude) for f, amplitude in tried)
     return Dither(
         best.frequency, amplitude, search.on, speed, system, (stick, with_it), rows, best.scan, averaged, tuple(checks)

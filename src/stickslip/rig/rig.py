@@ -102,11 +102,9 @@ class Shaker:
             "stroke", "velocity" and "force"; more than 1 can not be.
         """
         turn = 2 * math.pi * frequency
-        return {
-            "stroke": amplitude / self.stroke,
-            "velocity": turn * amplitude / self.velocity,
-            "force": (self.moving_mass * turn**2 * amplitude + pull) / self.force,
-        }
+        force = self.moving_mass * turn**2 * amplitude + pull
+        velocity = turn * amplitude
+        return {"stroke": amplitude / self.stroke, "velocity": velocity / self.velocity, "force": force / self.force}
 
     def largest(self, frequency: float, *, pull: float = 0.0) -> float:
         """The largest amplitude [m] at a frequency [Hz], the spring pulling so much [N]; 0 where there is none."""

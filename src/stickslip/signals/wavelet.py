@@ -351,15 +351,8 @@ def wavelet_overview(
     """
     if columns < 2:
         raise RecordError(f"columns = {columns}", "an overview has two columns at least", "ask for more")
-    blocks = wavelet_blocks(
-        source,
-        channel,
-        frequencies=frequencies,
-        voices=voices,
-        wavelet_frequency=wavelet_frequency,
-        normalisation=normalisation,
-        corrected=corrected,
-    )
+    options: dict[str, Any] = {"voices": voices, "wavelet_frequency": wavelet_frequency, "normalisation": normalisation}
+    blocks = wavelet_blocks(source, channel, frequencies=frequencies, corrected=corrected, **options)
     first = last = next(blocks)
     width = 1 << max(0, math.ceil(math.log2(max(1, first.sizes["time"] / columns))))  # samples of a column
     shown = rest = np.empty((first.sizes["frequency"], 0))

@@ -272,11 +272,8 @@ def _pushed(system: System, table: Table, sliding: Stability, push: float) -> tu
     state, mode = opening(table, dict(zip(table.names, map(float, start), strict=False)))
     carried = [one.carried for one in system.contacts] if isinstance(system, Structure) else [1.0]
     sides = [-np.sign(share * system.drive.speed) for share in carried]  # type: ignore[attr-defined]
-    slides = [
-        j
-        for j, joint in enumerate(table.modes)
-        if all(part.kind == "slip" and part.side == side for part, side in zip(_parts(joint), sides, strict=True))
-    ]
+    sliding_to = [[(part.kind, part.side) for part in _parts(joint)] for joint in table.modes]
+    slides = [j for j, parts in enumerate(sliding_to) if parts == [("slip", side) for side in sides]]
     return state, slides[0] if len(slides) == 1 and push < 1 else mode
 
 

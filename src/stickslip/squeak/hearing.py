@@ -141,11 +141,8 @@ class Hearing:
     def _heard(self) -> tuple[tuple[Span, ...], int]:
         active, throughout = self._active()
         least = 2 * self.size if throughout else 0  # in noise, two windows that share no sample have to agree
-        tonal = [
-            part
-            for part in self._tonal_spans()
-            if active[self._frame(part.first) : self._frame(part.last)].any() and part.last - part.first >= least
-        ]
+        spans = [part for part in self._tonal_spans() if part.last - part.first >= least]
+        tonal = [part for part in spans if active[self._frame(part.first) : self._frame(part.last)].any()]
         covered = np.zeros(len(active), dtype=bool)
         for part in tonal:
             covered[self._frame(part.first) : self._frame(part.last) + 1] = True

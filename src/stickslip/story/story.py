@@ -264,15 +264,9 @@ class Line:
     @classmethod
     def of(cls, estimate: Estimate, true: float | None = None, *, name: str = "") -> Line:
         """The row of an estimate, under another name where one is given."""
-        return cls(
-            name or estimate.name,
-            value_of(estimate),
-            interval_of(estimate),
-            None if true is None else value_of(estimate, true),
-            estimate.method,
-            estimate.status,
-            estimate.checks,
-        )
+        shown = None if true is None else value_of(estimate, true)
+        how = estimate.method, estimate.status, estimate.checks
+        return cls(name or estimate.name, value_of(estimate), interval_of(estimate), shown, *how)
 
 
 @dataclass(frozen=True)
