@@ -144,6 +144,8 @@ def test_a_point_without_meaning_is_marked_and_the_rest_stands() -> None:
     swept = ss.sweep(UNIT.having(static=0.6), {"kinetic": [0.5, 0.7]}, settle=2, cycles=2)
     words = dict(zip(swept.status.flag_values, swept.status.flag_meanings.split(), strict=True))
     assert [words[int(code)] for code in swept.status] == ["moving", "no_such_system"]
+    assert "below kinetic" in swept.status.attrs["refused"]
+    assert any("no system: static" in caution for caution in ss.summary(swept).cautions)
     assert math.isnan(swept.amplitude[1])
 
 

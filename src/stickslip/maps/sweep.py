@@ -19,7 +19,7 @@ from stickslip.errors import ModelError, SolveError
 from stickslip.laws.stribeck import TimeDelay
 from stickslip.maps.engines import read_engine
 from stickslip.maps.grid import Grid, apart, read_grid
-from stickslip.maps.measures import EVENTS, FAILED, REPEATS, Measure, Variable, read_measures, variables
+from stickslip.maps.measures import EVENTS, FAILED, NO_SYSTEM, REPEATS, Measure, Variable, read_measures, variables
 from stickslip.maps.plan import BLOCK, Arrays, Keep, Plan, assemble, blank, chunked, required
 from stickslip.maps.store import Store
 from stickslip.oscillator import Oscillator, Structure
@@ -208,7 +208,18 @@ def sweep(
                 raise
             done = len(plan.blocks) - len(kept.missing)
             status = f"interrupted: {done} of {len(plan.blocks)} blocks are there"
-        return kept.dataset(status)
+        return explained(kept.dataset(status), plan)
+
+
+def explained(atlas: Any, plan: Plan) -> Any:
+    """A map whose status has, as `refused`, why the first point that is no system is none."""
+    refused = np.argwhere(atlas["status"].values == NO_SYSTEM)
+    try:
+        if len(refused):
+            plan.at(tuple(refused[0]))
+    except ModelError as error:
+        atlas["status"].attrs["refused"] = f"{error.value}; {error.rule}"
+    return atlas
 
 
 def planned(

@@ -94,6 +94,8 @@ def _cautions(atlas: Any) -> list[str]:
     counts, whole = _counts(atlas), atlas.attrs.get("status", "complete")
     cautions = [] if whole == "complete" else [f"The map is not whole: {whole}."]
     cautions += [f"{counts[word]} points have no answer: {word}." for word in LOST if counts.get(word)]
+    if why := atlas["status"].attrs.get("refused"):
+        cautions.append(f"{counts['no such system']} points are no system: {why}.")
     if sum(size > 1 for size in atlas.sizes.values()) > 2:
         cautions.append(
             f"There is no figure: the map is over {len(atlas.dims)} parameters, and two can be drawn. Choose with "
