@@ -431,3 +431,9 @@ def test_rest_and_sliding_attract_beside_each_other() -> None:
     assert not more
     assert (rest.status, sliding.status) == ("rest", "unique")
     assert sliding.stops == (0, 0)
+
+
+def test_a_run_that_would_fill_the_memory_is_refused_at_once() -> None:
+    """1e9 s of slip and stick asked for 41 GB after minutes, and ended in numpy's words."""
+    with pytest.raises(ss.errors.SolveError, match=r"at most 2e\+08, some 10 GB; simulate a shorter time"):
+        ss.simulate(RIGID, duration=1e9)

@@ -40,6 +40,7 @@ FEW, SHORT = 16, 2048  # pieces and cells of a chunk that Python runs: tenths of
 CELLS = 65536  # Taylor cells between two looks, of a state of up to `SMALL` entries; of larger ones less by the square
 SMALL = 8
 MOST_CELLS = 1e10  # of a run: some hours
+SURE, MOST_PIECES = 1_000_000, 2e8  # after which it is foretold how many a run will keep; of the latter some 10 GB
 PACE = 0.1  # s between two calls of progress
 ORDER = 14  # of the polynomials: a cell turns by a radian or so, and its terms fall as 1 / 14!
 ROUNDING = 1e-13  # of the largest value: a polynomial that stays farther from the level than this does not touch it
@@ -376,6 +377,12 @@ class _Log:
         """Take the pieces just written, and make room for those to come."""
         self.count += count
         self.passed += passed
+        if self.count >= SURE and self.count * total > MOST_PIECES * self.passed:
+            raise SolveError(
+                f"{self.count * total / self.passed:.1e} pieces of motion in {total:g} s, by the first {self.count:g}",
+                f"a run keeps each, and at most {MOST_PIECES:g}, some 10 GB",
+                "simulate a shorter time; a sweep or a steady state keeps none",
+            )
         if self.count < len(self.columns.laps):
             return
         foretold = self.count * min(64.0, 1.05 * total / self.passed) if self.passed > 0 else 0.0
