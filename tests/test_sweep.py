@@ -5,7 +5,10 @@ from __future__ import annotations
 import builtins
 import itertools
 import math
+import signal
 import sys
+import threading
+import time
 from dataclasses import dataclass
 from pathlib import Path
 from types import SimpleNamespace
@@ -377,3 +380,23 @@ def test_a_notebook_shows_one_line_that_is_written_anew(monkeypatch: pytest.Monk
     assert shown[1].startswith("mapping " + 15 * "━" + 15 * "─")
     assert "left 0:00:00" in shown[3]
     assert shown[-1] == ""
+
+
+def test_an_interrupt_waits_for_no_block() -> None:
+    """A block of 4,096 motions, each simulated by itself, took minutes more."""
+    asked = itertools.count(1)
+
+    def slow(run: ss.solve.Trajectory) -> float:
+        if next(asked) == 3:
+            signal.pthread_kill(threading.main_thread().ident, signal.SIGINT)
+        time.sleep(0.02)
+        return run.duration
+
+    grid = {"frequency": np.linspace(0.1, 0.3, 3200)}  # 200 to a block
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background job is deaf to it
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            ss.sweep(UNIT, grid, measures=[slow], settle=0, cycles=1, engine="threads://1")
+    finally:
+        signal.signal(signal.SIGINT, before)
+    assert next(asked) < 150

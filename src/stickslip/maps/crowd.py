@@ -28,13 +28,15 @@ from stickslip.solve.simulate import simulate
 from stickslip.solve.tables import System, Systems, Tables, by_value, kind_of_drive, kind_of_law, opened, oscillators
 from stickslip.solve.trajectory import Event, Trajectory
 
-Watch = Callable[[Given, Counted, int, int], None]  # march what is given into what is left; modes and physical entries
+Heed = Callable[[], None]  # raises where the block is wanted no more
+Watch = Callable[[Given, Counted, int, int, Heed], None]  # march what is given into what is left: its modes and entries
 KINDS = {"stick": log.STICK, "microstick": log.MICROSTICK}
 PARTS = ("law", "drive")
 PATHS = {"micro_slips", "transition_speed", "energy"}  # measures of how far and how fast the contact slips
 KEPT = {"time": np.float64, "kind": np.str_, "mode": np.str_}  # of an event; the rest are whole numbers
 ORDER = 12  # Gauss points of a cell
 SEEN = 8  # looks at a cell for a turn
+AT_ONCE = 64  # motions between two looks at the keyboard: some 0.02 s
 Alone = Callable[[Plan, tuple[int, ...]], Mapping[str, Any]]  # the measures of one point by itself
 
 
@@ -128,7 +130,7 @@ def _starts(plan: Plan, steps: Index) -> dict[str, Array]:
     }
 
 
-def watched(plan: Plan, systems: Systems, start: Mapping[str, Any], watch: Watch) -> Arrays:
+def watched(plan: Plan, systems: Systems, start: Mapping[str, Any], watch: Watch, heed: Heed) -> Arrays:
     """The measures of systems of one kind."""
     table = tables_of(systems)
     named = {measure for measure in plan.measures if isinstance(measure, str)}
@@ -155,7 +157,7 @@ def watched(plan: Plan, systems: Systems, start: Mapping[str, Any], watch: Watch
         np.zeros(count),
         np.full((count, physical, physical), np.nan),
     )
-    watch(given, out, states.shape[1], physical)
+    watch(given, out, states.shape[1], physical, heed)
     answers = _answers(plan, out, units)
     lost = out.statuses == FAILED
     for name, values in answers.items():
@@ -213,9 +215,12 @@ def _answers(plan: Plan, out: Counted, units: Array) -> Arrays:
     return answers
 
 
-def on_cpu(given: Given, out: Counted, size: int, physical: int) -> None:
+def on_cpu(given: Given, out: Counted, size: int, physical: int, heed: Heed) -> None:
     """One motion after another, in one scratch."""
-    watch_all(given, out, rooms(1, size, physical))
+    room, count = rooms(1, size, physical), len(given.states)
+    for first in range(0, count, AT_ONCE):
+        heed()
+        watch_all(given, out, room, first, min(first + AT_ONCE, count))
 
 
 def rooms(count: int, size: int, physical: int) -> Rooms:
@@ -238,7 +243,7 @@ def pasts(count: int) -> Past:
 
 
 def run_block(
-    plan: Plan, number: int, watch: Watch = on_cpu, *, alone: Alone | None = None
+    plan: Plan, number: int, watch: Watch = on_cpu, *, alone: Alone | None = None, heed: Heed = lambda: None
 ) -> tuple[Arrays, Arrays | None]:
     """The answers of one block, by the names of the plan's variables, and its events where they are asked for.
 
@@ -251,13 +256,14 @@ def run_block(
     left = set(range(len(points)))
     logs: list[list[Any]] = []
     for rows, systems, known in crowds(plan, number):
-        values = known if systems is None else watched(plan, systems, known, watch)
+        values = known if systems is None else watched(plan, systems, known, watch, heed)
         for name in columns.keys() & values.keys():
             columns[name][rows] = values[name]
         left -= set(rows.tolist())
     own = [measure for measure in plan.measures if callable(measure)]
     for row in range(len(points)) if own else sorted(left):
         steps = points[row]
+        heed()
         if row in left or columns["status"][row] not in (NO_SYSTEM, FAILED):
             answers = (alone or _alone)(plan, steps) if row in left else _owns(plan, steps, own)
             for name in columns.keys() & answers.keys():

@@ -11,7 +11,7 @@ from numba import cuda
 from numba.cuda.cudadrv.driver import CudaAPIError
 
 from stickslip.errors import ModelError, SolveError
-from stickslip.maps.crowd import rooms, run_block
+from stickslip.maps.crowd import Heed, rooms, run_block
 from stickslip.maps.measures import LOG
 from stickslip.maps.plan import Keep, Plan
 from stickslip.maps.watch import Counted, Given, watch_one
@@ -49,7 +49,8 @@ def _watch_thread(given, out, rooms):
         watch_one(i, i, given, out, rooms)
 
 
-def _watch(given: Given, out: Counted, size: int, physical: int) -> None:
+def _watch(given: Given, out: Counted, size: int, physical: int, heed: Heed) -> None:
+    heed()
     count = len(given.states)
     with _driven():
         written = carried(out)

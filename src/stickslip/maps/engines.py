@@ -12,6 +12,7 @@ from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
 from contextlib import contextmanager
 from itertools import islice
 from logging import CRITICAL
+from threading import Event
 from typing import TYPE_CHECKING, Any
 
 from stickslip.errors import ModelError, SolveError
@@ -39,20 +40,26 @@ def threads(plan: Plan, numbers: Sequence[int], keep: Keep, address: str | None 
     """Run the blocks on as many threads as there are processors, or as `address` says; keep each in this thread.
 
     The kernels let go of Python's lock while they march. No more blocks are under way than twice the threads, so that
-    memory stays flat; on an interrupt those not begun are dropped and those under way are kept.
+    memory stays flat; on an interrupt those that are not done are dropped.
     """
-    count = int(address) if address else processors()
+    count, ended = int(address) if address else processors(), Event()
+
+    def heed() -> None:
+        if ended.is_set():
+            raise KeyboardInterrupt
+
     left = iter(numbers)
     with ThreadPoolExecutor(count, "sweep") as pool:
-        running = {pool.submit(run_block, plan, number): number for number in islice(left, 2 * count)}
+        running = {pool.submit(run_block, plan, number, heed=heed): number for number in islice(left, 2 * count)}
         try:
             while running:
                 for task in wait(running, return_when=FIRST_COMPLETED).done:
                     keep(running.pop(task), *task.result())
-                    running |= {pool.submit(run_block, plan, number): number for number in islice(left, 1)}
+                    running |= {pool.submit(run_block, plan, number, heed=heed): number for number in islice(left, 1)}
         except KeyboardInterrupt:
+            ended.set()
             for task, number in running.items():
-                if not task.cancel():
+                if not task.cancel() and task.exception() is None:
                     keep(number, *task.result())
             raise
 

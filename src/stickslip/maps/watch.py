@@ -467,7 +467,7 @@ def _inside(linear, mode, moving, span, turns, varies, friction, slip, sums, wor
 
 
 @compiled(**OPTIONS, nogil=True)
-def watch_all(given, out, rooms):
-    """One motion after another, in one scratch."""
-    for i in range(given.states.shape[0]):
+def watch_all(given, out, rooms, first, last):
+    """One motion after another, from the first up to the last, in one scratch."""
+    for i in range(first, last):
         watch_one(i, 0, given, out, rooms)

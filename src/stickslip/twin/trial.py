@@ -19,7 +19,7 @@ from stickslip.record.record import Record
 from stickslip.statistics import BINS, repeating, student
 from stickslip.twin import descent
 from stickslip.twin.belief import EXCESS, GIVE, KINETIC, RATE, SLOPE, Belief, Fit, levelled
-from stickslip.twin.search import CHANCE
+from stickslip.twin.search import CHANCE, CLOSE
 from stickslip.workers import Map
 
 Answers = Mapping[str, Estimate]
@@ -399,7 +399,7 @@ def _apart(belief: Belief, value: Callable[[Belief], float]) -> list[float]:
     low, high = _reached(belief, value, NORMAL_95)
     for rig in belief.rivals:
         further = rig.fit.freedom * math.log(left[rig] / nearest) if rig.fit is not None else math.inf
-        if further > NORMAL_95**2 and not rig.held:  # of a grid over a value that is held, the end lies between two
+        if further > CLOSE:  # near the law that is believed in, which is not the nearest
             continue
         least, most = _reached(rig, value, math.sqrt(min(max(0.0, NORMAL_95**2 - further), NORMAL_95**2)))
         more = value(rig) - value(belief)
