@@ -18,7 +18,7 @@ from stickslip.arrays import Array
 from stickslip.drives.kinds import Drive, Release, require_drive
 from stickslip.drives.on_another import Both
 from stickslip.errors import ModelError
-from stickslip.laws.base import Exit, Law, Mode, Row
+from stickslip.laws.base import Exit, Law, Mode, loads_of, of_speed
 from stickslip.laws.coulomb import Coulomb, LinearSlope
 from stickslip.laws.curved import (
     Creeping,
@@ -132,8 +132,8 @@ class Contact:
 
     def _require(self, pressed: str, where: str) -> None:
         """Refuse a law whose forces are not all proportional to the load."""
-        if pressed not in _loads(self.law):
-            fitting = [name for name, law in registered().items() if pressed in _loads(law)]
+        if pressed not in loads_of(self.law):
+            fitting = [name for name, law in registered().items() if pressed in loads_of(law)]
             raise ModelError(
                 f"{type(self.law).__name__} {where}",
                 "its forces are not proportional to the load in every mode",
@@ -173,7 +173,7 @@ class Contact:
             return mode
         if mode.friction is not None:
             mode = replace(mode, friction={**mode.friction, "v": mode.friction["v"] * self.preload})
-        return replace(mode, exits=tuple(replace(exit_, quantity=_of_speed(exit_.quantity)) for exit_ in mode.exits))
+        return replace(mode, exits=tuple(replace(exit_, quantity=of_speed(exit_.quantity)) for exit_ in mode.exits))
 
     def _followed(self, exit_: Exit) -> Exit:
         """A stop at zero velocity, as it is while the load changes the deflection of a compliant contact.
@@ -300,19 +300,6 @@ class Structure:
         Structure
         """
         return changed(self, changes)
-
-
-def _loads(law: object) -> tuple[str, ...]:
-    """By which of its parameters a contact may press a law: what of them all its forces are proportional to."""
-    loads = getattr(law, "loads", ())
-    return loads if isinstance(loads, tuple) else ()  # of a class whose laws differ in it: it is not told
-
-
-def _of_speed(quantity: Row) -> Row:
-    """An exit's quantity in which a bound on the speed is no share of the load."""
-    if "v" not in quantity:
-        return quantity
-    return {"always" if name == "1" else name: share for name, share in quantity.items()}
 
 
 def _require_directions(contacts: Sequence[Contact], size: int) -> None:

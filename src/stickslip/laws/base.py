@@ -96,6 +96,19 @@ class Law(Protocol):
         """The table."""
 
 
+def loads_of(law: object) -> tuple[str, ...]:
+    """By which of its parameters a contact may press a law: what of them all its forces are proportional to."""
+    loads = getattr(law, "loads", ())
+    return loads if isinstance(loads, tuple) else ()  # of a class whose laws differ in it: it is not told
+
+
+def of_speed(quantity: Row) -> Row:
+    """An exit's quantity in which a bound on the speed is no share of the load."""
+    if "v" not in quantity:
+        return quantity
+    return {"always" if name == "1" else name: share for name, share in quantity.items()}
+
+
 @dataclass(frozen=True)
 class Rigid:
     """What a rigid contact has in common with others: no memory, no places, slip to either side or stick."""
