@@ -39,3 +39,18 @@ def test_a_damped_contact_is_found_from_along_its_valley() -> None:
             end = descent.refined(replace(best.at(**along), fit=None))
             assert best.fit.freedom * math.log(descent.misfit(end) / descent.misfit(best)) < 1
             assert end.contact == pytest.approx(RIG.contact, rel=0.01)
+
+
+def test_values_that_x_does_not_tell_apart_have_a_step_without_noise_too() -> None:
+    """A mass, a spring and a friction in one proportion move nothing: without noise no damping held them (singular)."""
+    slider = ss.Oscillator(mass=2.0, stiffness=800, law=ss.laws.Coulomb(1.0), drive=ss.drives.HarmonicBase(4e-3, 2.0))
+    record = ss.Rig.perfect("x", "z").measure(ss.simulate(slider, duration=3), fs=500, rng=1)
+    told = ss.friction_force(record, mass=(2.0, 0.02), stiffness=(800.0, 8.0), damping=(0.0, 0.1))
+    (drive,) = search.possible_drives(told, slider.drive)
+    simple = search._linear(told, slider, drive)
+    still = replace(simple, unsure={"mass": 1e-2, "spring": 1e-2}).at(mass=0.0, spring=0.0)
+    with np.errstate(all="raise"):
+        fit = descent.linearised(still).fit
+        assert fit is not None
+        for damping in descent.DAMPINGS:
+            assert np.isfinite(descent._towards(still, fit, damping)).all()

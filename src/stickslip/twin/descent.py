@@ -80,7 +80,9 @@ def _towards(belief: Belief, fit: Fit, damping: float = DAMPINGS[0]) -> Array:
     reach = np.array([belief.reach(name) for name in fit.names])
     seen = fit.normal * np.outer(reach, reach)
     pulled = seen @ ((fit.gain @ belief.residual - fit.pull) / reach)
-    damped = seen + damping * belief.noise**2 * np.eye(len(reach))  # what x hardly tells holds the others back no more
+    # what x hardly tells holds the others back no more; never below rounding, which leaves nothing of noise
+    least = damping * max(belief.noise**2, float(np.finfo(float).eps * np.trace(seen)))
+    damped = seen + least * np.eye(len(reach))
     step, free = np.zeros(len(reach)), np.ones(len(reach), dtype=bool)
     while True:
         step[free] = np.linalg.solve(damped[np.ix_(free, free)], pulled[free])
