@@ -52,6 +52,18 @@ def test_without_a_question_all_is_recognised_and_analyze_needs_no_option() -> N
     assert told.stderr.startswith("stickslip: columns and constants by rig.toml")
 
 
+def test_a_sound_beside_it_has_channels_of_its_own() -> None:
+    """Of a file that holds nothing but sound the columns of the rig's records were asked for."""
+    Path("rig.toml").write_text('mass = "2 kg"\n[channels]\nx = "`Weg Schlitten` [mm]"\n')
+    noise = 0.1 * np.random.default_rng(1).standard_normal(20000)
+    ss.squeak.write_sound(ss.Record.of({"sound": noise}, units={"sound": "FS"}, fs=20000.0), "noise.wav")
+    told = CliRunner().invoke(main, ["check", "noise.wav"])
+    assert told.exit_code == 0, told.output
+    assert "sound" in told.stdout
+    refused = CliRunner().invoke(main, ["check", "noise.wav", "--config", "rig.toml"])
+    assert "there is no column 'Weg Schlitten'" in refused.stderr
+
+
 def test_what_nobody_states_is_called_a_guess() -> None:
     written("Zeit (ms);Weg Schlitten;Reibkraft (N)")
     result = CliRunner().invoke(main, ["init", "versuch.csv", "--yes"])

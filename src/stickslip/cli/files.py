@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 @reading_options
 def check(file: str, **options: Any) -> None:
     """Tell what is wrong with a record, with row numbers."""
-    rig = rig_of(**options)
+    rig = rig_of(file, **options)
     refused: list[ss.StickslipError] = []
     groups = groups_of(file)
     for group in groups:
@@ -67,7 +67,7 @@ def convert(file: str, out: Path, force: bool, **options: Any) -> None:
         raise click.BadParameter(f"'{out}' is the file to be read", param_hint="OUT")
     if out.exists() and not force:
         raise click.BadParameter(f"'{out}' is there already; --force writes over it", param_hint="OUT")
-    record = require_described(ss.answers.read_mended(files, rig=rig_of(**options)))
+    record = require_described(ss.answers.read_mended(files, rig=rig_of(file, **options)))
     say(ss.write_record(record, out, overwrite=force))
 
 

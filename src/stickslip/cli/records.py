@@ -29,7 +29,7 @@ RIG_FILE = "rig.toml"  # of the folder one is in: read where no other is named
 
 
 def rig_of(
-    *,
+    *files: str,
     config: Path | None,
     channels: Sequence[str],
     units: Sequence[str],
@@ -41,8 +41,10 @@ def rig_of(
 ) -> RigSettings:
     """The settings of the file, with those of the command line in front; rig.toml of this folder is that file.
 
-    A rig.toml is looked for only if it may be `here`.
+    A rig.toml is looked for only if it may be `here`; not where all `files` are sounds, which have none of its columns.
     """
+    parts = [Path(part) for file in files for part in file.split("+")]
+    here = here and not (parts and all(map(ss.squeak.is_sound, parts)))
     if config is None and here and Path(RIG_FILE).is_file():
         config = Path(RIG_FILE)
         complain(f"columns and constants by {RIG_FILE}")

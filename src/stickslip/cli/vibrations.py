@@ -229,7 +229,7 @@ def squeak(
     stickslip squeak wet_6N.csv wet_1N.csv --normal "*6N*=6.13" --normal "*1N*=1.23"
     """
     places = Places.of(options)
-    rig = rig_of(**options)
+    rig = rig_of(*files, **options)
     groups = groups_of(*files)
     require_fits(options["normal"], groups)
     usual = Path(f"{groups[0][0].stem}-squeak" if len(groups) == 1 else "squeaks-compared")
@@ -260,7 +260,7 @@ def wavelet(file: str, output: Output, frequencies: str | None, **options: Any) 
     """
     files = files_of(file, "one is mapped at a time")
     query = {key: options.pop(key) for key in ("channel", "wavelet_frequency", "normalisation")}
-    rig = rig_of(**options)
+    rig = rig_of(file, **options)
     with progress(2) as tell:
         tell(f"reading {name_of(files)}", 0)
         parts = _told_of(ss.answers.read_parts(files, rig=rig, size=BLOCK), tell)

@@ -23,6 +23,26 @@ def recognise(path: Path, head: bytes) -> bool:
     return (head[:4] in (b"RIFF", b"RF64", b"RIFX") and head[8:12] == b"WAVE") or head[:4] in (b"fLaC", b"OggS")
 
 
+def is_sound(path: Path) -> bool:
+    """Whether a file is a sound by its name, which has channels of its own: no rig's columns are looked for in it.
+
+    Parameters
+    ----------
+    path : Path
+        It need not be there.
+
+    Returns
+    -------
+    bool
+
+    Examples
+    --------
+    >>> is_sound(Path("chalk.OGG")), is_sound(Path("run.csv"))
+    (True, False)
+    """
+    return path.suffix.lower() in SUFFIXES
+
+
 def read(path: Path, options: Options) -> Table:
     """One column a channel: "sound" where there is one, else "ch1", "ch2" ..., in units of full scale."""
     soundfile = optional("soundfile")

@@ -1,3 +1,4 @@
+from stickslip.files.audio import is_sound as is_sound
 from stickslip.squeak.bifurcation import CycleBranches as CycleBranches
 from stickslip.squeak.bifurcation import Threshold as Threshold
 from stickslip.squeak.bifurcation import critical_value as critical_value
