@@ -25,7 +25,7 @@ def nearest() -> Belief:
     loss = RIG.loss / math.sqrt(RIG.contact * RIG.mass)
     true = {GIVE: math.log(RIG.contact), LOSS: loss, BENT: 0.0, KINETIC: RIG.kinetic, SLOPE: 0.0}
     begun = replace(simple.as_stated().at(**true), held=LOSS, fit=None)
-    led = search._led(begun, [told.rows(0, samples) for samples in search._horizons(told)])
+    led = search._descended_along(begun, [told.rows(0, samples) for samples in search._horizons(told)])
     return descent.refined(replace(led, record=told, held=""))
 
 
@@ -53,4 +53,4 @@ def test_values_that_x_does_not_tell_apart_have_a_step_without_noise_too() -> No
         fit = descent.linearised(still).fit
         assert fit is not None
         for damping in descent.DAMPINGS:
-            assert np.isfinite(descent._towards(still, fit, damping)).all()
+            assert np.isfinite(descent._damped_step(still, fit, damping)).all()

@@ -322,7 +322,7 @@ class Belief:
         """As far as a value may be moved at once: further away its slope tells nothing."""
         return REACH * self.unsure[name] if name in self.unsure else self.size(name)
 
-    def first_felt(self, parts: Iterable[Values], deviations: float) -> Values | None:
+    def first_detectable(self, parts: Iterable[Values], deviations: float) -> Values | None:
         """The first of ever larger parts that moves x by more deviations than the other values could take up."""
         fit, still = self.fit, self.moved
         assert fit is not None
@@ -362,7 +362,7 @@ class Belief:
                 rig = rig.having(sensor.channel, noise=measured)
         return replace(self, rig=rig)
 
-    def told_by(self, x: Array) -> Belief:
+    def fitted_to(self, x: Array) -> Belief:
         """The rig that a twin would have been believed to be by its displacement, by the same linear fit."""
         if self.fit is None:
             return self

@@ -47,11 +47,11 @@ def descended(belief: Belief, passes: int, *, roughly: bool = False) -> tuple[Be
     """The nearest after so many passes, and whether its slopes were taken just there; roughly, noise is an end."""
     belief, fresh, taken = linearised(belief), True, 1
     while not (roughly and belief.like_noise):
-        before, moved = misfit(belief), _step(belief)
+        before, moved = misfit(belief), _downhill(belief)
         if moved is not None and misfit(moved) < LEARNS * before:
-            belief, fresh = _learned(belief, moved), False
+            belief, fresh = _updated_by_broyden(belief, moved), False
             continue
-        ended = fresh and (moved is None or _gained(belief, moved) < SETTLED)
+        ended = fresh and (moved is None or _chi_squared_gained(belief, moved) < SETTLED)
         if moved is not None:
             belief, fresh = moved, False
         if ended or taken >= passes:
@@ -60,22 +60,22 @@ def descended(belief: Belief, passes: int, *, roughly: bool = False) -> tuple[Be
     return belief, fresh
 
 
-def _gained(before: Belief, after: Belief) -> float:
+def _chi_squared_gained(before: Belief, after: Belief) -> float:
     """By how much less chi-squared is, of as many independent samples as a belief has that was linearised."""
     assert before.fit is not None
     return before.fit.freedom * math.log(misfit(before) / misfit(after))
 
 
-def _step(belief: Belief) -> Belief | None:
+def _downhill(belief: Belief) -> Belief | None:
     """Nearer to the record by its own slopes; None where no step leads nearer, however damped."""
     fit = belief.fit
     assert fit is not None
     before = misfit(belief)
-    moved = (belief.by(fit.names, _towards(belief, fit, damping)) for damping in DAMPINGS)
+    moved = (belief.by(fit.names, _damped_step(belief, fit, damping)) for damping in DAMPINGS)
     return next((nearer for nearer in moved if misfit(nearer) < before), None)
 
 
-def _towards(belief: Belief, fit: Fit, damping: float = DAMPINGS[0]) -> Array:
+def _damped_step(belief: Belief, fit: Fit, damping: float = DAMPINGS[0]) -> Array:
     """Gauss's and Newton's step, damped as Levenberg's and Marquardt's, and within the values' reach."""
     reach = np.array([belief.reach(name) for name in fit.names])
     seen = fit.normal * np.outer(reach, reach)
@@ -93,7 +93,7 @@ def _towards(belief: Belief, fit: Fit, damping: float = DAMPINGS[0]) -> Array:
         step[~free] = 0.0
 
 
-def _learned(before: Belief, moved: Belief) -> Belief:
+def _updated_by_broyden(before: Belief, moved: Belief) -> Belief:
     """With slopes that the step has shown, and no simulation more: Broyden's rule, each value by what it moves."""
     fit = before.fit
     assert fit is not None

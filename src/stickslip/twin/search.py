@@ -128,10 +128,10 @@ def believe(record: Record, *, mapped: Map = map) -> Belief:
     )
     drives = possible_drives(record, HarmonicBase(0.0, frequency=1.0, contact=stated.contact))
     simple = min((_linear(record, oscillator, drive) for drive in drives), key=misfit)
-    belief = _needed(_richer(_needed(simple, SLOPE, KINETIC), mapped), SLOPE)
+    belief = _without_chance(_richer(_without_chance(simple, SLOPE, KINETIC), mapped), SLOPE)
     belief = _with_slips(belief, simple, mapped)
     measured = belief.with_measured_noise()  # which, slow, weighs less against what is stated of the constants
-    return belief if measured is belief else _over(measured, record)
+    return belief if measured is belief else _refined_on(measured, record)
 
 
 def _linear(record: Record, oscillator: Oscillator, drive: DriveFrom) -> Belief:
@@ -142,7 +142,7 @@ def _linear(record: Record, oscillator: Oscillator, drive: DriveFrom) -> Belief:
     begun = Belief(record, oscillator, values, drive, Rig(tuple(_sensors(record))), unsure)
     # where the sensor has an offset, the rest position is nearer to its mean than to its zero
     begun = min(begun, begun.at(x=values["x"] - float(record["x"].mean())), key=misfit)
-    led = _led(begun, [record.rows(0, samples) for samples in _horizons(record)])
+    led = _descended_along(begun, [record.rows(0, samples) for samples in _horizons(record)])
     return refined(replace(led, record=record))
 
 
@@ -168,15 +168,15 @@ def lacking(record: Record) -> StickslipError | None:
     return None
 
 
-def _needed(belief: Belief, *parts: str) -> Belief:
+def _without_chance(belief: Belief, *parts: str) -> Belief:
     """Without those parts, asked in turn, that chance would have shown too."""
     for part in parts:
-        if part in belief.values and not _stands_out(belief, part):
+        if part in belief.values and not _significant(belief, part):
             belief = refined(belief.without(part))
     return belief
 
 
-def _stands_out(belief: Belief, part: str) -> bool:
+def _significant(belief: Belief, part: str) -> bool:
     """Whether a value is further from zero than chance would bring it."""
     from scipy.special import stdtrit  # half a second, where nothing else of an analysis loads it
 
@@ -188,20 +188,20 @@ def _stands_out(belief: Belief, part: str) -> bool:
 
 def _richer(simple: Belief, mapped: Map) -> Belief:
     """With the parts that leave the least of the displacement, where that is less than chance would leave."""
-    laws = _led_by(_parts(simple), simple.record, mapped)
+    laws = _search(_candidates(simple), simple.record, mapped)
     # their chances say nothing of each other: each counts as many independent samples as its own residual has
-    best = _simplest([law for law in laws if _by_chance(simple, law) < CHANCE] or [simple])
+    best = _simplest([law for law in laws if _p_value(simple, law) < CHANCE] or [simple])
     if GIVE in best.values:
-        softer = _led_by(_softer(best), simple.record, mapped)
+        softer = _search(_compliant_candidates(best), simple.record, mapped)
         damped = [replace(law, held="") for law in softer if law.held == LOSS]
         laws += [law for law in softer if law.held != LOSS]
-        laws += _unlike(sorted(mapped(partial(_over, record=simple.record), damped), key=misfit))
+        laws += _distinct(sorted(mapped(partial(_refined_on, record=simple.record), damped), key=misfit))
         best = _simplest([law for law in laws if {GIVE, RATE} & law.values.keys()])
     if SPEED in best.values:
-        laws += _led_by(_stretched(best), simple.record, mapped)
+        laws += _search(_stribeck_candidates(best), simple.record, mapped)
     elif GIVE in best.values:
-        laws += _led_by(_falling(best), simple.record, mapped)
-    return replace(best, rivals=tuple(law for law in laws if law is not best and _as_near(law, best)))
+        laws += _search(_falling_candidates(best), simple.record, mapped)
+    return replace(best, rivals=tuple(law for law in laws if law is not best and _as_likely(law, best)))
 
 
 def _with_slips(belief: Belief, simple: Belief, mapped: Map) -> Belief:
@@ -209,28 +209,28 @@ def _with_slips(belief: Belief, simple: Belief, mapped: Map) -> Belief:
 
     Where x asks for it, it is a rival; where it leaves so much less that nothing else will do, it is believed in.
     """
-    asked = [_off(belief, name) for name in SLIPS if _asks_for(belief, name)]
-    slips = list(mapped(partial(_over, record=belief.record), asked))
+    asked = [_with_slip(belief, name) for name in SLIPS if _score_favours(belief, name)]
+    slips = list(mapped(partial(_refined_on, record=belief.record), asked))
     # x late by 1 % of a cycle has looked like 8 times the static friction
     if {EXCESS, GIVE, RATE} & belief.values.keys():
-        begun = [_off(simple.as_stated(), name) for name in SLIPS]
-        slips += [law for law in mapped(partial(_led_beside, beside=belief), begun) if law is not None]
+        begun = [_with_slip(simple.as_stated(), name) for name in SLIPS]
+        slips += [law for law in mapped(partial(_descended_beside, beside=belief), begun) if law is not None]
     nearest = min([belief, *slips], key=misfit)
     freedom = 0.0 if nearest.fit is None else nearest.fit.freedom
     # x tells a spring that is off from a mass that is by rounding alone: the first of those that are as near
     nearest = next(law for law in [belief, *slips] if freedom * math.log(misfit(law) / misfit(nearest)) <= SETTLED)
     best = nearest if freedom * math.log(misfit(belief) / misfit(nearest)) > CERTAIN else belief
-    rivals = (law for law in (*belief.rivals, *slips) if law is not best and _as_near(law, best))
+    rivals = (law for law in (*belief.rivals, *slips) if law is not best and _as_likely(law, best))
     return replace(best, rivals=tuple(rivals))
 
 
-def _off(belief: Belief, name: str) -> Belief:
+def _with_slip(belief: Belief, name: str) -> Belief:
     """The same with one constant, or the clock of x, off by as much as x asks for."""
     unsure = {other: sd for other, sd in belief.unsure.items() if other != name}
     return replace(belief.at(**{KINETIC: belief.values.get(KINETIC, 0.0), name: 0.0}), unsure=unsure)
 
 
-def _asks_for(belief: Belief, name: str) -> bool:
+def _score_favours(belief: Belief, name: str) -> bool:
     """Whether x would be nearer with that constant off, than chance brings it (a score test)."""
     fit = belief.fit
     if name in belief.unsure or fit is None:
@@ -240,67 +240,68 @@ def _asks_for(belief: Belief, name: str) -> bool:
     return float(column @ belief.residual) ** 2 > SLIPPED * float(column @ column) * fit.weight
 
 
-def _led_by(families: list[list[Belief]], record: Record, mapped: Map) -> list[Belief]:
+def _search(families: list[list[Belief]], record: Record, mapped: Map) -> list[Belief]:
     """The nearest of each family and others as near, over the whole record where its beginning allows them."""
     horizons = [record.rows(0, samples) for samples in _horizons(record)]
     # what a process is sent is short: with the whole record and its slopes 200 starts were 3 GB
     families = [[replace(begun, record=horizons[0], fit=None) for begun in family] for family in families]
-    families = _further(families, _followed, mapped)
-    families = _further([family[:STARTS] for family in families], partial(_tried, passes=1), mapped)
+    families = _advanced(families, _evaluated, mapped)
+    families = _advanced([family[:STARTS] for family in families], partial(_descended, passes=1), mapped)
     families = [family[: 1 if family[0].held else KEPT] for family in families]
     for beginning in horizons:  # starts that have come to one valley go on as one
-        families = [_unlike(family) for family in _further(families, partial(_led_over, record=beginning), mapped)]
-    families = _further(families, _sloping, mapped)
-    nearest = [law for family in families for law in _ends(family)]
+        step = partial(_descended_on, record=beginning)
+        families = [_distinct(family) for family in _advanced(families, step, mapped)]
+    families = _advanced(families, _with_slope, mapped)
+    nearest = [law for family in families for law in _minima(family)]
     least: float = min(misfit(law) for law in nearest)
-    return list(mapped(partial(_over, record=record), [law for law in nearest if misfit(law) <= FAR * least]))
+    return list(mapped(partial(_refined_on, record=record), [law for law in nearest if misfit(law) <= FAR * least]))
 
 
-def _further(families: list[list[Belief]], step: Callable[[Belief], Belief], mapped: Map) -> list[list[Belief]]:
+def _advanced(families: list[list[Belief]], step: Callable[[Belief], Belief], mapped: Map) -> list[list[Belief]]:
     """All families a step further, each with its nearest first; in one round, so that no process waits for another."""
     moved = iter(mapped(step, [begun for family in families for begun in family]))
     return [sorted(itertools.islice(moved, len(family)), key=misfit) for family in families]
 
 
-def _followed(begun: Belief) -> Belief:
+def _evaluated(begun: Belief) -> Belief:
     """The same, with what it leaves of its record."""
     misfit(begun)
     return begun
 
 
-def _led_over(begun: Belief, record: Record) -> Belief:
+def _descended_on(begun: Belief, record: Record) -> Belief:
     """The nearest over so much of a record."""
-    return _tried(replace(begun, record=record), STEPS)
+    return _descended(replace(begun, record=record), STEPS)
 
 
-def _sloping(led: Belief) -> Belief:
+def _with_slope(led: Belief) -> Belief:
     """With a slope against speed, where it was led without."""
-    return led if SLOPE in led.values else _tried(led.at(**{SLOPE: 0.0}), STEPS)
+    return led if SLOPE in led.values else _descended(led.at(**{SLOPE: 0.0}), STEPS)
 
 
-def _unlike(family: list[Belief]) -> list[Belief]:
+def _distinct(family: list[Belief]) -> list[Belief]:
     """One of each end to which the searches of a family have come, the nearest first."""
     apart: list[Belief] = []
     for belief in family:
-        if not any(_same(belief, other) for other in apart):
+        if not any(_same_minimum(belief, other) for other in apart):
             apart.append(belief)
     return apart
 
 
-def _ends(family: list[Belief]) -> list[Belief]:
+def _minima(family: list[Belief]) -> list[Belief]:
     """Of one family's ends the nearest, and others as near."""
     best, *others = family
-    return [best, *(other for other in others if _as_near(other, best) and not _same(other, best))]
+    return [best, *(other for other in others if _as_likely(other, best) and not _same_minimum(other, best))]
 
 
-def _led_beside(begun: Belief, beside: Belief) -> Belief | None:
+def _descended_beside(begun: Belief, beside: Belief) -> Belief | None:
     """The nearest over the whole record; None once it is left behind by another law."""
     for samples in _horizons(beside.record):
         record = beside.record.rows(0, samples)
-        begun = _led_over(begun, record)
+        begun = _descended_on(begun, record)
         if misfit(begun) > FAR * misfit(replace(beside, record=record)):
             return None
-    return _over(begun, beside.record)
+    return _refined_on(begun, beside.record)
 
 
 def _simplest(laws: list[Belief]) -> Belief:
@@ -310,18 +311,18 @@ def _simplest(laws: list[Belief]) -> Belief:
     return min(laws, key=lambda law: freedom * math.log(misfit(law)) + CLOSE * len(law.values))
 
 
-def _as_near(law: Belief, best: Belief) -> bool:
+def _as_likely(law: Belief, best: Belief) -> bool:
     """Whether a law leaves no more than chance would, were it the one that wrote the record."""
     return best.fit is not None and best.fit.freedom * math.log(misfit(law) / misfit(best)) < CLOSE
 
 
-def _same(one: Belief, other: Belief) -> bool:
+def _same_minimum(one: Belief, other: Belief) -> bool:
     """Whether two searches have come to the same end."""
     parts = one.values.keys() - one.unsure.keys()
     return all(abs(one.values[part] - other.values[part]) < SAME * one.size(part) for part in parts)
 
 
-def _over(begun: Belief, record: Record) -> Belief:
+def _refined_on(begun: Belief, record: Record) -> Belief:
     """The nearest over a whole record."""
     begun = replace(begun, record=record)
     try:
@@ -338,14 +339,14 @@ def _horizons(record: Record) -> list[int]:
     return [*(round(cycles * cycle) for cycles in HORIZONS if LEAST <= cycles * cycle < end), end]
 
 
-def _led(begun: Belief, horizons: list[Record]) -> Belief:
+def _descended_along(begun: Belief, horizons: list[Record]) -> Belief:
     """The nearest over a few samples, then over more: far ahead, a belief that is not near yet loses its way."""
     for record in horizons:
-        begun = _led_over(begun, record)
+        begun = _descended_on(begun, record)
     return begun
 
 
-def _tried(begun: Belief, passes: int) -> Belief:
+def _descended(begun: Belief, passes: int) -> Belief:
     """Nearer, by so many passes; as it was of a law that can not be followed."""
     try:
         return descended(begun, passes, roughly=True)[0]
@@ -353,7 +354,7 @@ def _tried(begun: Belief, passes: int) -> Belief:
         return begun
 
 
-def _parts(simple: Belief) -> list[list[Belief]]:
+def _candidates(simple: Belief) -> list[list[Belief]]:
     """Beginnings of the richer laws, of each a grid, with the constants as stated: a wrong law strains them."""
     record, simple = simple.record, simple.as_stated()
     furthest, fastest = (float(np.max(np.abs(record[name]))) for name in "xv")
@@ -377,7 +378,7 @@ def _parts(simple: Belief) -> list[list[Belief]]:
     return [rigid, compliant, [begun.without(SLOPE) for begun in falling]]  # beside it a slope would lead astray
 
 
-def _softer(give: Belief) -> list[list[Belief]]:
+def _compliant_candidates(give: Belief) -> list[list[Belief]]:
     """Beginnings of what else may look like a contact that gives way: one with a damping, bristles, or a lag."""
     record = give.record
     furthest, fastest = (float(np.max(np.abs(record[name]))) for name in "xv")
@@ -391,7 +392,7 @@ def _softer(give: Belief) -> list[list[Belief]]:
     return [*damped, level, bristles, lags]
 
 
-def _falling(give: Belief) -> list[list[Belief]]:
+def _falling_candidates(give: Belief) -> list[list[Belief]]:
     """The same as bristles whose friction falls by so much: x hardly tells it, but their stiffness follows from it."""
     speeds = SPEEDS[1:3]  # from beyond these the search of one rig ended where friction hardly falls (seed 281129)
     return [[replace(begun, held=EXCESS) for begun in _bristles(give, excess, speeds)] for excess in EXCESSES[2:]]
@@ -414,13 +415,13 @@ def _bristles(give: Belief, excess: float, speeds: tuple[float, ...] = SPEEDS) -
     ]
 
 
-def _stretched(best: Belief) -> list[list[Belief]]:
+def _stribeck_candidates(best: Belief) -> list[list[Belief]]:
     """The same with more and with less static friction: where it falls at small speeds, x may not tell how far."""
     excess = max(best.values[EXCESS], EXCESSES[1] * best.values[KINETIC])
     return [[replace(best.at(**{EXCESS: part * excess}), held=EXCESS)] for part in STRETCHES]
 
 
-def _by_chance(simple: Belief, richer: Belief) -> float:
+def _p_value(simple: Belief, richer: Belief) -> float:
     """Probability that the richer law leaves so much less by chance alone, for as many laws as are tried."""
     from scipy.special import fdtrc  # as above
 

@@ -187,7 +187,7 @@ def try_on_twins(
         raise EstimateError(f"{count} twins", "an interval needs eight at least", "ask for 40")
     frequency = answers[FREQUENCY].value if FREQUENCY in answers else math.nan
     twins, seeds = [], np.random.SeedSequence(rng).spawn(count)
-    for number, twin in enumerate(mapped(partial(_asked, belief, ask, frequency), seeds), start=1):
+    for number, twin in enumerate(mapped(partial(_ask_twin, belief, ask, frequency), seeds), start=1):
         twins += [twin] if twin is not None else []
         progress(number / count)
     if len(twins) < max(8, ANSWERED * count):
@@ -198,27 +198,27 @@ def try_on_twins(
         )
     misfit = _Misfit.of(belief, *_strays(belief, twins, frequency))
     tried = {}
-    others = _counted(belief, frequency)
+    others = _counted_offsets(belief, frequency)
     for name in ASKED:
         if name in answers and answers[name].known:
             pairs = [(twin.answers.get(name), twin.truth[name]) for twin in twins]
             both = belief.falls or UNSTATED in kinds(answers[name].status)
-            tried[name] = _among(_tried(answers[name], pairs, misfit, both=both), others[name])
+            tried[name] = _widened(_tried(answers[name], pairs, misfit, both=both), others[name])
     if GIVE in belief.values:
         answers = {**answers, GIVES: Estimate(GIVES, belief.contact, (0.0, math.inf), math.inf, "N/m", "fit to x")}
     for name, value in FITTED.items():
         if name in answers and (name != GIVES or GIVE in belief.values):
-            tried[name] = _among(_fitted(answers[name], value, belief, twins, misfit), _apart(belief, value))
+            tried[name] = _widened(_fitted(answers[name], value, belief, twins, misfit), _rival_offsets(belief, value))
     apart = tried[OFFSET].value if OFFSET in tried else 0.0
-    tried |= {name: _among(tried[name], [times * apart]) for name, times in ZERO.items() if name in tried}
+    tried |= {name: _widened(tried[name], [times * apart]) for name, times in ZERO.items() if name in tried}
     if ENERGY in tried:
-        tried[ENERGY] = _among(tried[ENERGY], [-_work_of_drift(belief, frequency), _work_of_drift(belief, frequency)])
+        tried[ENERGY] = _widened(tried[ENERGY], [-_work_of_drift(belief, frequency), _work_of_drift(belief, frequency)])
     if LEVEL in tried and tried[LEVEL].known:
         tried |= {name: _holding(tried[name], tried[LEVEL].interval) for name in DIRECTIONS if name in tried}
     bounded = {name: answer.within(*BOUNDS.get(name, (0.0, math.inf))) for name, answer in tried.items()}
     felt = {**_powers(belief), SHARE: _share_felt(bounded.get(SHARE))}
     if (share := felt[SHARE]) is not None and not share.claimed:
-        bounded[SHARE] = _among(bounded[SHARE], [-bounded[SHARE].value]).within(*BOUNDS[SHARE])
+        bounded[SHARE] = _widened(bounded[SHARE], [-bounded[SHARE].value]).within(*BOUNDS[SHARE])
     return Trial(count, belief, bounded, felt, misfit.strays, misfit.repeats)
 
 
@@ -278,7 +278,7 @@ class _Twin:
     truth: Mapping[str, float]
 
 
-def _asked(
+def _ask_twin(
     belief: Belief, ask: Callable[[Record], Answers], frequency: float, seed: np.random.SeedSequence
 ) -> _Twin | None:
     """A twin, with its answers and its truth; None of one that can not be followed: it tells nothing."""
@@ -328,7 +328,7 @@ def _powers(belief: Belief) -> dict[str, Power | None]:
         if part in belief.values:
             felt = null + abs(value(belief) - value(belief.by((part,), np.array([-chance * fit.sd(part)]))))
         else:
-            seen = belief.first_felt(({part: size} for size in sought[part]), chance)
+            seen = belief.first_detectable(({part: size} for size in sought[part]), chance)
             felt = math.inf if seen is None else abs(value(belief.at(**seen)))
         powers[name] = Power(value(belief), null, felt) if math.isfinite(felt) else None
     return powers
@@ -367,11 +367,11 @@ def _fitted(
     if part not in belief.values:
         if misfit.doubt:  # of a contact of another kind nothing is bounded
             return _estimate(quick, quick.value, quick.interval, quick.method, [quick.status], misfit)
-        reach = _reach(belief, part, value)
+        reach = _detectable(belief, part, value)
     if not math.isfinite(value(belief) + reach):
         words = Doubt("the motion does not depend on it, so that the record tells nothing of it", UNFELT)
         return replace(quick.unknown(Status(words)), method=f"fit to x, {len(twins)} twins")
-    errors = np.array([value(belief.told_by(twin.x)) - value(belief.at(**twin.values)) for twin in twins])
+    errors = np.array([value(belief.fitted_to(twin.x)) - value(belief.at(**twin.values)) for twin in twins])
     least, (low, high) = _less_bias(value(belief), errors, misfit.strays)
     interval = (low - reach if part == SLOPE else low, high + reach)
     if quick.known and (misfit.doubt or belief.falls):  # a line, where a real one is a curve
@@ -379,16 +379,16 @@ def _fitted(
     return _estimate(quick, least, interval, f"fit to x, {len(twins)} twins", [], misfit)
 
 
-def _reach(belief: Belief, part: str, value: Callable[[Belief], float]) -> float:
+def _detectable(belief: Belief, part: str, value: Callable[[Belief], float]) -> float:
     """By how much a part that is not believed in may move an answer; infinite where the motion does not show it."""
     if belief.fit is None:
         return math.inf
     larger = ({part: size * belief.size(part)} for size in SIZES)
-    felt = belief.first_felt(larger, student(belief.fit.freedom))
+    felt = belief.first_detectable(larger, student(belief.fit.freedom))
     return math.inf if felt is None else value(belief.at(**felt)) - value(belief)
 
 
-def _apart(belief: Belief, value: Callable[[Belief], float]) -> list[float]:
+def _rival_offsets(belief: Belief, value: Callable[[Belief], float]) -> list[float]:
     """By how much other laws that the record leaves possible would answer more: the ends of what x leaves each of them.
 
     They lie where it leaves as much more of x than the nearest law as chance would once in twenty.
@@ -396,18 +396,18 @@ def _apart(belief: Belief, value: Callable[[Belief], float]) -> list[float]:
     left, ends = {rig: descent.misfit(rig) for rig in (belief, *belief.rivals)}, list[float]()
     # one with a constant off by what nobody stated is nearer by that alone, and makes no other law less likely
     nearest = min(misfit for rig, misfit in left.items() if rig.slipped == belief.slipped)
-    low, high = _reached(belief, value, NORMAL_95)
+    low, high = _linear_ends(belief, value, NORMAL_95)
     for rig in belief.rivals:
         further = rig.fit.freedom * math.log(left[rig] / nearest) if rig.fit is not None else math.inf
         if further > CLOSE:  # near the law that is believed in, which is not the nearest
             continue
-        least, most = _reached(rig, value, math.sqrt(min(max(0.0, NORMAL_95**2 - further), NORMAL_95**2)))
+        least, most = _linear_ends(rig, value, math.sqrt(min(max(0.0, NORMAL_95**2 - further), NORMAL_95**2)))
         more = value(rig) - value(belief)
         ends += [min(more, least - low), max(more, most - high)]
     return ends
 
 
-def _reached(belief: Belief, value: Callable[[Belief], float], deviations: float) -> tuple[float, float]:
+def _linear_ends(belief: Belief, value: Callable[[Belief], float], deviations: float) -> tuple[float, float]:
     """The ends of a value of rigs so many standard deviations of the linear fit away, the way that tells the most."""
     middle, fit = value(belief), belief.fit
     if fit is None or not math.isfinite(middle) or not deviations:
@@ -415,11 +415,11 @@ def _reached(belief: Belief, value: Callable[[Belief], float], deviations: float
     slopes = np.array([value(belief.by(fit.names, LITTLE * step)) - middle for step in fit.root.T])
     if not (norm := float(np.linalg.norm(slopes))) > 0:  # what is not moved at all, or undefined nearby
         return middle, middle
-    ends = sorted(value(_moved(belief, fit, side * slopes / norm, deviations)) for side in (-1, 1))
+    ends = sorted(value(_displaced(belief, fit, side * slopes / norm, deviations)) for side in (-1, 1))
     return ends[0], ends[1]
 
 
-def _moved(belief: Belief, fit: Fit, way: Array, deviations: float) -> Belief:
+def _displaced(belief: Belief, fit: Fit, way: Array, deviations: float) -> Belief:
     """The rig so many standard deviations away; where a value comes to its end, the others go on without it.
 
     A contact's stiffness went on as if its damping became less than none.
@@ -441,7 +441,7 @@ def _moved(belief: Belief, fit: Fit, way: Array, deviations: float) -> Belief:
         way = way / (float(np.linalg.norm(way)) or 1.0)
 
 
-def _counted(belief: Belief, frequency: float) -> dict[str, list[float]]:
+def _counted_offsets(belief: Belief, frequency: float) -> dict[str, list[float]]:
     """The same of what is counted in a simulated motion."""
     chance = np.random.default_rng(0)  # the noise that it draws is not looked at
     rigid = [not {GIVE, RATE} & rig.values.keys() for rig in belief.rivals]
@@ -460,10 +460,10 @@ def _work_of_drift(belief: Belief, frequency: float) -> float:
 
 def _holding(answer: Estimate, interval: tuple[float, float]) -> Estimate:
     """The answer with an interval that holds another one."""
-    return _among(answer, [here - own for here, own in zip(interval, answer.interval, strict=True)])
+    return _widened(answer, [here - own for here, own in zip(interval, answer.interval, strict=True)])
 
 
-def _among(answer: Estimate, apart: list[float]) -> Estimate:
+def _widened(answer: Estimate, apart: list[float]) -> Estimate:
     """The answer with an interval that holds what other laws would answer, too."""
     if not answer.known or not apart:
         return answer
