@@ -23,7 +23,7 @@ from stickslip.cli.program import main
 from stickslip.estimate import UNTRIED, kinds, stands
 from stickslip.law.driven import Sampled, Tones
 from stickslip.twin.belief import EXCESS, GAIN, HELD, LATE, SLOPE, SPRING
-from stickslip.twin.descent import _step, _towards, linearised, misfit
+from stickslip.twin.descent import _damped_step, _downhill, linearised, misfit
 from stickslip.twin.search import believe
 from stickslip.twin.trial import ASTRAY, _Misfit, try_on_twins
 
@@ -315,9 +315,9 @@ def test_a_value_at_its_end_stays_and_the_search_goes_on_without_it() -> None:
     belief = bristled().trial.belief
     doubled = {EXCESS: 2 * belief.values[EXCESS], SLOPE: 0.0, HELD: 1.0}
     far = linearised(replace(belief.at(**doubled), held=EXCESS))
-    step = dict(zip(far.fit.names, _towards(far, far.fit), strict=True))
+    step = dict(zip(far.fit.names, _damped_step(far, far.fit), strict=True))
     assert all(step[name] == 0 or not far.pinned(name, step[name]) for name in step)
-    nearer = _step(far)
+    nearer = _downhill(far)
     assert nearer is not None
     assert misfit(nearer) < misfit(far)
 
