@@ -17,6 +17,9 @@ demo: $(VENV)/.user
 lab: $(VENV)/.lab
 	$(BIN)/stickslip lab
 
+# Where bytecode is kept, no worker and none of the many processes of the tests has to compile the package anew.
+test soak: export PYTHONDONTWRITEBYTECODE :=
+
 test: $(VENV)/.dev
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n 2 --dist worksteal
 

@@ -84,22 +84,30 @@ def paths(app: Starlette) -> list[tuple[str, str]]:
 ROUTES = paths(lab_app(token="t", port=1))
 
 
+@pytest.fixture(scope="module")
+def anyone(lab: Lab) -> Iterator[httpx.Client]:
+    """Somebody without the token; to be made it takes half a second, in which it reads whom TLS trusts."""
+    with httpx.Client(base_url=lab.base, timeout=600) as anyone:
+        yield anyone
+
+
 @pytest.mark.parametrize(("method", "path"), ROUTES)
-def test_every_door_wants_our_host_our_page_and_the_token(lab: Lab, method: str, path: str) -> None:
+def test_every_door_wants_our_host_our_page_and_the_token(
+    lab: Lab, anyone: httpx.Client, method: str, path: str
+) -> None:
     known = lab.headers
     ours = f"127.0.0.1:{lab.port}"
-    with httpx.Client(base_url=lab.base, timeout=600) as anyone:
-        assert anyone.request(method, path).status_code == 401
-        assert anyone.request(method, path, headers={"Authorization": "Bearer wrong"}).status_code == 401
-        for host in ("evil.example", f"evil.example:{lab.port}", "127.0.0.1", f"127.0.0.1.evil.example:{lab.port}"):
-            assert anyone.request(method, path, headers={**known, "Host": host}).status_code == 400
-        for origin in ("http://evil.example", "null", "http://127.0.0.1:1", f"https://{ours}"):
-            assert anyone.request(method, path, headers={**known, "Origin": origin}).status_code == 403
-        answer = anyone.request(method, path, headers={**known, "Origin": f"http://{ours}"})
-        assert answer.status_code not in (401, 403), "who is ours is let in, to be answered by what is behind the door"
-        assert answer.status_code != 400 or "this lab answers" not in answer.text.lower()
-        assert answer.status_code < 500
-        assert "content-security-policy" in answer.headers
+    assert anyone.request(method, path).status_code == 401
+    assert anyone.request(method, path, headers={"Authorization": "Bearer wrong"}).status_code == 401
+    for host in ("evil.example", f"evil.example:{lab.port}", "127.0.0.1", f"127.0.0.1.evil.example:{lab.port}"):
+        assert anyone.request(method, path, headers={**known, "Host": host}).status_code == 400
+    for origin in ("http://evil.example", "null", "http://127.0.0.1:1", f"https://{ours}"):
+        assert anyone.request(method, path, headers={**known, "Origin": origin}).status_code == 403
+    answer = anyone.request(method, path, headers={**known, "Origin": f"http://{ours}"})
+    assert answer.status_code not in (401, 403), "who is ours is let in, to be answered by what is behind the door"
+    assert answer.status_code != 400 or "this lab answers" not in answer.text.lower()
+    assert answer.status_code < 500
+    assert "content-security-policy" in answer.headers
 
 
 def test_the_lab_listens_on_this_machine_alone(lab: Lab) -> None:

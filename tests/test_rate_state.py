@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -72,22 +73,36 @@ def reference(system: ss.Oscillator, speed: float, end: float) -> dict[str, floa
         y[1] = held if abs(held) < most else math.copysign(most + 1e-3, held)
 
 
-FORCED = [
-    (ratio, law, 1e-2, ss.drives.HarmonicForce(1.2, f), 0.1, 1.2 / f)
-    for ratio, law, f in [
-        (60, "aging", 0.05),
-        (60, "slip", 0.15),
-        (100, "slip", 0.05),
-        (20, "aging", 0.1),
-        (150, "aging", 0.05),
-        (300, "aging", 0.05),
-        (300, "slip", 0.15),
-    ]
+def forced(ratio: float, law: str, frequency: float) -> tuple[Any, ...]:
+    return ratio, law, 1e-2, ss.drives.HarmonicForce(1.2, frequency), 0.1, 1.2 / frequency
+
+
+def belt(ratio: float, law: str) -> tuple[Any, ...]:
+    return ratio, law, 1e-6, ss.drives.Belt(0.1), 0.0, 6.0
+
+
+# the reference takes ten seconds each: the smallest and the largest ratio and one between, both laws, both drives
+SHORT = [
+    forced(20, "aging", 0.1),
+    forced(60, "slip", 0.15),
+    forced(300, "aging", 0.05),
+    belt(60, "aging"),
+    belt(300, "slip"),
 ]
-BELT = [(ratio, law, 1e-6, ss.drives.Belt(0.1), 0.0, 6.0) for ratio in (60, 300) for law in ("aging", "slip")]
+LONG = [
+    forced(60, "aging", 0.05),
+    forced(100, "slip", 0.05),
+    forced(150, "aging", 0.05),
+    forced(300, "slip", 0.15),
+    belt(60, "slip"),
+    belt(300, "aging"),
+]
 
 
-@pytest.mark.parametrize(("ratio", "law", "distance", "drive", "speed", "end"), [*FORCED, *BELT])
+@pytest.mark.parametrize(
+    ("ratio", "law", "distance", "drive", "speed", "end"),
+    [*SHORT, *(pytest.param(*case, marks=pytest.mark.soak) for case in LONG)],
+)
 def test_stops_and_reversals_are_those_of_an_implicit_solver(
     ratio: float, law: str, distance: float, drive: ss.drives.Drive, speed: float, end: float
 ) -> None:

@@ -13,6 +13,7 @@ import sys
 import types
 from collections import Counter
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -25,7 +26,6 @@ PACKAGE = Path(stickslip.__file__).parent
 FILES = sorted(PACKAGE.rglob("*.py"))
 ROOMS = sorted(stub.parent for stub in PACKAGE.glob("*/__init__.pyi"))
 MODULES = sorted(module.name for module in pkgutil.walk_packages([str(PACKAGE)], "stickslip."))
-TREES = {str(file.relative_to(PACKAGE)): ast.parse(file.read_text("utf-8")) for file in FILES}
 HEAVY = {"scipy", "pandas", "matplotlib", "pint", "h5py", "pyarrow", "xarray", "jinja2", "pooch", "nptdms", "soundfile"}
 HEAVY |= {"concurrent", "multiprocessing"}
 EMPTY_NAMES = {"utils", "util", "core", "common", "helpers", "misc", "tools"}
@@ -41,6 +41,12 @@ BY_PLACE = {
     "oscillator",
     "grid",
 }  # may follow the first argument without being named
+
+
+@cache
+def trees() -> dict[str, ast.Module]:
+    """The syntax trees of all files: made where a test looks at them, and not by whoever collects the tests."""
+    return {str(file.relative_to(PACKAGE)): ast.parse(file.read_text("utf-8")) for file in FILES}
 
 
 def public_names() -> Iterator[tuple[str, object]]:
@@ -197,7 +203,7 @@ def test_a_file_is_short_and_named_for_what_it_holds() -> None:
 def test_a_constant_stands_once_in_a_file() -> None:
     """The second of two would silently hold for what was written by the first."""
     twice = []
-    for name, tree in TREES.items():
+    for name, tree in trees().items():
         targets = [target for node in tree.body if isinstance(node, ast.Assign) for target in node.targets]
         names = Counter(
             node.id
@@ -211,7 +217,7 @@ def test_a_constant_stands_once_in_a_file() -> None:
 
 def test_a_room_names_what_is_public_in_its_stub_alone() -> None:
     attached = ["from stickslip.lazy import attached", "__getattr__, __dir__, __all__ = attached(__name__)"]
-    for name, tree in TREES.items():
+    for name, tree in trees().items():
         if not name.endswith("/__init__.py"):
             continue
         docstring, *rest = tree.body
@@ -231,7 +237,7 @@ def unsafe(tree: ast.Module) -> set[str]:
 
 
 def test_nothing_is_unpickled_or_evaluated() -> None:
-    assert not {name: names for name, tree in TREES.items() if (names := unsafe(tree))}
+    assert not {name: names for name, tree in trees().items() if (names := unsafe(tree))}
 
 
 @pytest.mark.parametrize("room", ["cli", "lab"])
