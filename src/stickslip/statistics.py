@@ -22,6 +22,8 @@ from stickslip.estimate import NORMAL_95, Doubt, Estimate, Status
 FEW_CYCLES = 8  # below this no test of the interval holds at 0.5 correlation between neighbours
 HALF_ERROR = 0.5  # standard errors by which correlation is taken to be stronger: too weak a one costs more
 FEW_INDEPENDENT = 8.0  # independent samples per coefficient, below which an interval is not to be trusted
+MOST_NOISE = 0.75  # of the power of a sum of columns, that may be noise: beyond, nothing would be left of the columns
+NOISE_UNSURE = 0.1  # of its power, that the noise of columns is unsure by, chosen
 MOST_LEVERAGE = 0.9  # of a sample and its neighbours: beyond, one stroke alone tells a coefficient
 BINS, FEWEST = 16, 6.0  # of a way or a cycle, and of how many, as they weigh, a correlation is told
 # Deviations of Fisher's z, once in 700 without an effect: 1 of 58 joints whose friction is the same along the way.
@@ -48,6 +50,8 @@ class LeastSquares:
         The coefficients as linear forms of the data.
     leverage : ndarray, shape (n,)
         By how much of the error of a sample and of its neighbours, which share it, the fit follows them.
+    restored : ndarray, shape (p,)
+        By how much each coefficient would grow with the noise of the columns, in proportion.
     """
 
     coefficients: Array
@@ -56,6 +60,7 @@ class LeastSquares:
     independent: float
     projection: Array
     leverage: Array
+    restored: Array
 
     @cached_property
     def _sure(self) -> tuple[Array, Array]:
@@ -88,7 +93,8 @@ class LeastSquares:
         """
         form = np.asarray(weights, dtype=float) @ self.projection
         sd, freedom = mean_uncertainty(len(form) * form * self.residual / (1 - self.leverage))
-        value, sd = float(np.asarray(weights) @ self.coefficients), math.hypot(sd, beside)
+        restored = NOISE_UNSURE * float(np.asarray(weights) @ self.restored)
+        value, sd = float(np.asarray(weights) @ self.coefficients), math.hypot(sd, beside, restored)
         return Estimate.normal(name, value, sd=sd, unit=unit, method=method, quantile=student(freedom), **more)
 
 
@@ -309,7 +315,9 @@ def _values(estimates: Sequence[Estimate]) -> tuple[Array, Array]:
     return values, np.maximum(sds, 1e-12 * max(1e-300, float(np.abs(values).max())))
 
 
-def least_squares(design: ArrayLike, data: ArrayLike, *, instruments: ArrayLike | None = None) -> LeastSquares:
+def least_squares(
+    design: ArrayLike, data: ArrayLike, *, instruments: ArrayLike | None = None, noise: ArrayLike | None = None
+) -> LeastSquares:
     """Linear least squares whose uncertainties hold for correlated, uneven residuals.
 
     ``b = (X'X)^-1 X'y``. Each sample's influence on b is ``psi_t = n (X'X)^-1 x_t u_t`` with residual u; b varies as
@@ -317,7 +325,9 @@ def least_squares(design: ArrayLike, data: ArrayLike, *, instruments: ArrayLike 
     ``sqrt(m / (m - p))``, m the number of independent samples, for the p coefficients fitted.
 
     With instruments, ``b = (Z'X)^-1 Z'y``: columns that go with those of the design and know nothing of the noise in
-    them, which would else pull the coefficients towards zero (Reiersol 1945).
+    them, which would else pull the coefficients towards zero (Reiersol 1945). Where nobody has such columns but the
+    power of the noise E in the design is, ``b = (X'X - E'E)^-1 X'y`` (Fuller 1987, section 2.2). It counts as known to
+    a tenth in :meth:`LeastSquares.combined`, and as no more than three quarters of the power of any sum of columns.
 
     Parameters
     ----------
@@ -327,6 +337,8 @@ def least_squares(design: ArrayLike, data: ArrayLike, *, instruments: ArrayLike 
         What the columns explain, in order of time.
     instruments : array_like, shape (n, p), optional
         One for each column; the columns themselves where left out.
+    noise : array_like, shape (p, p), optional
+        ``E'E`` of the noise of the columns; none where left out.
 
     Returns
     -------
@@ -357,6 +369,7 @@ def least_squares(design: ArrayLike, data: ArrayLike, *, instruments: ArrayLike 
     sizes = np.linalg.norm(known, axis=0)
     if not np.all(sizes > 0):
         raise EstimateError("an instrument of zeros", "every column needs an instrument", "leave the term out")
+    noisy = np.zeros((terms, terms)) if noise is None else np.asarray(noise, dtype=float) / np.outer(lengths, lengths)
     inner = (known / sizes).T @ unit
     condition = math.sqrt(float(np.linalg.cond(inner)))
     if condition > INSEPARABLE:
@@ -365,14 +378,18 @@ def least_squares(design: ArrayLike, data: ArrayLike, *, instruments: ArrayLike 
             "the columns must be told apart",
             "leave a term out, or give a record whose speed and acceleration vary more",
         )
-    projection = np.linalg.inv(inner) @ (known / sizes).T
+    if noisy.any():
+        noisy *= min(1.0, MOST_NOISE / float(np.abs(np.linalg.eigvals(np.linalg.solve(inner, noisy))).max()))
+    inverse = np.linalg.inv(inner - noisy)
+    projection = inverse @ (known / sizes).T
     scaled = projection @ values
     residual = values - unit @ scaled
     independent = count / correlation_time(residual)
     leverage = np.einsum("ij,ji->i", unit, projection)
     leverage = np.clip(leverage * count / independent, 0.0, MOST_LEVERAGE)
     influence = projection / lengths[:, None]
-    return LeastSquares(scaled / lengths, residual, condition, independent, influence, leverage)
+    restored = inverse @ noisy @ scaled / lengths
+    return LeastSquares(scaled / lengths, residual, condition, independent, influence, leverage, restored)
 
 
 def follows(measured: Array, model: Array) -> float:

@@ -134,16 +134,17 @@ class _Balance:
             torque = torque + self.share * base[:, self.terms.index("load")]
         known, shapes = self.columns(self.seen, steered=True) if self.data.followed else (base, falls)
         basis = _basis(known, np.hstack(shapes), SAME if self.data.followed else 0.0)
-        return _Solved([np.column_stack([base, one]) for one in falls], torque, basis)
+        return _Solved([np.column_stack([base, one]) for one in falls], torque, basis, self.data.noise(self.richer))
 
 
 @dataclass(frozen=True)
 class _Solved:
-    """Designs, the torque that they explain, and an orthonormal basis of all that the instruments tell."""
+    """Designs, the torque that they explain, an orthonormal basis of all that the instruments tell, and the noise."""
 
     designs: list[Array]
     torque: Array
     basis: Array
+    noise: Array
 
     def left(self, design: Array) -> tuple[Array, float]:
         """The coefficients, and the square of what they leave of that of the torque which the instruments tell."""
@@ -166,7 +167,7 @@ class _Solved:
     def fit(self, number: int) -> LeastSquares:
         """One of them, with all that makes its intervals (two-stage least squares)."""
         design = self.designs[number]
-        return least_squares(design, self.torque, instruments=self.basis @ (self.basis.T @ design))
+        return least_squares(design, self.torque, instruments=self.basis @ (self.basis.T @ design), noise=self.noise)
 
 
 def speed_of(log: Log, *, steered: bool = False) -> tuple[Array, float]:

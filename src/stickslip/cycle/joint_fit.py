@@ -12,7 +12,17 @@ import numpy as np
 
 from stickslip.arrays import Array
 from stickslip.balance.motion import require_fit
-from stickslip.cycle.joint_slides import NARROW, SHORTEST, Sliding, Teeth, Window, places, seated, sliding
+from stickslip.cycle.joint_slides import (
+    NARROW,
+    SHORTEST,
+    Sliding,
+    Teeth,
+    Window,
+    encoder_errors,
+    places,
+    seated,
+    sliding,
+)
 from stickslip.errors import EstimateError, ModelError, RecordError
 from stickslip.estimate import Constant, Estimate
 from stickslip.record.record import Record, Step, require_record
@@ -56,6 +66,7 @@ ADVICE = {
     "fall": "slide slower too",
     "fall of load": "slide slowly under several loads",
 }
+DERIVATIVES = ("inertia", "viscous", "uneven")  # terms in which the counts of an encoder are noise
 WARM = ("warming", "thinning")
 # Of the variance of a temperature, its counts' and its noise's: a regression on it is low by as much.
 ROUGHLY = 0.02
@@ -88,6 +99,8 @@ class Log:
         As it was measured, apart from the position; None of a controller's, which is made of it.
     ahead : ndarray or float
         By how much what the encoder tells of is ahead of the link, by the play of the teeth between.
+    noise : ndarray, shape (3, 3)
+        ``E'E`` of the encoder's noise E in the columns of `DERIVATIVES`; none where the reference knows nothing of it.
     """
 
     position: Array
@@ -98,6 +111,7 @@ class Log:
     about: float = 0.0
     torque: Array | None = None
     ahead: Array | float = 0.0
+    noise: Array = field(default_factory=lambda: np.zeros((len(DERIVATIVES), len(DERIVATIVES))))
 
     @property
     def link(self) -> Array:
@@ -164,6 +178,13 @@ class Log:
             return slides.at(five_point_difference(self.reference, 1) * slides.window.fs, 2)
         return slides.at(self.position - self.reference, 1)
 
+    def noisy(self) -> Log:
+        """With the noise that its encoder makes of its columns."""
+        errors = encoder_errors(self.turned, self.sliding.window.fs)
+        drawn = [replace(self, position=error, lead=np.zeros_like(error)) for error in errors]
+        columns = [one.columns(DERIVATIVES, 0.0, (0.0, 0.0)) for one in drawn]
+        return replace(self, noise=np.mean([made.T @ made for made in columns], axis=0))
+
     def quiet(self) -> Log:
         """With the motion freed of its noise, beyond a stroke: that would bend a fit, but less than noise a prediction.
 
@@ -215,6 +236,11 @@ class JointData:
     ) -> Array:
         """The columns of all logs, one below the other."""
         return np.concatenate([log.columns(terms, load, pull, steered=steered) for log in self.logs])
+
+    def noise(self, terms: tuple[str, ...]) -> Array:
+        """``E'E`` of the encoders' noise in the columns; in those that are no derivatives it is smoothed to nothing."""
+        among = np.array([[float(term == one) for one in DERIVATIVES] for term in terms])
+        return np.asarray(sum(among @ log.noise @ among.T for log in self.logs))
 
     def model(self, fit: LeastSquares, terms: tuple[str, ...], pull: tuple[float, float]) -> Array:
         """What a fit, of these logs or of others, makes of the torque."""
@@ -290,6 +316,8 @@ def pooled(data: Sequence[JointData]) -> JointData:
     joined = {name: np.concatenate([getattr(one, name) for one in data]) for name in ("torque", "raw", "known")}
     unsure = tuple(np.concatenate(columns) for columns in zip(*(one.unsure for one in data), strict=True))
     logs = tuple(log for one in data for log in one.logs)
+    if any(log.reference is None for log in logs):  # then no reference is an instrument
+        logs = tuple(log if log.noise.any() else log.noisy() for log in logs)
     return JointData(logs, terms=first.terms, source=first.source, unsure=unsure, stated=first.stated, **joined)
 
 
@@ -376,6 +404,8 @@ def _data_of(
     logged = "temperature" in record and bool(np.all(np.isfinite(record["temperature"])))
     warm = record["temperature"] if logged else None
     log = Log(position, reference, slides, np.zeros(len(position)) if lead is None else lead, warm)
+    if not followed:
+        log = log.noisy()
     if teeth is not None:
         log = replace(log, ahead=teeth.lead)
     terms = ["viscous", "forward", "back", *(("sine", "cosine", "load") if gravity else ())]
@@ -540,7 +570,7 @@ def _solved(data: JointData, terms: tuple[str, ...], share: float, pull: tuple[f
     if "load" in terms:  # linear about `share`: its column stands in gravity's already
         torque = torque + share * columns[:, terms.index("load")]
     instruments = None if not data.followed else data.columns(terms, share, pull, steered=True)
-    return least_squares(columns, torque, instruments=instruments)
+    return least_squares(columns, torque, instruments=instruments, noise=data.noise(terms))
 
 
 def _pull(fit: LeastSquares, terms: Sequence[str]) -> tuple[float, float]:

@@ -12,8 +12,8 @@ import numpy as np
 from stickslip.arrays import Array, Mask, Rows, stretches
 from stickslip.balance.motion import away_from
 from stickslip.errors import EstimateError
-from stickslip.signals.derivatives import differentiate, five_point_difference
-from stickslip.signals.noise import quantisation_step
+from stickslip.signals.derivatives import differentiate, five_point_difference, smooth
+from stickslip.signals.noise import noise_level, quantisation_step
 from stickslip.statistics import BINS
 
 # of a stroke's length, that the window has on either side: with 0.15 the accelerations of an axis fall out
@@ -24,6 +24,7 @@ NOISY = 4.0  # deviations of the velocity's noise, below which it may be at rest
 SLOW = 0.05  # of its fast speed (90 %): slower, static friction that falls with the speed would be taken for Coulomb's
 SLOWER = 0.02  # where that fall is asked for
 NARROW = 0.3  # of the window, near the ends of strokes
+DRAWS = 4  # of an encoder's errors
 APART = 4  # rows in the window's half: nearer ones tell the same
 
 
@@ -186,6 +187,22 @@ def sliding(position: Array, fs: float, *, slowly: bool = False, carry: Mask | N
     rows = np.concatenate([slides.rows, _apart(slow, narrow)])
     order, near = np.argsort(rows, kind="stable"), np.arange(len(rows)) >= len(slides.rows)
     return replace(slides, rows=rows[order], near=near[order], narrow=narrow)
+
+
+def encoder_errors(position: Array, fs: float) -> list[Array]:
+    """What an encoder's counts and noise may have made of its position, drawn a few times.
+
+    The counts of a slow motion are no white noise: they are made again, of the smoothed motion, from other zeros. What
+    is noisier than these alone has white noise beside.
+    """
+    count, place, chance = quantisation_step(position), smooth(position, fs).values, np.random.default_rng(0)
+    power = noise_level(position, fs) ** 2
+    errors = []
+    for zero in (np.arange(DRAWS) + 0.5) / DRAWS * count:
+        counted = np.round((place + zero) / count) * count - zero if count else place
+        beside = max(power - noise_level(counted, fs) ** 2, 0.0)
+        errors.append(counted - place + math.sqrt(beside) * chance.standard_normal(len(place)))
+    return errors
 
 
 def _apart(within: Mask, window: Window) -> Rows:
