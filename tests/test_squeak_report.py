@@ -337,7 +337,6 @@ def test_a_record_becomes_a_page_with_its_sounds(tmp_path: Path) -> None:
     assert names == {"spectrogram", "spectra", "coherence", "forcing-cycle", "burst", "friction-velocity"}
 
 
-@pytest.mark.figures
 def test_several_records_are_compared(tmp_path: Path) -> None:
     for surface, load in CONDITIONS[1::2]:
         ss.write_record(measured(surface, load), tmp_path / f"{surface}_{load}.csv")
@@ -349,7 +348,11 @@ def test_several_records_are_compared(tmp_path: Path) -> None:
     rows = {each["name"]: each for each in data["comparison"]["conditions"]}
     assert rows["wet_6.13.csv"]["normal"] == 6.13
     assert rows["wet_6.13.csv"]["count"] > 5 > rows["wet_1.23.csv"]["count"] == 0
-    assert (tmp_path / "out" / "figures" / "0-2-conditions-compared-conditions.svg").exists()
+
+
+def test_conditions_that_are_compared_are_drawn() -> None:
+    plates = {plate.name: plate for plate in ss.summary(compared()).plates}
+    assert plates["conditions"].svg().startswith("<?xml")
 
 
 def test_files_of_one_name_are_told_apart_by_their_folders(tmp_path: Path) -> None:
