@@ -132,6 +132,15 @@ def test_a_mistake_is_named_first_and_the_command_printed_mends_it(name: str) ->
     assert right(mended(result))
 
 
+def test_each_of_two_mistakes_that_look_alike_has_a_command() -> None:
+    """Without a force a mass in g looks as a spring in N/mm does: the only command told friction of 1,200 N."""
+    result = ask("analyze", written("t [s],x [m],z [m],a [m/s^2]"), *RIG, "--mass", "2000")
+    assert "Probably the stiffness is in N/mm, not in N/m or the mass is in g, not in kg" in first_line(result)
+    lines = result.stdout.splitlines()
+    commands = [lines[lines.index(begin) + 1] for begin in ("To mend it:", "or:")]
+    assert [right(ask(*shlex.split(command)[1:]).stdout) for command in commands] == [False, True]
+
+
 @pytest.mark.parametrize("title", ["y", "frame", "Tisch"])
 def test_a_column_that_is_called_as_a_base_is_proposed_as_one(title: str) -> None:
     path = written("t [s],x [mm],z [mm]", x=1e3, z=1e3)

@@ -299,7 +299,7 @@ def _caused(error: ss.StickslipError, mistaken: Findings | None) -> ss.Stickslip
     if mistaken is None:
         return error
     value = f"{mistaken.name}: probably {mistaken.contradiction}"
-    mended = ss.summary(mistaken).remedy
+    mended = " or ".join(ss.summary(mistaken).remedies)
     return EstimateError(
         value, "no law is fitted until that is mended", f"begin with {mended}" if mended else "mend it"
     )

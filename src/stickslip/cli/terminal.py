@@ -302,7 +302,7 @@ def _print_short(story: Story) -> None:
     sentences = [] if story.lines or story.tables else story.others  # without rows the sentences are all
     for text in (*story.opening, *sentences, *(f"{part.title}: {part.answer}" for part in story.parts[:MOST_PARTS])):
         lines += _lines(text)
-    lines += [*_remedy(story), *_numbers(story, rows)]
+    lines += [*_remedies(story), *_numbers(story, rows)]
     left, hidden = MOST_ROWS - len(rows), 0
     for table in story.tables:
         shown = () if table.folded else table.rows[:left]
@@ -331,7 +331,7 @@ def _print_short(story: Story) -> None:
 def _print_all(story: Story) -> None:
     """Everything that the page tells in words, each sentence once."""
     lines = [line for text in story.headline for line in _lines(text)]
-    lines += [*_remedy(story), *_numbers(story, story.lines), ""]
+    lines += [*_remedies(story), *_numbers(story, story.lines), ""]
     shown = {str(sentence) for sentence in (*story.headline, *story.notices)} | {
         notice.reason for notice in story.notices
     }
@@ -352,9 +352,10 @@ def _print(title: str, lines: Sequence[str]) -> None:
             say(line)
 
 
-def _remedy(story: Story) -> list[str]:
-    """The command that mends what is wrong, on a line that can be copied."""
-    return ["To mend it:", as_typed(story.remedy)] if story.remedy else []
+def _remedies(story: Story) -> list[str]:
+    """The commands that mend what is wrong, whichever of them is so, on lines that can be copied."""
+    commands = [line for remedy in story.remedies for line in ("or:", as_typed(remedy))]
+    return ["To mend it:", *commands[1:]] if commands else []
 
 
 def as_typed(command: str) -> str:

@@ -59,15 +59,15 @@ def of_findings(findings: Findings) -> Story:
         draw=lambda: plates_of(decay),
         data=lambda: _data(decay),
         look=lambda: _scope(findings),
-        remedy=_remedy(findings),
+        remedies=_remedies(findings),
     )
 
 
-def _remedy(findings: Findings) -> str:
-    """The command without the mistake that was made, or with the units that were left out."""
+def _remedies(findings: Findings) -> list[str]:
+    """The commands without a mistake that may have been made, or with the units that were left out."""
     options = [] if findings.settings["restoring"] == "linear" else ["--restoring", findings.settings["restoring"]]
     if slips := findings.results.get("slips"):
-        return corrected(findings, slips[0], "decay", options)
+        return corrected(findings, slips, "decay", options)
     return completed(findings, "decay", options)
 
 

@@ -76,16 +76,16 @@ def of_laws(
     )
     ranked = Table("Laws by misfit", ("law", "misfit", "kept", "parameters"), rows, note)
     why = Table("Why each law is kept or not", ("law", "verdict"), verdicts, folded=True)
-    headline, remedy = [comparison.verdict], ""
+    headline, remedies = [comparison.verdict], list[str]()
     if mistaken is not None:
         headline = [f"Probably {mistaken.contradiction}: until that is mended no law holds.", *headline]
-        remedy = corrected(mistaken, mistaken.slips[0], "fit", options)
+        remedies = corrected(mistaken, mistaken.slips, "fit", options)
     return _story(
         comparison,
         record,
         headline,
         notes=comparison.fit.checks,
-        remedy=remedy,
+        remedies=remedies,
         tables=[ranked, why],
         history=comparison.history,
         data=comparison.to_dict,

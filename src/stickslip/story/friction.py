@@ -56,7 +56,7 @@ def of_findings(findings: Findings) -> Story:
         draw=lambda: plates_of(findings),
         data=lambda: _data(findings),
         look=lambda: scope.of_findings(findings),
-        remedy=_remedy(findings),
+        remedies=_remedies(findings),
     )
 
 
@@ -112,11 +112,11 @@ def _uncertain(record: Any) -> bool:
     return bool(record.rig and record.rig.sd) or any(channel.gain_sd for channel in record.channels.values())
 
 
-def _remedy(findings: Findings) -> str:
-    """The command that reads the channels without the slip that would make them agree, or states what is missing."""
+def _remedies(findings: Findings) -> list[str]:
+    """The commands that read the channels without a slip that would make them agree, or state what is missing."""
     zero = _zero_off(findings)
     slips = findings.results.get("slips") or ([zero] if zero is not None else [])
-    return scope.corrected(findings, slips[0]) if slips else scope.completed(findings)
+    return scope.corrected(findings, slips) if slips else scope.completed(findings)
 
 
 def _zero_off(findings: Findings) -> Slip | None:

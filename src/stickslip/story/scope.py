@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import base64
 import shlex
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -255,7 +255,15 @@ def command_of(record: Record, question: str, *options: str) -> tuple[str, int]:
     return (f"{shlex.join(command)} {ROWS}", _read(record).get("rows", (0,))[0] or 0) if command else ("", 0)
 
 
-def corrected(findings: Findings, slip: Slip, question: str = "analyze", options: Sequence[str] = ()) -> str:
+def corrected(
+    findings: Findings, slips: Iterable[Slip], question: str = "analyze", options: Sequence[str] = ()
+) -> list[str]:
+    """The commands that ask again, each without one of the slips of the hand that would explain it alike."""
+    commands = (_corrected(findings, slip, question, options) for slip in slips)
+    return list(filter(None, dict.fromkeys(commands)))
+
+
+def _corrected(findings: Findings, slip: Slip, question: str, options: Sequence[str]) -> str:
     """The command that asks again, without a slip of the hand; empty where none can."""
     record, settings = findings.record, dict(findings.settings)
     read = dict(_read(record))
@@ -283,7 +291,7 @@ def corrected(findings: Findings, slip: Slip, question: str = "analyze", options
     return _again(findings, question, read, {**settings, "sensors": sensors}, options)
 
 
-def completed(findings: Findings, question: str = "analyze", options: Sequence[str] = ()) -> str:
+def completed(findings: Findings, question: str = "analyze", options: Sequence[str] = ()) -> list[str]:
     """The command that asks again with what was not stated: a constant left to fill in, a unit as it was read.
 
     Where the channels contradict each other as they were read, their units are to be filled in, too.
@@ -298,8 +306,8 @@ def completed(findings: Findings, question: str = "analyze", options: Sequence[s
     lacking = findings.results.get("lacking", ())
     missing = [word for name in lacking for word in (f"--{name}", f"VALUE {RIG_UNITS[name]}")]
     if not (missing or assumed or clock):
-        return ""
-    return _again(findings, question, read, findings.settings, (*options, *missing))
+        return []
+    return list(filter(None, [_again(findings, question, read, findings.settings, (*options, *missing))]))
 
 
 def _again(

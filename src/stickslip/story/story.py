@@ -349,8 +349,8 @@ class Story:
         :attr:`plates`, :attr:`clips` and :attr:`scope`.
     data : callable
         What ``results.json`` holds.
-    remedy : str
-        The command that would mend what is wrong; empty where nothing is, or no command would.
+    remedies : sequence of str
+        The commands any one of which would mend what is wrong; none where nothing is, or no command would.
     write : callable
         Writes the files that this kind of result has beside page, numbers, figures and sounds into a folder.
     """
@@ -370,7 +370,7 @@ class Story:
     listen: Callable[[], Sequence[Clip]] = tuple
     look: Callable[[], Scope | None] = _nothing_to_look_at
     data: Callable[[], Mapping[str, Any]] = dict
-    remedy: str = ""
+    remedies: Sequence[str] = ()
     write: Callable[[Path], object] = _nothing_more
 
     @property
