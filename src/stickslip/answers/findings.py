@@ -183,6 +183,11 @@ class Findings(Answers):
         return bool(self.contradiction or hopeless(self.results.get("consistency")))
 
     @property
+    def unanswered(self) -> bool:
+        """Whether no force is given, as what it rests on was stated wrongly or not at all."""
+        return self.forceless or bool(self.results.get("lacking"))
+
+    @property
     def drawn(self) -> Findings:
         """What of this figures show: all of it, but for the forces where none is to be given."""
         if not self.forceless:

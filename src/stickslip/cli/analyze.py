@@ -115,6 +115,8 @@ def analyze(
 
     name_left_out(refused)
     _deliver_sure(all_findings, twins, together, output.folder(usual), output)
+    if all(findings.unanswered for findings in all_findings):
+        raise SystemExit(1)
 
 
 def _deliver_sure(
