@@ -304,3 +304,7 @@ def test_command(tmp_path, monkeypatch) -> None:
     lacking = CliRunner().invoke(main, ["tribometer", "0.csv", "--json", *channels[:4]])
     assert lacking.exit_code == 1
     assert "--normal" in lacking.output
+    unnamed = CliRunner().invoke(main, ["tribometer", "0.csv", "--normal", "10"])
+    assert unnamed.stderr.endswith("To mend it:\nstickslip init 0.csv\n")
+    CliRunner().invoke(main, ["init", "0.csv", "--yes"])
+    assert CliRunner().invoke(main, ["tribometer", "0.csv", "--normal", "10", "--json"]).exit_code == 0

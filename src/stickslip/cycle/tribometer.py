@@ -11,7 +11,7 @@ import numpy as np
 from stickslip.arrays import Array, Mask, Rows
 from stickslip.balance.motion import Cycles, Motion, contact_motion, find_cycles, motion_channels, require_fit
 from stickslip.cycle.loops import DRIVES, levels_of, sliding_parts
-from stickslip.errors import EstimateError, ModelError, RecordError
+from stickslip.errors import UNNAMED, EstimateError, ModelError, RecordError
 from stickslip.estimate import Constant, Doubt, Estimate, Result, Status
 from stickslip.record.record import Record, require_record
 from stickslip.signals.interpolate import without_delays
@@ -162,6 +162,7 @@ def friction_coefficients(
     """
     require_record(record)
     names = [*motion_channels(record, "ground"), "friction", *(["normal"] if "normal" in record else [])]
+    record.require(*names, question=QUESTION, kind=UNNAMED)
     record.require_clean(*names, question=QUESTION)
     record = without_delays(record, *names, question=QUESTION)
     motion = contact_motion(record, contact="ground", question=QUESTION)
