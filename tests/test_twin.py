@@ -451,13 +451,20 @@ def test_a_base_that_wanders_is_followed() -> None:
     assert belief.kinetic == pytest.approx(0.5 * PULL, rel=0.01)
 
 
-def test_an_x_that_comes_late_is_told_and_is_no_static_friction() -> None:
+def test_an_x_that_comes_late_is_told_and_is_no_static_friction(tmp_path: Path) -> None:
     # x 1.4 ms behind z was a Stribeck curve with 8.5 times the friction at rest, sure within 5 %
     rig = stepped.Rig("Coulomb", 0.367, 304.4, 0.613, 3.29e-3, 6.997, kinetic=0.1724)
     record = stepped.record(rig, np.random.default_rng(11), noise=2.7e-3)
     late = record.with_channel("x", np.roll(record["x"], 4), unit="m")
-    tried = ss.tried(ss.analyze(late, **rig.stated), twins=8)
+    table = np.column_stack([late.time, late["x"], late["z"]])
+    np.savetxt(tmp_path / "late.csv", table, delimiter=",", header="t [s],x [m],z [m]", comments="")
+    tried = ss.tried(ss.analyze(ss.read_record(tmp_path / "late.csv"), **rig.stated), twins=8)
     assert "x 1.4 ms late" in tried.trial.doubt.words
+    told = " ".join(ss.summary(tried).remedies)
+    delay, gain = re.search(r"--sensor x\.delay=(\S+)", told), re.search(r"--channels 'x=(\S+) \* \(x\)", told)
+    assert delay is not None
+    assert gain is not None, "which looks like it in this motion"
+    assert float(delay[1]) == pytest.approx(4 / record.fs, rel=0.05)
     assert not stands(tried.loops.level.status)
     assert not any(stands(e.status) for e in tried.breakaway.estimates)
 

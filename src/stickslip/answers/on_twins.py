@@ -11,12 +11,14 @@ from typing import Any, TypeVar
 from stickslip.answers.findings import BY_FORCE, NOT_TRIED, Findings, flagged, without
 from stickslip.balance.force import friction_force
 from stickslip.compiled import waiting
+from stickslip.consistent.checks import Slip
 from stickslip.cycle.loops import Loops, friction_loops
 from stickslip.cycle.onset import Breakaway, Presliding, breakaway, presliding
 from stickslip.cycle.sticks import Sticks, find_sticks
 from stickslip.errors import StickslipError
 from stickslip.estimate import UNTRIED, Estimate, Result, Status
 from stickslip.record.record import Record, StatedRig
+from stickslip.twin.belief import GAIN, LATE, MASS, SPRING, Belief
 from stickslip.twin.search import believe
 from stickslip.twin.trial import COMPLIANCE, GIVES, Trial, try_on_twins
 from stickslip.workers import workers
@@ -95,9 +97,25 @@ def _as_tried(findings: Findings, trial: Trial) -> dict[str, Any]:
         "breakaway": _with(findings.breakaway, trial.estimates),
         "presliding": findings.presliding if findings.stiffness is not None else _yields(findings.presliding, trial),
     }
+    results["slipped"] = tuple(_slip(rig, name, findings.record) for name, rig in trial.belief.slips.items())
     if trial.doubt is not None:  # what was not tried rests on the same constants and channels
         results |= {key: flagged(results.get(key, findings.results.get(key)), trial.doubt) for key in BY_FORCE}
     return results
+
+
+def _slip(rig: Belief, name: str, record: Record) -> Slip:
+    """What of a record's channels and constants is to be read otherwise, were it what this rig has off."""
+    if name == LATE:
+        return Slip(rig.slip, delays={"x": _rounded(record.channels["x"].delay + rig.late)})
+    factor = math.exp(rig.values[name])
+    if name == GAIN:
+        return Slip(rig.slip, {"x": ("x", _rounded(1 / factor))})
+    return Slip(rig.slip, constants={{MASS: "mass", SPRING: "stiffness"}[name]: _rounded(factor)})
+
+
+def _rounded(value: float) -> float:
+    """To what of it may be told: it is written into a command."""
+    return float(f"{value:.4g}")
 
 
 def _note(trial: Trial) -> str:

@@ -115,7 +115,8 @@ def _uncertain(record: Any) -> bool:
 def _remedies(findings: Findings) -> list[str]:
     """The commands that read the channels without a slip that would make them agree, or state what is missing."""
     zero = _zero_off(findings)
-    slips = findings.results.get("slips") or ([zero] if zero is not None else [])
+    off = findings.results.get("slips") or findings.results.get("slipped")
+    slips = off or ([zero] if zero is not None else [])
     return scope.corrected(findings, slips) if slips else scope.completed(findings)
 
 

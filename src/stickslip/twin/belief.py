@@ -291,6 +291,14 @@ class Belief:
         return f"{words}, or that of {moves} as much the other way" if name == GAIN and moves else words
 
     @property
+    def slips(self) -> dict[str, Belief]:
+        """The nearest rig of each kind of slip, where it has one itself; by what is off."""
+        nearest: dict[str, Belief] = {}
+        for rig in (self, *sorted(self.rivals, key=lambda rival: rival.left)) if self.slipped else ():
+            nearest.setdefault(rig.slipped, rig)
+        return {name: rig for name, rig in nearest.items() if name}
+
+    @property
     def strain(self) -> float:
         """The largest number of standard deviations by which it takes a constant to be off."""
         return max((abs(self.values[name]) / sd for name, sd in self.unsure.items()), default=0.0)

@@ -235,10 +235,7 @@ class _Misfit:
     @classmethod
     def of(cls, belief: Belief, strays: float, repeats: float) -> _Misfit:
         """That of a belief's record, with what else as well as its slip would be one."""
-        nearest: dict[str, str] = {}  # of each kind
-        for rig in (belief, *sorted(belief.rivals, key=lambda rival: rival.left)) if belief.slip else ():
-            nearest.setdefault(rig.slipped, rig.slip)
-        return cls(strays, repeats, belief.strain, belief.left, " or ".join(filter(None, nearest.values())))
+        return cls(strays, repeats, belief.strain, belief.left, " or ".join(r.slip for r in belief.slips.values()))
 
     @property
     def doubt(self) -> Doubt | None:
