@@ -56,3 +56,18 @@ def test_no_more_than_three_quarters_of_a_column_is_taken_for_noise() -> None:
     column = np.random.default_rng(0).standard_normal(500)
     fit = least_squares(column[:, None], column, noise=[[2 * float(column @ column)]])
     assert fit.coefficients[0] == pytest.approx(4.0)
+
+
+@pytest.mark.parametrize("bits", [10, 12, 16])
+def test_rests_at_turns_are_told_by_the_encoders_noise(servo, bits: int) -> None:
+    """It rests for 10 to 80 ms where it turns; by 4 % of its peak speed it was told to rest twice as long."""
+    angle, count = servo[0], 2 * np.pi / 2**bits
+    still = np.diff(angle) == 0
+    rests = float(np.mean(still)) + np.sum(np.diff(still.astype(int)) > 0) / len(still)  # each begins and ends between
+    record = ss.Record.of(
+        {"theta": np.round(angle / count) * count, "force": servo[1]}, fs=FS, units={"theta": "rad", "force": "N m"}
+    )
+    sticks = ss.answers.analyze_joint(record).sticks
+    assert sticks.share.includes(rests)
+    assert sticks.share.interval[1] < 1.5 * rests
+    assert not sticks.per_cycle.known  # two tones whose period is that of the log

@@ -18,7 +18,7 @@ from stickslip.cycle.joint_logs import joint_backlash, joint_breakaway, regress_
 from stickslip.cycle.static_peak import static_coefficient
 from stickslip.cycle.sticks import find_sticks
 from stickslip.cycle.tribometer import DEFINITIONS, friction_coefficients
-from stickslip.estimate import UNTRIED, Constant, Doubt, Estimate
+from stickslip.estimate import UNTRIED, Constant, Doubt, Estimate, stands
 from stickslip.laws.coulomb import LinearSlope
 from stickslip.laws.stribeck import Stribeck
 from stickslip.record.clock import fit_clock
@@ -101,8 +101,10 @@ def analyze_joint(
     breakaway = inquiry.ask("Breakaway", partial(joint_breakaway, whole, joint=joint), aside=True)
     apart = partial(joint_backlash, whole, joint=joint)
     backlash = inquiry.ask("Backlash", apart, aside=True) if "motor" in whole else None
-    sticks = inquiry.ask("Sticks and slips", partial(find_sticks, whole, method="speed"), aside=True)
+    sticks = inquiry.ask("Sticks and slips", partial(find_sticks, whole, method="speed", creeps=False), aside=True)
     results = {"joint": joint, "breakaway": breakaway, "backlash": backlash}
+    if sticks is not None and not stands(sticks.frequency.status):
+        sticks = replace(sticks, per_cycle=sticks.per_cycle.unknown("the motion has no period"))
     results["sticks"] = with_doubt(sticks, TURNS)
     assumed = {key: channel.unit for key, channel in log.channels.items() if channel.assumed}
     unstated = [f"{key} is read as {unit}" for key, unit in assumed.items() if key not in ("motor", "temperature")]

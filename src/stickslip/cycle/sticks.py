@@ -24,6 +24,8 @@ QUESTION = "sticks and slips"
 METHODS = ("fusion", "speed")
 SLIPPED = 3.0  # times the threshold: a motion that never gets there is creep or noise within a stick
 DWELL = 2.5  # times the duration of a passage through zero, from which on it is a stick
+# Of the typical peak speed, where nothing creeps: far below, what the smoother leaves at a rest is taken for motion.
+STILL = 0.005
 FASTEST = 3  # samples: nothing shorter is told from a reversal
 
 
@@ -110,6 +112,7 @@ def find_sticks(
     threshold: float | str | None = None,
     frequency: float | str | None = None,
     method: str | None = None,
+    creeps: bool = True,
 ) -> Sticks:
     """When does the contact stick, for what share of the time, how often per cycle?
 
@@ -143,6 +146,8 @@ def find_sticks(
         Forcing frequency [Hz]; found from the record when not given.
     method : {"fusion", "speed"}, optional
         By fusion where the record's friction allows it, when not given.
+    creeps : bool, optional
+        Whether what sticks may creep, or give way, faster than 0.5 % of the typical peak speed; a gear does not.
 
     Returns
     -------
@@ -176,7 +181,7 @@ def find_sticks(
         noise = float(np.median(record["v_sd"])) if "v_sd" in record else motion.noise
         motion = replace(motion, velocity=record["v"], noise=noise, bandwidth=record.fs / 2)
     cycles = find_cycles(record, motion, frequency=frequency)
-    limit, rule = _threshold(motion, cycles, threshold)
+    limit, rule = _threshold(motion, cycles, threshold, CREEP if creeps else STILL)
     stuck, certain = _stuck(motion, limit)
     if holds:
         events = _events_of(holds, stuck, motion, SLIPPED * limit)
@@ -212,9 +217,9 @@ def _kind(sticks: Sequence[StickEvent], microslips: Estimate | None) -> str:
     return "stick-slip" if sticks else "sliding"
 
 
-def _threshold(motion: Motion, cycles: Cycles, threshold: float | str | None) -> tuple[float, str]:
+def _threshold(motion: Motion, cycles: Cycles, threshold: float | str | None, share: float) -> tuple[float, str]:
     """Speed below which the contact may stick, and the rule in words."""
-    noisy, creep = AUDIBLE * motion.noise, CREEP * cycles.peak
+    noisy, creep = AUDIBLE * motion.noise, share * cycles.peak
     limit = max(noisy, creep) if threshold is None else parse_value(threshold, f"{motion.unit}/s")
     if not 0 < limit < cycles.peak and threshold is not None:
         raise EstimateError(
@@ -228,7 +233,7 @@ def _threshold(motion: Motion, cycles: Cycles, threshold: float | str | None) ->
             "slips are told from sticks where they are three times as fast as the threshold",
             "give a record with less noise or more motion",
         )
-    rule = "five deviations of its noise" if noisy >= creep else f"{100 * CREEP:g} % of its peak, to pass over creep"
+    rule = "five deviations of its noise" if noisy >= creep else f"{100 * share:g} % of its peak, to pass over creep"
     return limit, f"time with the speed below {_words(limit, motion)} ({'given' if threshold is not None else rule})"
 
 
