@@ -11,7 +11,7 @@ import pytest
 import stepped
 import stickslip as ss
 from stickslip.twin import descent, search
-from stickslip.twin.belief import BENT, GIVE, KINETIC, LOSS, SLOPE, Belief
+from stickslip.twin.belief import BENT, GIVE, HELD, KINETIC, LOSS, RATE, SLOPE, Belief
 
 RIG = stepped.Rig("compliant", 0.52, 0.51, 0.0122, 1.02e-3, 0.248, kinetic=2.08e-4, contact=2.556, loss=0.172)
 
@@ -39,6 +39,18 @@ def test_a_damped_contact_is_found_from_along_its_valley() -> None:
             end = descent.refined(replace(best.at(**along), fit=None))
             assert best.fit.freedom * math.log(descent.misfit(end) / descent.misfit(best)) < 1
             assert end.contact == pytest.approx(RIG.contact, rel=0.01)
+
+
+def test_a_memory_without_friction_has_slopes() -> None:
+    """Its law is a line's then, and its neighbour's has a memory: the tables of both were built as of one kind."""
+    slider = ss.Oscillator(mass=2.0, stiffness=800, law=ss.laws.Coulomb(1.0), drive=ss.drives.HarmonicBase(4e-3, 2.0))
+    record = ss.Rig.perfect("x", "z").measure(ss.simulate(slider, duration=3), fs=500, rng=1)
+    told = ss.friction_force(record, mass=2.0, stiffness=800.0, damping=0.0)
+    (drive,) = search.possible_drives(told, slider.drive)
+    still = search._linear(told, slider, drive).at(**{KINETIC: 0.0, SLOPE: 0.0, RATE: 5.0, HELD: 0.0})
+    fit = descent.linearised(still).fit
+    assert fit is not None
+    assert KINETIC in fit.names
 
 
 def test_values_that_x_does_not_tell_apart_have_a_step_without_noise_too() -> None:

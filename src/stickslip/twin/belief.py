@@ -471,6 +471,8 @@ class Belief:
         scaled = {DRIVE[0]: 1 / (1 + self.values[DRIVE[0]])} if isinstance(self.drive, Sampled) else {}
         names = [name for name in self.values if name not in (LATE, GAIN, *scaled)]
         near = [self.at(**{name: self.values[name] + NUDGE * self.size(name)}) for name in names]
+        if any(type(belief.law) is not type(self.law) for belief in near):  # a memory of no friction is a line
+            return {}
         motion = sensitivity(
             run,
             [belief._system for belief in near],
