@@ -252,7 +252,8 @@ def of_sticks(findings: Findings) -> str:
         return "it hardly ever sticks"
     often = sticks.per_cycle.value
     some = math.isfinite(often) and often > 0
-    stops = f", with {often:.2g} stop{'' if often == 1 else 's'} in each cycle" if some else ""
+    number = f"{often:.2g}"
+    stops = f", with {number} stop{'' if number == '1' else 's'} in each cycle" if some else ""
     share = interval_of(sticks.share) if high - low > 0.01 else value_of(sticks.share)
     return f"it {'sticks' if stands(sticks.share.status) else 'seems to stick'} {share} of the time{stops}"
 
