@@ -97,7 +97,7 @@ def _as_tried(findings: Findings, trial: Trial) -> dict[str, Any]:
         "breakaway": _with(findings.breakaway, trial.estimates),
         "presliding": findings.presliding if findings.stiffness is not None else _yields(findings.presliding, trial),
     }
-    results["slipped"] = tuple(_slip(rig, name, findings.record) for name, rig in trial.belief.slips.items())
+    results["slipped"] = tuple(_slip(rig, name, findings.record) for name, rig in trial.slips.items())
     if trial.doubt is not None:  # what was not tried rests on the same constants and channels
         results |= {key: flagged(results.get(key, findings.results.get(key)), trial.doubt) for key in BY_FORCE}
     return results

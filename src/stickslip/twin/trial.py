@@ -126,6 +126,11 @@ class Trial:
         """Whether the record is not of the kind of its twins."""
         return self.doubt is not None
 
+    @property
+    def slips(self) -> Mapping[str, Belief]:
+        """By what is off, the nearest rig that has it off; none where that does not explain the record."""
+        return {} if self.belief.left > LOST or self.strays > UNLIKE else self.belief.slips
+
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON: how many, the law believed in, what would be felt, and how far x strays."""
         return {
