@@ -22,8 +22,7 @@ from stickslip.answers.on_twins import _yields
 from stickslip.cli.program import main
 from stickslip.estimate import UNTRIED, kinds, stands
 from stickslip.law.driven import Sampled, Tones
-from stickslip.twin.belief import EXCESS, GAIN, HELD, LATE, SLOPE, SPRING
-from stickslip.twin.descent import _damped_step, _downhill, linearised, misfit
+from stickslip.twin.belief import GAIN, LATE, SPRING
 from stickslip.twin.search import believe
 from stickslip.twin.trial import ASTRAY, _Misfit, try_on_twins
 
@@ -216,21 +215,6 @@ def test_a_contact_that_gives_way_is_found_with_its_stiffness() -> None:
     assert tried.loops.level.value == pytest.approx(YIELDS.kinetic, rel=1e-3)
 
 
-def test_a_contact_that_is_bent_as_the_record_begins_is_no_contact_of_bristles() -> None:
-    """It was begun relaxed: bristles with eight times the static friction were nearer, 32 % too stiff and sure of it.
-
-    And the search ended in the valley of stiffness and damping, where it bends, 13 of chi-squared above its floor.
-    """
-    rig = stepped.Rig("compliant", 4.7, 2646.0, 4.4, 1.17e-3, 5.15, kinetic=1.383, contact=5.393e4, loss=39.3)
-    record = stepped.record(rig, np.random.default_rng(11), noise=5e-4)
-    tried = ss.tried(ss.analyze(record, **rig.stated), twins=8)
-    assert isinstance(tried.trial.belief.law, ss.laws.CompliantContact)
-    assert not tried.trial.unlike
-    stiffness = estimate(tried, "presliding stiffness")
-    assert stiffness.includes(rig.contact)
-    assert stiffness.value == pytest.approx(rig.contact, rel=0.1)
-
-
 def test_a_friction_that_lags_is_no_contact_that_gives_way() -> None:
     rig = stepped.Rig("state variable", 2.0, 800.0, 1.0, 4e-3, 2.4, kinetic=0.96, rate=150.0)
     record = stepped.record(rig, np.random.default_rng(11), noise=1e-4)
@@ -241,17 +225,6 @@ def test_a_friction_that_lags_is_no_contact_that_gives_way() -> None:
     assert tried.presliding is None or tried.presliding.verdict != "gives way"
 
 
-def test_a_contact_is_no_surer_than_the_laws_that_explain_x_as_well() -> None:
-    """A spring was told to a thousandth, and bristles that fit as well leave it a twentieth: 5225 to 5958 for 6079."""
-    rng = np.random.default_rng(np.random.SeedSequence([281129, 4]).spawn(1)[0])
-    rig = stepped.drawn("LuGre", rng)
-    record = stepped.record(rig, rng, noise=10 ** rng.uniform(-4, -2.3))
-    tried = ss.tried(ss.analyze(record, **rig.stated), twins=8)
-    stiffness = next(estimate for estimate in tried.estimates if estimate.name == "presliding stiffness")
-    assert stiffness.includes(rig.contact)
-    assert stiffness.interval[0] > rig.contact / 2
-
-
 def test_a_law_beside_a_clock_that_is_late_is_no_less_likely_for_that() -> None:
     """x 0.03 ms late, which nobody stated, was nearest: curves with the true static friction were left out for it."""
     rng = np.random.default_rng(np.random.SeedSequence([291901, stepped.KINDS.index("Stribeck")]).spawn(2)[1])
@@ -259,45 +232,6 @@ def test_a_law_beside_a_clock_that_is_late_is_no_less_likely_for_that() -> None:
     record = stepped.record(rig, rng, noise=10 ** rng.uniform(-4, -2.3))
     tried = ss.tried(ss.analyze(record, **rig.stated), twins=8)
     assert estimate(tried, RATIO).includes(rig.static / rig.kinetic)
-
-
-@cache
-def bristled() -> ss.answers.Findings:
-    """What is found of a contact of bristles."""
-    rig = stepped.Rig(
-        "LuGre",
-        2.0,
-        800.0,
-        1.0,
-        4e-3,
-        2.4,
-        kinetic=0.96,
-        static=1.3,
-        speed=8e-3,
-        contact=8000.0,
-        exponent=2.0,
-    )
-    record = stepped.record(rig, np.random.default_rng(11), noise=1e-4)
-    return ss.tried(ss.analyze(record, **rig.stated), twins=8)
-
-
-def test_bristles_are_found_with_their_stiffness() -> None:
-    tried = bristled()
-    assert isinstance(tried.trial.belief.law, ss.laws.LuGre)
-    assert tried.loops.level.value == pytest.approx(0.96, rel=0.01)
-    assert tried.presliding.stiffness.value == pytest.approx(8000.0, rel=0.05)
-
-
-def test_bristles_whose_friction_does_not_fall_are_no_damped_spring() -> None:
-    # which was believed in with a quarter of their stiffness
-    level = 0.3 * PULL
-    rig = stepped.Rig(
-        "LuGre", 2.0, 800.0, 1.0, 4e-3, 2.4, kinetic=level, static=level, speed=1.0, contact=33e3, exponent=2.0
-    )
-    tried = ss.tried(ss.analyze(stepped.record(rig, np.random.default_rng(7), noise=2e-4), **rig.stated), twins=8)
-    assert isinstance(tried.trial.belief.law, ss.laws.Dahl)
-    assert estimate(tried, "presliding stiffness").includes(rig.contact)
-    assert tried.presliding.stiffness.value == pytest.approx(rig.contact, rel=0.02)
 
 
 def test_of_two_laws_that_chance_does_not_explain_the_nearer_is_believed_in() -> None:
@@ -313,18 +247,6 @@ def test_of_two_laws_that_chance_does_not_explain_the_nearer_is_believed_in() ->
     belief = believe(ss.friction_force(record, **rig.stated))
     assert isinstance(belief.law, ss.laws.Stribeck)
     assert belief.static == pytest.approx(rig.static, rel=0.05)
-
-
-def test_a_value_at_its_end_stays_and_the_search_goes_on_without_it() -> None:
-    # a slope that may not fall below zero, and was drawn there, had ended the search with a step that led nowhere
-    belief = bristled().trial.belief
-    doubled = {EXCESS: 2 * belief.values[EXCESS], SLOPE: 0.0, HELD: 1.0}
-    far = linearised(replace(belief.at(**doubled), held=EXCESS))
-    step = dict(zip(far.fit.names, _damped_step(far, far.fit), strict=True))
-    assert all(step[name] == 0 or not far.pinned(name, step[name]) for name in step)
-    nearer = _downhill(far)
-    assert nearer is not None
-    assert misfit(nearer) < misfit(far)
 
 
 def test_friction_that_falls_with_speed_is_found_with_its_static_level() -> None:
@@ -364,25 +286,6 @@ def test_a_spring_in_the_wrong_unit_gives_no_number() -> None:
         if answer.name in ("stuck share of the time", "stops per cycle") and answer.known:
             assert answer.interval[0] >= 0
             assert answer.interval[1] <= 1 or answer.name == "stops per cycle"
-
-
-def test_bristles_whose_static_friction_x_does_not_show_leave_it_open() -> None:
-    rig = stepped.Rig(
-        "LuGre", 2.0, 800.0, 1.0, 4e-3, 3.9, kinetic=0.2 * PULL, static=0.3 * PULL, speed=2e-3, contact=2e4
-    )
-    tried = asked(rig)[1]
-    answer = estimate(tried, RATIO)
-    assert not answer.known or answer.includes(tried.record.truth[RATIO])
-
-
-def test_the_stiffness_of_bristles_counts_what_x_does_not_show_of_their_fall() -> None:
-    # a spring that slides leaves x as well explained, with a stiffness a fifth too low and sure within a per cent
-    rig = stepped.Rig(
-        "LuGre", 2.594, 4513.0, 3.15, 3.875e-3, 5.01, kinetic=5.79, static=9.24, speed=0.0341, contact=1.173e5
-    )
-    record = stepped.record(rig, np.random.default_rng(11), noise=5e-3)
-    tried = ss.tried(ss.analyze(record, **rig.stated), twins=8)
-    assert estimate(tried, "presliding stiffness").includes(rig.contact)
 
 
 def test_a_rigid_contact_is_rigid_up_to_what_would_have_been_seen() -> None:
