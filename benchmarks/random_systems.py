@@ -17,7 +17,7 @@ from collections.abc import Callable
 import numpy as np
 
 import stickslip as ss
-import stickslip.compiled
+import stickslip.compiler
 from stickslip import drives, laws
 
 SLOW = 10.0  # s of processor
@@ -157,10 +157,10 @@ def system(name: str, seed: int) -> tuple[ss.Oscillator, dict[str, float], float
 def outcome(made: ss.Oscillator, start: dict[str, float], duration: float) -> tuple[str, str]:
     """What became of a system, in a word, and why."""
     begun = time.process_time()
-    known = ss.compiled.compilation.seconds
+    known = ss.compiler.compilation.seconds
 
     def stop(share: float) -> None:
-        spent = time.process_time() - begun - (ss.compiled.compilation.seconds - known)
+        spent = time.process_time() - begun - (ss.compiler.compilation.seconds - known)
         if spent > SLOW and share < 1.0:
             raise InterruptedError(f"{spent / max(share, 1e-12):.1e} s in all, foretold")
 
@@ -172,7 +172,7 @@ def outcome(made: ss.Oscillator, start: dict[str, float], duration: float) -> tu
         return "refused", str(error)
     except (ArithmeticError, LookupError, TypeError, ValueError, RuntimeError, AttributeError) as error:
         return "wrong", f"{type(error).__name__}: {error}"
-    spent = time.process_time() - begun - (ss.compiled.compilation.seconds - known)
+    spent = time.process_time() - begun - (ss.compiler.compilation.seconds - known)
     left = ss.solve.energy(run).residual
     if not left < BALANCED:
         return "wrong", f"energy balances to {left:.1e}"

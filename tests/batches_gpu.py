@@ -6,8 +6,12 @@ import math
 
 from numba import cuda
 
-from batches import Batch, Given, Rooms, march_one
+import batches
+from batches import Batch, Given, Rooms
+from stickslip.compiled import dispatcher_of
 from stickslip.maps.cuda import THREADS, carried
+
+march_one = dispatcher_of(batches.march_one)
 
 
 @cuda.jit

@@ -5,6 +5,7 @@ from __future__ import annotations
 import gc
 import math
 import os
+import pickle
 import shutil
 import subprocess
 import sys
@@ -14,8 +15,9 @@ import numpy as np
 import pytest
 
 import stickslip
-from stickslip import compiled
+from stickslip import compiled, compiler
 from stickslip.cli.terminal import compiling
+from stickslip.signals.pieces import turning_points
 
 PACKAGE = Path(stickslip.__file__).parent
 ASK = (
@@ -105,6 +107,24 @@ def test_what_compiled_code_calls_answers_python_as_well(tmp_path: Path, monkeyp
     assert sum(module.square.stats.cache_hits.values()) == 1
 
 
+FIRST = """
+import sys
+import numpy as np
+from stickslip.signals.pieces import turning_points
+before, rows = "numba" in sys.modules, np.zeros(9, dtype=np.int64)
+print(before, turning_points(np.array([0.0, 2.0, 0.0, 3.0]), 1.0, rows), "numba" in sys.modules)
+"""
+
+
+def test_numba_is_imported_with_the_first_kernel_that_is_called() -> None:
+    run = subprocess.run([sys.executable, "-c", FIRST], capture_output=True, text=True, check=True)
+    assert run.stdout.split() == ["False", "4", "True"]
+
+
+def test_a_kernel_crosses_to_another_process_by_its_name() -> None:
+    assert pickle.loads(pickle.dumps(turning_points)) is turning_points
+
+
 LINES = """
 a = y[0] * q[1] + h
 b = exp(-2.0 * fabs(a)) / (1.0 + tanh(y[1]))
@@ -141,12 +161,12 @@ def test_who_watches_is_told_that_it_compiles_and_for_how_long(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr(compiled, "_root", lambda: tmp_path)
-    monkeypatch.setattr(compiled.compilation, "seconds", 0.0)
+    monkeypatch.setattr(compiler.compilation, "seconds", 0.0)
     monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
     with compiling():
         assert compiled.generated(f"{SQUARE}# watched\n").square(3.0) == 9.0
-        assert compiled.compilation.seconds > 0
-        monkeypatch.setattr(compiled.compilation, "seconds", 7.0)
+        assert compiler.compilation.seconds > 0
+        monkeypatch.setattr(compiler.compilation, "seconds", 7.0)
     lines = capsys.readouterr().err.splitlines()
     assert lines == [
         "stickslip: compiling for this machine, once; what is compiled is kept",
@@ -157,7 +177,7 @@ def test_who_watches_is_told_that_it_compiles_and_for_how_long(
 def test_who_does_not_watch_reads_nothing_of_it(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(compiled.compilation, "seconds", 7.0)
+    monkeypatch.setattr(compiler.compilation, "seconds", 7.0)
     with compiling():
         pass
     assert not capsys.readouterr().err
@@ -167,7 +187,7 @@ def test_the_log_tells_that_it_compiles(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     monkeypatch.setattr(compiled, "_root", lambda: tmp_path)
-    monkeypatch.setattr(compiled.compilation, "seconds", 0.0)
+    monkeypatch.setattr(compiler.compilation, "seconds", 0.0)
     with caplog.at_level("INFO", logger="stickslip"):
         compiled.generated(SQUARE).square(3.0)
     assert caplog.messages == ["compiling for this machine, once; what is compiled is kept"]

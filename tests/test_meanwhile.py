@@ -305,9 +305,9 @@ STRANGE = """
 import numba, numba.core.codegen, numba.core.compiler
 numba.__version__ = "0.99.0"
 del numba.core.codegen.JITCodeLibrary  # called otherwise
-from stickslip import compiled
+from stickslip import compiled, compiler
 fourth = compiled.generated({text!r}).fourth
-print(compiled.KNOWN, fourth(2.0), len(fourth.overloads))
+print(compiler.KNOWN, fourth(2.0), len(fourth.overloads))
 """
 
 

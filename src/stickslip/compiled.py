@@ -13,9 +13,7 @@ same source, while another process compiles.
 from __future__ import annotations
 
 import atexit
-import gc
 import hashlib
-import logging
 import os
 import re
 import shutil
@@ -26,34 +24,19 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from functools import cache
+from functools import cache, cached_property, update_wrapper
 from importlib.machinery import SourceFileLoader
 from importlib.util import module_from_spec, spec_from_loader
 from pathlib import Path
 from types import FunctionType, ModuleType
 from typing import Any
 
-import llvmlite.binding
-import llvmlite.ir
-import numba
 import numpy as np
-from numba import cfunc, config, njit, types
-from numba.core import event
 
 from stickslip.workers import processors
 
-# What compiles faster below goes into numba's own classes, which it may change with any release: for releases that are
-# not known yet there are none, and all is compiled as numba does by itself.
-KNOWN = (0, 61) <= tuple(map(int, numba.__version__.split(".")[:2])) <= (0, 68)
-if KNOWN:
-    from numba.core.codegen import JITCodeLibrary
-    from numba.core.compiler import Compiler, Flags
-else:
-    JITCodeLibrary = Compiler = Flags = object
-
 OPTIONS = {"error_model": "numpy", "_nrt": False}
 FAST = {**OPTIONS, "fastmath": {"contract", "nsz", "arcp"}}
-BARE = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 PACKAGE = Path(__file__).parent
 HOLDS_KERNELS = "@compiled("
 IMPORT = re.compile(r"^from (stickslip[\w.]*) import (\([^)]*\)|[^\n]+)", re.MULTILINE)
@@ -73,142 +56,64 @@ APART: dict[str, Any] = WINDOWS if sys.platform == "win32" else {"start_new_sess
 AHEAD = "from stickslip.compiled import beside\nwith beside():\n from stickslip.solve.simulate import ahead\n ahead()"
 
 
-class Compilation(event.Listener):  # type: ignore[misc]  # numba tells no types
-    """Says when numba begins to compile, which it does not for what it finds on disk, and counts for how long.
+class Kernel:
+    """A function that numba compiles with these options when it is first called, kept in :func:`folder`.
+
+    Until then numba is not imported: half a second, and most of an analysis calls no kernel. To compiled code that
+    calls it, it is numba's own, whose attributes it has.
 
     Attributes
     ----------
-    seconds : float
-        That this process has spent compiling so far.
+    py_func : callable
+        The function as it stands.
     """
 
-    def __init__(self) -> None:
-        self.seconds, self._depth, self._began, self._collects = 0.0, 0, 0.0, False
-        event.register("numba:compile", self)
+    def __init__(self, function: Callable[..., Any], options: dict[str, Any]) -> None:
+        update_wrapper(self, function)
+        self.py_func, self._options = function, options
 
-    def on_start(self, event: Any) -> None:
-        """A function, or one that it calls, is compiled."""
-        if not self._depth:
-            self._began = time.perf_counter()
-            self._collects = gc.isenabled()
-            gc.disable()  # numba's many small objects live until the end: to look for garbage takes a tenth of the time
-            if not self.seconds:
-                _say("compiling for this machine, once; what is compiled is kept")
-        self._depth += 1
+    def __call__(self, *arguments: Any, **named: Any) -> Any:
+        return self.dispatcher(*arguments, **named)
 
-    def on_end(self, event: Any) -> None:
-        """It is done."""
-        self._depth -= 1
-        if not self._depth:
-            self.seconds += time.perf_counter() - self._began
-            if self._collects:
-                gc.enable()
+    def __getattr__(self, name: str) -> Any:
+        if name.startswith("__"):
+            raise AttributeError(name)
+        return getattr(self.dispatcher, name)
 
-    def timed(self, compiler: Callable[[], Any]) -> Any:
-        """What a compiler makes that tells numba's listeners nothing; what it found on disk does not count."""
-        began = time.perf_counter()
-        made = compiler()
-        self.seconds += 0.0 if made.cache_hits else time.perf_counter() - began
-        return made
+    def __reduce__(self) -> str:
+        return self.py_func.__qualname__
 
-
-def _say(sentence: str) -> None:
-    """To who sits before a prompt of Python; else to who listens to the log of the package."""
-    if hasattr(sys, "ps1"):
-        print(f"stickslip: {sentence}", file=sys.stderr)
-    logging.getLogger(__package__).info(sentence)
-
-
-compilation = Compilation()
-
-
-class _Flags(Flags):  # type: ignore[misc]  # numba tells no types
-    """numba's own, compared by what was set: it compares all that may be, as often as it looks for a type."""
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, _Flags) and self._values == other._values
-
-    def __hash__(self) -> int:
-        return hash(frozenset(self._values))
-
-
-class _Shown(Compiler):  # type: ignore[misc]
-    """Compiles what Python calls, with all that it calls: for C it needs no entrance."""
-
-    def __init__(self, typing: Any, target: Any, library: Any, args: Any, result: Any, flags: Any, names: Any) -> None:
-        flags = _Flags(flags)
-        flags.no_cfunc_wrapper = True
-        super().__init__(typing, target, library, args, result, flags, names)
-
-
-class _Called(_Shown):
-    """Compiles what compiled code calls, as far as it is the same wherever it is called."""
-
-    def __init__(self, typing: Any, target: Any, library: Any, *rest: Any) -> None:
-        library = _Body(target.codegen(), "called")
-        library.enable_object_caching()
-        super().__init__(typing, target, library, *rest)
-
-
-class _Body(JITCodeLibrary):  # type: ignore[misc]
-    """Code that is linked into its callers and optimised there: by itself it would be so once more for each level of
-    calls, and made machine code of that nothing runs. That holds its globals for numba's environments alone."""
-
-    def _optimize_final_module(self) -> None:
-        pass
-
-    def _finalize_final_module(self) -> None:
-        self._finalized = True
-        shared = self._get_module_for_linking()
-        kept = [str(own) for own in shared.global_variables if own.name.startswith("_ZN08NumbaEnv")]
-        blank = str(self._codegen._create_empty_module(self.name))
-        self._final_module = llvmlite.binding.parse_assembly("\n".join([blank, *kept]))
-        super()._finalize_final_module()
+    @cached_property
+    def dispatcher(self) -> Any:
+        """What numba makes of it."""
+        return _numba().dispatcher(self.py_func, _folder_of(self.py_func), self._options)
 
 
 def compiled(**options: Any) -> Callable[[Callable[..., Any]], Any]:
-    """numba's `njit` with these options, kept in :func:`folder`.
-
-    What compiled code calls is compiled apart, without the entrances for Python and C and as :class:`_Body`: they took
-    a quarter of the time, its optimisation and machine code a third of the rest. A number that stands in the call is an
-    argument as any other: numba would compile the function anew for each.
-    """
-    quick = {"pipeline_class": _Shown} if KNOWN else {}
-
-    def compile_(function: Callable[..., Any]) -> Any:
-        shown = _keeping(njit, {**quick, **options})(function)
-        if not config.DISABLE_JIT:
-            shown.kept = folder(Path(function.__code__.co_filename))
-        if KNOWN and not config.DISABLE_JIT:
-            called = _keeping(njit, {"pipeline_class": _Called, **options, **BARE})(function)
-            shown.get_call_template = lambda given, named: called.get_call_template(map(types.unliteral, given), named)
-            shown.get_overload = called.get_overload
-        return shown
-
-    return compile_
+    """A :class:`Kernel` with these options of numba's `njit`."""
+    return lambda function: Kernel(function, options)
 
 
 def pointer(signature: Any, **options: Any) -> Callable[[Callable[..., Any]], Any]:
     """As :func:`compiled`, at once and for one signature: a function that compiled code takes as an argument."""
-
-    def compiler(**more: Any) -> Callable[[Callable[..., Any]], Any]:
-        return lambda function: compilation.timed(lambda: cfunc(signature, **more)(function))
-
-    return _keeping(compiler, options)
+    return lambda function: _numba().address(function, _folder_of(function), signature, options)
 
 
-def _keeping(compiler: Callable[..., Any], options: dict[str, Any]) -> Callable[[Callable[..., Any]], Any]:
-    def compile_(function: Callable[..., Any]) -> Any:
-        kept, place = config.CACHE_DIR, folder(Path(function.__code__.co_filename))
-        if place is None or config.DISABLE_JIT:
-            return compiler(**options)(function)
-        config.CACHE_DIR = str(place / "called" if BARE.keys() <= options.keys() else place)
-        try:
-            return compiler(cache=True, **options)(function)
-        finally:
-            config.CACHE_DIR = kept
+def dispatcher_of(kernel: Kernel) -> Any:
+    """What numba makes of a kernel, and of all that this calls: a GPU's compiler knows numba's own class alone."""
+    names = kernel.py_func.__globals__
+    for name, called in list(names.items()):
+        if isinstance(called, Kernel):
+            names[name] = called.dispatcher
+            dispatcher_of(called)
+    return kernel.dispatcher
 
-    return compile_
+
+def _numba() -> Any:
+    """numba, with what is made of it here."""
+    from stickslip import compiler
+
+    return compiler
 
 
 _plain: dict[str, dict[str, Any]] = {}
@@ -241,7 +146,7 @@ class Meanwhile:
     def now(self, kernel: Any, steps: int = 1) -> Callable[..., Any]:
         """The kernel where it is on disk or nobody else compiles it; else its source, for Python to run, where that
         takes no more than `MOST` steps."""
-        if kernel in self._ready or steps > MOST or not hasattr(kernel, "kept"):
+        if kernel in self._ready or steps > MOST or not hasattr(kernel, "overloads"):
             return kernel  # type: ignore[no-any-return]
         if self.seconds > PATIENCE or kernel.overloads or _on_disk(kernel) or not self._compiling():
             return self.awaited(kernel)
@@ -249,7 +154,7 @@ class Meanwhile:
 
     def awaited(self, kernel: Any) -> Callable[..., Any]:
         """The kernel, where another process compiles it once that is done: two would take as long."""
-        if kernel not in self._ready and hasattr(kernel, "kept"):
+        if kernel not in self._ready and hasattr(kernel, "overloads"):
             last = time.monotonic() + LONGEST
             while not (kernel.overloads or _on_disk(kernel)) and self._compiling() and time.monotonic() < last:
                 time.sleep(0.02)
@@ -277,15 +182,15 @@ class Meanwhile:
         if not self._tried:
             self._tried, self._own = True, _begun(root / LOCK)
             if self._own is not None:
-                _say("running uncompiled while another process compiles for this machine, once")
+                _numba().say("running uncompiled while another process compiles for this machine, once")
         return _held(root / LOCK) if self._own is None else self._own.poll() is None
 
 
 def _on_disk(kernel: Any) -> bool:
     """Whether numba has kept the machine code of a kernel: each is called with arguments of one kind."""
-    function = kernel.py_func
+    function, place = kernel.py_func, _folder_of(kernel.py_func)
     name = f"*/*.{function.__qualname__}-{function.__code__.co_firstlineno}.*.nbc"
-    return kernel.kept is not None and any(kernel.kept.glob(name))
+    return place is not None and any(place.glob(name))
 
 
 def _held(lock: Path) -> bool:
@@ -383,6 +288,10 @@ def _passing() -> Path:
     return Path(place.name)
 
 
+def _folder_of(function: Any) -> Path | None:
+    return folder(Path(function.__code__.co_filename))
+
+
 @cache
 def folder(file: Path) -> Path | None:
     """Where the compiled kernels of a file are kept; None where nothing may be written."""
@@ -400,9 +309,10 @@ def digest(file: Path) -> str:
 
 
 def _digest(texts: dict[Path, str]) -> str:
-    """What is compiled of these texts, and for whom: numba would compile anew for itself of another release."""
+    """What is compiled of these texts, and by what: numba would compile anew for itself of another release."""
     sources = (f"{file.relative_to(PACKAGE).as_posix()}\0{texts[file]}" for file in sorted(texts))
-    return hashlib.sha256("\0".join([numba.__version__, *sources]).encode()).hexdigest()[:16]
+    by = _numba().numba.__version__, _text(Path(_numba().__file__))
+    return hashlib.sha256("\0".join([*by, *sources]).encode()).hexdigest()[:16]
 
 
 def _closure(text: str) -> dict[Path, str]:
@@ -465,7 +375,7 @@ def _prune(root: Path) -> None:
 
 @cache
 def _root() -> Path | None:
-    chosen = [Path(config.CACHE_DIR)] if config.CACHE_DIR else []
+    chosen = [Path(kept)] if (kept := _numba().config.CACHE_DIR) else []
     # Not the common temporary folder: what numba finds there it would run, whoever put it there.
     for parent in (*chosen, PACKAGE / "__pycache__", _own_cache()):
         root = parent / "kernels"

@@ -112,7 +112,7 @@ def compiling() -> Iterator[None]:
     try:
         yield
     finally:
-        kernels = sys.modules.get("stickslip.compiled")  # not imported for this: a command without kernels starts light
+        kernels = sys.modules.get("stickslip.compiler")  # not imported for this: a command without kernels starts light
         if kernels is not None and kernels.compilation.seconds >= 1:
             log.info("compiled in %.0f s; the next run finds it", kernels.compilation.seconds)
         log.removeHandler(spoken)

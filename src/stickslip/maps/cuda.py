@@ -10,15 +10,19 @@ from typing import Any
 from numba import cuda
 from numba.cuda.cudadrv.driver import CudaAPIError
 
+from stickslip.compiled import dispatcher_of
 from stickslip.errors import ModelError, SolveError
+from stickslip.maps import watch
 from stickslip.maps.crowd import Heed, rooms, run_block
 from stickslip.maps.measures import LOG
 from stickslip.maps.plan import Keep, Plan
-from stickslip.maps.watch import Counted, Given, watch_one
+from stickslip.maps.watch import Counted, Given
 
 THREADS = 64  # of a block of the GPU
 FLOAT64 = (1, 3)  # compute capability with which NVIDIA's GPUs have it
 INSTEAD = 'take engine="threads"'
+
+watch_one = dispatcher_of(watch.watch_one)
 
 
 def run(plan: Plan, numbers: Sequence[int], keep: Keep) -> None:
