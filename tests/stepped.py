@@ -180,6 +180,17 @@ def _remembering(p, samples, settle, h, steps):  # type: ignore[no-untyped-def]
     return out, 0.0, 0
 
 
+def marched(rig: Rig, samples: int, settle: int, fs: float, steps: int) -> tuple[np.ndarray, float, int]:
+    """Displacement, velocity and acceleration at each sample, after `settle` others; time stuck [s], and stops."""
+    p = np.array([
+        rig.mass, rig.stiffness, rig.damping, rig.amplitude, 2 * np.pi * rig.frequency, rig.kinetic,
+        max(rig.static, rig.kinetic), rig.slope, rig.speed, rig.contact, rig.rate,
+        rig.exponent, rig.rough, rig.loss,
+    ])  # fmt: skip
+    march = {"compliant": _compliant, "LuGre": _remembering, "state variable": _remembering}.get(rig.kind, _rigid)
+    return march(p, samples, settle, 1 / (fs * steps), steps)
+
+
 def _written(values: np.ndarray, gain: float, level: float, rng: np.random.Generator, *, dirty: bool) -> np.ndarray:
     """A sensor's: with noise and a gain; a dirty one with an offset, a drift, and counts of 12 bits, too."""
     own = gain * values + level * rng.standard_normal(len(values))
@@ -206,14 +217,7 @@ def record(
     fs = float(np.clip(400 * rig.frequency, 200, 5000))
     cycle = fs / rig.frequency
     samples, settle = round(cycles * cycle), round(30 * cycle)
-    p = np.array([
-        rig.mass, rig.stiffness, rig.damping, rig.amplitude, 2 * np.pi * rig.frequency, rig.kinetic,
-        max(rig.static, rig.kinetic), rig.slope, rig.speed, rig.contact, rig.rate,
-        rig.exponent, rig.rough, rig.loss,
-    ])  # fmt: skip
-    march = {"compliant": _compliant, "LuGre": _remembering, "state variable": _remembering}.get(rig.kind, _rigid)
-    steps = 20 * STEPS if rig.kind in SOFT else STEPS
-    (x, v, a), held, stops = march(p, samples, settle, 1 / (fs * steps), steps)
+    (x, v, a), held, stops = marched(rig, samples, settle, fs, 20 * STEPS if rig.kind in SOFT else STEPS)
     time = (settle + np.arange(samples)) / fs
     z = rig.amplitude * np.sin(2 * np.pi * rig.frequency * time)
     true = {"x": x, "z": z}

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 import stickslip as ss
 from stickslip.errors import EstimateError, RecordError
 from stickslip.signals.alignment import Lines
+from stickslip.signals.jumps import band_limited, unresolved_jumps
 from stickslip.signals.response import derivative_spectra, window
 
 Array = NDArray[np.float64]
@@ -61,7 +62,7 @@ def test_the_misfit_is_expanded_as_its_residuals_change() -> None:
     rng, n = np.random.default_rng(1), 50
     waves = rng.standard_normal((5, n)) + 1j * rng.standard_normal((5, n))
     noise = rng.uniform(0.5, 2.0, (2, n))
-    lines = Lines(rng.uniform(1.0, 3.0, n), waves[0], waves[1:4], noise, waves[4])
+    lines = Lines(rng.uniform(1.0, 3.0, n), waves[0], waves[1:4], noise, waves[4], np.ones(n, dtype=bool))
     theta, steps = np.array([0.1, 1.3, 0.2, 0.15]), 1e-5 * np.eye(4)
     value, slopes, curvature, products = lines.expansion(theta)
     by_theta = np.array([lines.residual(theta + d) - lines.residual(theta - d) for d in steps]) / 2e-5
@@ -246,6 +247,49 @@ def test_a_long_record_in_blocks_says_the_same(monkeypatch: pytest.MonkeyPatch) 
     parts = ss.balance.sensor_delay(record).delay
     assert abs(parts.value - whole.value) < 2 * bound()
     assert parts.sd == pytest.approx(whole.sd, rel=0.15)
+
+
+def square(offset: float, delay: float, *, filtered: bool) -> ss.Record:
+    """x and a of an acceleration of +-1 m/s^2 that jumps each 20 samples, `offset` samples after one; a is late."""
+    rng, turn = np.random.default_rng(1), 2 * math.pi * FS / 40
+    waves = turn * np.arange(1, 16 if filtered else 400, 2)[:, None]  # up to 0.375 of the rate
+    times = T - offset / FS
+    x = np.sum(-4 * turn / math.pi / waves**3 * np.sin(waves * times), axis=0)
+    a = np.sign(np.sin(turn * (times - delay)))
+    if filtered:
+        a = np.sum(4 * turn / math.pi / waves * np.sin(waves * (times - delay)), axis=0)
+    noise = {"x": 2e-7, "a": 0.01}
+    return ss.Record.of(
+        {name: v + noise[name] * rng.standard_normal(T.size) for name, v in (("x", x), ("a", a))}, fs=FS
+    )
+
+
+@pytest.mark.parametrize(("offset", "delay"), [(0.1, 0.0), (0.5, 0.0), (0.8, 0.0), (0.5, 1.7e-3)])
+def test_jumps_sampled_without_a_filter_leave_a_delay_unknown_by_half_a_sample(offset: float, delay: float) -> None:
+    """Each comes at the same instant between two samples: from there to either of them no reading differs."""
+    raw = ss.balance.sensor_delay(square(offset, delay, filtered=False))
+    assert raw.delay.includes(delay)
+    assert 0.2 < raw.delay.sd * FS < 0.35  # 1/sqrt(12) where nothing but jumps tells the delay
+    assert raw.mount_frequency is None
+    assert raw.gain.includes(1.0)
+    assert "between two samples" in raw.delay.checks[0]
+    filtered = ss.balance.sensor_delay(square(offset, delay, filtered=True)).delay
+    assert filtered.includes(delay)
+    assert filtered.sd * FS < 0.02
+
+
+def test_unresolved_jumps_are_those_that_no_sample_lies_on() -> None:
+    steps = np.where(np.arange(400) // 50 % 2, 1.0, -1.0)
+    noise = 0.01 * np.random.default_rng(1).standard_normal(400)
+    jumps = unresolved_jumps(steps + noise).sizes
+    assert np.flatnonzero(jumps).tolist() == [49, 99, 149, 199, 249, 299, 349]
+    np.testing.assert_allclose(np.abs(jumps[jumps != 0]), 2.0, atol=0.06)
+    assert unresolved_jumps(np.sin(np.arange(400) / 9)).unresolved < 1e-3
+    lines = np.arange(1, 39, 2)[:, None]  # of a square wave of 100 samples: up to 0.39 of the rate
+    smooth = np.sum(np.sin(lines * 2 * np.pi * (np.arange(400) - 49.3) / 100) / lines, axis=0) * 4 / np.pi
+    assert unresolved_jumps(smooth + noise).unresolved < 0.03
+    limited = np.fft.rfft(band_limited(steps, np.diff(steps))[100:300]) * np.exp(2j * np.pi * np.arange(101) / 400)
+    np.testing.assert_allclose(np.abs(limited[2:80:4]), 400 / (np.pi * np.arange(1, 40, 2)), rtol=0.02)
 
 
 def test_channels_that_do_not_follow_one_motion_are_told() -> None:

@@ -46,6 +46,8 @@ class Pair:
         Standard deviation of each one's noise in a sample.
     order : int
         0, 1 or 2.
+    highest : float
+        Part of the sampling rate up to which lines are used.
     """
 
     first: Array
@@ -53,6 +55,7 @@ class Pair:
     fs: float
     noise: tuple[float, float]
     order: int
+    highest: float = HIGHEST
 
     def stretches(self, delay: float, room: int = 0) -> Iterator[Lines]:
         """All of it, one window each, with the first later by `delay` [s]; `room` samples at both ends are left out."""
@@ -71,7 +74,8 @@ class Pair:
         turn = np.asarray(2 * math.pi * np.fft.rfftfreq(count, 1 / self.fs), dtype=np.float64)
         flat = window(count)
         noise = [self.noise[0] ** 2 * turn ** (2 * self.order), np.full_like(turn, self.noise[1] ** 2)]
-        return Lines(turn, first, second, float(np.sum(flat**2)) * np.array(noise), np.fft.rfft(flat))
+        power = float(np.sum(flat**2)) * np.array(noise)
+        return Lines(turn, first, second, power, np.fft.rfft(flat), turn < 2 * math.pi * self.highest * self.fs)
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,6 +94,8 @@ class Lines:
         Power of the noise in the first one's derivative and in the second.
     constant : ndarray (n,)
         What the window makes of an offset.
+    inside : ndarray (n,) of bool
+        Whether it may be used.
     """
 
     turn: Array
@@ -97,13 +103,13 @@ class Lines:
     second: Complex
     noise: Array
     constant: Complex
+    inside: Mask
 
     @property
     def clear(self) -> Mask:
         """Lines above the noise in either sensor, whatever the phase between them: the choice favours no delay."""
         loud = np.any(np.abs([self.first, self.second[0]]) ** 2 > CLEAR * self.noise, axis=0)
-        inside = np.arange(len(self.turn)) < 2 * HIGHEST * len(self.turn)
-        return np.asarray(loud & inside & (self.turn > 0))
+        return np.asarray(loud & self.inside & (self.turn > 0))
 
     @property
     def information(self) -> Array:
@@ -124,9 +130,7 @@ class Lines:
 
     def chosen(self, which: Mask) -> Lines:
         """Some of the lines."""
-        return Lines(
-            self.turn[which], self.first[which], self.second[:, which], self.noise[:, which], self.constant[which]
-        )
+        return Lines(*(getattr(self, field.name)[..., which] for field in fields(self)))
 
     @property
     def telling(self) -> Lines:
@@ -214,12 +218,15 @@ class Alignment:
         Sum of squares of the residual over its deviation, real and imaginary parts apart.
     lines : Lines
         Those used.
+    moved : array_like (4,)
+        How far theta may lie away, as likely anywhere up to there, for what the samples did not resolve.
     """
 
     theta: Array
     covariance: Array
     misfit: float
     lines: Lines
+    moved: Array | tuple[float, ...] = (0.0, 0.0, 0.0, 0.0)
 
     @property
     def delay(self) -> float:
@@ -239,7 +246,12 @@ class Alignment:
     def sd(self, slope: Sequence[float]) -> float:
         """Standard deviation of what changes with theta by `slope`."""
         variance = float(np.dot(slope, self.covariance @ slope))
-        return math.sqrt(max(0.0, variance) * self.widening)  # rounding may leave less than none
+        beyond = float(np.dot(slope, self.moved)) ** 2 / 3
+        return math.sqrt(max(0.0, variance) * self.widening + beyond)  # rounding may leave less than none
+
+    def unsure_by(self, other: Alignment) -> Alignment:
+        """The same, where it may lie as far away as another."""
+        return replace(self, moved=other.theta - self.theta)
 
 
 def align(
