@@ -147,15 +147,13 @@ def _taken(path: Path) -> FormatError:
 
 
 def _write_csv(path: Path, columns: Columns, _: str) -> None:
-    import pandas as pd
-
     with path.open("w", encoding="utf-8", newline="") as file:
         file.write(",".join(f"{name} [{unit}]" for name, (unit, _) in columns.items()) + "\n")
         rows = len(next(iter(columns.values()))[1])
         for first in range(0, rows, ROWS_AT_ONCE):
-            part = {name: values[first : first + ROWS_AT_ONCE] for name, (_, values) in columns.items()}
-            # pandas writes the shortest digits that give the same float back
-            pd.DataFrame(part).to_csv(file, header=False, index=False, na_rep="nan", lineterminator="\n")
+            # repr gives the shortest digits that are the same float again
+            part = (map(repr, values[first : first + ROWS_AT_ONCE].tolist()) for _, values in columns.values())
+            file.writelines(f"{','.join(row)}\n" for row in zip(*part, strict=True))
 
 
 def _write_hdf5(path: Path, columns: Columns, metadata: str) -> None:
