@@ -128,7 +128,7 @@ def test_a_failure_half_way_leaves_the_old_file(tmp_path: Path, suffix: str, mon
     before = path.read_bytes()
     broken = replace(example(10), truth={"level": 2.0})
     writer = {
-        ".csv": "pandas.DataFrame.to_csv",
+        ".csv": "stickslip.files.write.checksum",
         ".h5": "h5py.Group.create_dataset",
         ".parquet": "pyarrow.parquet.write_table",
     }
