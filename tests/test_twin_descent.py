@@ -11,7 +11,7 @@ import pytest
 import stepped
 import stickslip as ss
 from stickslip.twin import descent, search
-from stickslip.twin.belief import BENT, GIVE, HELD, KINETIC, LOSS, RATE, SLOPE, Belief
+from stickslip.twin.belief import BENT, EXCESS, GIVE, HELD, KINETIC, LOSS, RATE, SLOPE, Belief
 
 RIG = stepped.Rig("compliant", 0.52, 0.51, 0.0122, 1.02e-3, 0.248, kinetic=2.08e-4, contact=2.556, loss=0.172)
 
@@ -39,6 +39,42 @@ def test_a_damped_contact_is_found_from_along_its_valley() -> None:
             end = descent.refined(replace(best.at(**along), fit=None))
             assert best.fit.freedom * math.log(descent.misfit(end) / descent.misfit(best)) < 1
             assert end.contact == pytest.approx(RIG.contact, rel=0.01)
+
+
+def test_a_descent_goes_on_while_it_tells_laws_apart() -> None:
+    """Of a contact whose damping was held far off, with the mass and the spring astray for it: 74 above the floor."""
+    rng = np.random.default_rng(np.random.SeedSequence([311101, 3]).spawn(1)[0])
+    rig = stepped.drawn("compliant", rng)
+    rig = replace(rig, loss=rng.uniform(0, 0.15) * np.sqrt(rig.contact * rig.mass))
+    record = stepped.record(rig, rng, noise=10 ** rng.uniform(-4, -2.3), off=0.005)
+    record = record.with_details("x", gain_sd=0.005).with_details("z", gain_sd=0.005)
+    written = {name: value * (1 + 0.005 * rng.standard_normal()) for name, value in rig.stated.items()}
+    told = ss.friction_force(record, **{name: (value, 0.005 * value) for name, value in written.items()})
+    (drive,) = search.possible_drives(told, ss.drives.HarmonicBase(0.0, frequency=1.0))
+    simple = search._linear(told, ss.Oscillator(law=search.LinearSlope(0.0, slope=0.0), **written), drive)
+    astray = {
+        "x": -6.5096e-4, "v": 2.33113e-3, "mass": 0.32021, "spring": 0.296247, "damper": 0.0, "gain of x": -5.0927e-3,
+        "drive 0": -5.13297e-3, KINETIC: 6.084e-3, SLOPE: -7.4406e-3, GIVE: 6.770135, BENT: 1.124e-3, LOSS: 0.5,
+    }  # fmt: skip
+    ends = [descent.descended(simple.as_stated().at(**astray), passes)[0] for passes in (20, 100)]
+    assert ends[0].fit is not None
+    assert ends[0].fit.freedom * math.log(descent.misfit(ends[0]) / descent.misfit(ends[1])) < 1
+
+
+@pytest.mark.parametrize("static", [None, 2.6])
+def test_what_comes_back_to_the_law_it_contains_is_led_no_further(static: float | None) -> None:
+    """A stiffness that goes on rising, on a contact that does not give way: where static friction tells x better."""
+    law = ss.laws.Coulomb(2.0, static=static)
+    slider = ss.Oscillator(mass=2.0, stiffness=800, law=law, drive=ss.drives.HarmonicBase(4e-3, 2.0))
+    record = ss.Rig.perfect("x", "z").having("x", white=1e-6).measure(ss.simulate(slider, duration=3), fs=500, rng=1)
+    told = ss.friction_force(record, mass=2.0, stiffness=800.0, damping=0.0)
+    (drive,) = search.possible_drives(told, slider.drive)
+    simple = search._linear(told, slider, drive)
+    rigid = descent.refined(simple.at(**{EXCESS: 0.3}))
+    stiff = descent.linearised(simple.at(**{GIVE: math.log(4e9), BENT: 0.0}))
+    families = [[rigid], [stiff]]
+    promising = search._promising(families, simple, None)
+    assert promising == (families if static is None else [[rigid]])
 
 
 def test_a_memory_without_friction_has_slopes() -> None:

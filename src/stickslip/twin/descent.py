@@ -13,7 +13,10 @@ from stickslip.statistics import correlation_time
 from stickslip.twin.belief import BENT, HELD, NUDGE, Belief, Fit, levelled
 
 QUESTION = "the twin of a record"
-PASSES = 20  # of the descent: in a narrow valley; elsewhere the first two do nearly all of it
+# Of the descent: in a narrow valley; elsewhere the first two do nearly all of it. At most so many times as many, as
+# long as one gains more of chi-squared than tells a law from another by chance in a hundred: 20 alone ended 74 above
+# the floor where a damping was let go of, the mass 64 standard deviations off (benchmarks/twins.py, seed 311101).
+PASSES, LONGER, TELLING = 20, 5, 6.6
 # Of a step, over the noise, tried in turn. Newton's step halved leads out of a bent valley: of a damped contact's
 # stiffness, damping and deflection it ended 79 of chi-squared above the floor, 5 % too stiff and sure of it.
 DAMPINGS = tuple(10.0**power for power in range(8))
@@ -51,10 +54,11 @@ def descended(belief: Belief, passes: int, *, roughly: bool = False) -> tuple[Be
         if moved is not None and misfit(moved) < LEARNS * before:
             belief, fresh = _updated_by_broyden(belief, moved), False
             continue
-        ended = fresh and (moved is None or _chi_squared_gained(belief, moved) < SETTLED)
+        gained = 0.0 if moved is None else _chi_squared_gained(belief, moved)
+        ended, most = fresh and gained < SETTLED, passes if roughly or gained < TELLING else LONGER * passes
         if moved is not None:
             belief, fresh = moved, False
-        if ended or taken >= passes:
+        if ended or taken >= most:
             break
         belief, fresh, taken = linearised(belief), True, taken + 1
     return belief, fresh
