@@ -428,8 +428,12 @@ class Belief:
     @property
     def like_noise(self) -> bool:
         """Whether it leaves no more of the displacement than its noise, and the constants within their uncertainty."""
-        level = self._with_counts(self.sensor.noise.level)
-        return float(np.std(self.residual)) < NEAR * level and self.strain < REACH
+        return self.over_noise < NEAR and self.strain < REACH
+
+    @property
+    def over_noise(self) -> float:
+        """What it leaves of the displacement, over its noise."""
+        return float(np.std(self.residual)) / self._with_counts(self.sensor.noise.level)
 
     @property
     def start(self) -> dict[str, float]:

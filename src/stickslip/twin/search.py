@@ -188,19 +188,20 @@ def _significant(belief: Belief, part: str) -> bool:
 
 def _richer(simple: Belief, mapped: Map) -> Belief:
     """With the parts that leave the least of the displacement, where that is less than chance would leave."""
-    laws = _search(_candidates(simple), simple.record, mapped)
+    record = simple.record
+    laws = _search(_candidates(simple), record, mapped, contained=simple)
     # their chances say nothing of each other: each counts as many independent samples as its own residual has
     best = _simplest([law for law in laws if _p_value(simple, law) < CHANCE] or [simple])
-    if GIVE in best.values:
-        softer = _search(_compliant_candidates(best), simple.record, mapped)
-        damped = [replace(law, held="") for law in softer if law.held == LOSS]
-        laws += [law for law in softer if law.held != LOSS]
-        laws += _distinct(sorted(mapped(partial(_refined_on, record=simple.record), damped), key=misfit))
+    if GIVE in (give := best).values:
+        damped = [replace(law, held="") for law in _search(_damped_candidates(give), record, mapped)]
+        laws += _distinct(sorted(mapped(partial(_refined_on, record=record), damped), key=misfit))
+        best = _simplest([law for law in laws if GIVE in law.values])
+        laws += _search(_softer_candidates(give), record, mapped, best=best)
         best = _simplest([law for law in laws if {GIVE, RATE} & law.values.keys()])
     if SPEED in best.values:
-        laws += _search(_stribeck_candidates(best), simple.record, mapped)
+        laws += _search(_stribeck_candidates(best), record, mapped, best=best)
     elif GIVE in best.values:
-        laws += _search(_falling_candidates(best), simple.record, mapped)
+        laws += _search(_falling_candidates(best), record, mapped, best=best)
     return replace(best, rivals=tuple(law for law in laws if law is not best and _as_likely(law, best)))
 
 
@@ -240,8 +241,18 @@ def _score_favours(belief: Belief, name: str) -> bool:
     return float(column @ belief.residual) ** 2 > SLIPPED * float(column @ column) * fit.weight
 
 
-def _search(families: list[list[Belief]], record: Record, mapped: Map) -> list[Belief]:
-    """The nearest of each family and others as near, over the whole record where its beginning allows them."""
+def _search(
+    families: list[list[Belief]],
+    record: Record,
+    mapped: Map,
+    *,
+    contained: Belief | None = None,
+    best: Belief | None = None,
+) -> list[Belief]:
+    """The nearest of each family and others as near, over the whole record where its beginning allows them.
+
+    Beside a law that all families contain, and the best that is known.
+    """
     horizons = [record.rows(0, samples) for samples in _horizons(record)]
     # what a process is sent is short: with the whole record and its slopes 200 starts were 3 GB
     families = [[replace(begun, record=horizons[0], fit=None) for begun in family] for family in families]
@@ -251,6 +262,9 @@ def _search(families: list[list[Belief]], record: Record, mapped: Map) -> list[B
     for beginning in horizons:  # starts that have come to one valley go on as one
         step = partial(_descended_on, record=beginning)
         families = [_distinct(family) for family in _advanced(families, step, mapped)]
+        known = (law and replace(law, record=beginning, fit=None) for law in (contained, best))
+        if not (families := _promising(families, *known)):
+            return []
     families = _advanced(families, _with_slope, mapped)
     nearest = [law for family in families for law in _minima(family)]
     least: float = min(misfit(law) for law in nearest)
@@ -261,6 +275,22 @@ def _advanced(families: list[list[Belief]], step: Callable[[Belief], Belief], ma
     """All families a step further, each with its nearest first; in one round, so that no process waits for another."""
     moved = iter(mapped(step, [begun for family in families for begun in family]))
     return [sorted(itertools.islice(moved, len(family)), key=misfit) for family in families]
+
+
+def _promising(families: list[list[Belief]], contained: Belief | None, best: Belief | None) -> list[list[Belief]]:
+    """Those that may still come to something.
+
+    What leaves no less than the law that all of them contain, where one is certain to, is on its way back to that law:
+    on a rigid contact a stiffness goes on rising, for half of a search. What leaves far more than another, which leaves
+    hardly more than noise, is of the wrong kind.
+    """
+    nearest = min((family[0] for family in families), key=misfit)
+    limits = [FAR * misfit(law) for law in (nearest, best) if law is not None and law.over_noise**2 < FAR]
+    if contained is not None and nearest.fit is not None:
+        gained = nearest.fit.freedom * math.log(misfit(contained) / misfit(nearest))
+        limits += [misfit(contained)] if gained > CERTAIN else []
+    kept = ([law for law in family if misfit(law) <= min(limits, default=math.inf)] for family in families)
+    return [family for family in kept if family]
 
 
 def _evaluated(begun: Belief) -> Belief:
@@ -378,18 +408,23 @@ def _candidates(simple: Belief) -> list[list[Belief]]:
     return [rigid, compliant, [begun.without(SLOPE) for begun in falling]]  # beside it a slope would lead astray
 
 
-def _compliant_candidates(give: Belief) -> list[list[Belief]]:
-    """Beginnings of what else may look like a contact that gives way: one with a damping, bristles, or a lag."""
-    record = give.record
-    furthest, fastest = (float(np.max(np.abs(record[name]))) for name in "xv")
-    # first beside a stiffness that suits it: moved at once, it was led back to none, a stiffness 25 % too large
-    damped = [[replace(give.as_stated().at(**{LOSS: loss}), held=LOSS)] for loss in LOSSES]
+def _damped_candidates(give: Belief) -> list[list[Belief]]:
+    """Beginnings of a contact that has a damping, too.
+
+    First beside a stiffness that suits it: moved at once, it was led back to none, a stiffness 25 % too large.
+    """
+    return [[replace(give.as_stated().at(**{LOSS: loss}), held=LOSS)] for loss in LOSSES]
+
+
+def _softer_candidates(give: Belief) -> list[list[Belief]]:
+    """Beginnings of what else may look like a contact that gives way: bristles, or a friction that lags."""
+    furthest, fastest = (float(np.max(np.abs(give.record[name]))) for name in "xv")
     bristles = [begun for excess in EXCESSES[1:4] for begun in _bristles(give, excess)]
     # x may tell bristles from a spring, and nothing of how their friction falls
     level = [_slid(give).at(**{KINETIC: part * give.values[KINETIC]}) for part in LEVELS]
     rates = [math.log(rate * fastest / furthest) for rate in RATES]
     lags = [_slid(give).without(GIVE).at(**{RATE: rate}) for rate in rates]
-    return [*damped, level, bristles, lags]
+    return [level, bristles, lags]
 
 
 def _falling_candidates(give: Belief) -> list[list[Belief]]:
