@@ -8,9 +8,12 @@ import numpy as np
 import pytest
 from scipy.signal import butter, lfilter
 
+import stepped
 import stickslip as ss
 from rigs import CASES, RIG, SETTLED, measured, told
+from stickslip.cycle.onset import NOT_ABOVE
 from stickslip.errors import EstimateError, RecordError
+from stickslip.estimate import kinds, stands
 
 MASS, STIFFNESS, FS = 3.08, 1191.0, 500.0
 
@@ -33,6 +36,49 @@ def test_static_friction_is_found_whether_it_is_higher_or_not(static: float) -> 
         assert each.value == pytest.approx(static, rel=0.03)
     assert breakaway.ringing_forward is None
     assert breakaway.status == "ok"
+
+
+@pytest.mark.parametrize("kind", ["Coulomb", "static", "Stribeck"])
+def test_a_contact_that_never_sticks_tells_no_static_friction(kind: str) -> None:
+    """By the rigs of another integrator: what pulls as it turns round moves the mass: it is up to 20 times too much."""
+    refused = 0
+    for draw in range(8):
+        rng = np.random.default_rng([701, draw])
+        rig = stepped.drawn(kind, rng)
+        record = stepped.record(rig, rng)
+        if record.truth["stuck share of the time"]:
+            continue
+        with pytest.raises(EstimateError, match="never sticks"):
+            ss.cycle.breakaway(ss.friction_force(record, **rig.stated))
+        refused += 1
+    assert refused >= 3
+
+
+@pytest.mark.parametrize("speed", [0.0, 0.15])
+def test_static_friction_holds_whether_it_falls_at_once_or_with_the_speed(speed: float) -> None:
+    """The pull at which the slip begins, on the side where rigs of another integrator stick; one of six may be out."""
+    held = 0
+    for draw in range(6):
+        rng = np.random.default_rng([702, draw])
+        pull, turn = 1800 * 1.5e-3, 2 * np.pi * 2.5
+        rig = stepped.Rig(
+            "Stribeck" if speed else "static", 1.5, 1800, 0.9, 1.5e-3, 2.5, kinetic=0.26 * pull * rng.uniform(0.9, 1.1),
+            static=0.44 * pull, speed=speed * 1.5e-3 * turn,
+        )  # fmt: skip
+        static = ss.cycle.breakaway(ss.friction_force(stepped.record(rig, rng), **rig.stated)).forward
+        assert static is not None
+        assert static.interval[1] - static.interval[0] < 0.4 * rig.static
+        held += static.includes(rig.static)
+    assert held >= 5
+
+
+def test_a_static_friction_below_the_sliding_one_bears_a_doubt() -> None:
+    """Friction that grows with speed is larger as it slides than at rest: the number stands, and says so."""
+    found = ss.cycle.breakaway(driven(ss.laws.LinearSlope(1.0, slope=8.0)))
+    for estimate in (found.forward, found.back, found.ratio):
+        assert estimate is not None
+        assert NOT_ABOVE in kinds(estimate.status)
+        assert stands(estimate.status)
 
 
 def heard(
