@@ -13,10 +13,12 @@ from stickslip.statistics import correlation_time
 from stickslip.twin.belief import BENT, HELD, NUDGE, Belief, Fit, levelled
 
 QUESTION = "the twin of a record"
-# Of the descent: in a narrow valley; elsewhere the first two do nearly all of it. At most so many times as many, as
-# long as one gains more of chi-squared than tells a law from another by chance in a hundred: 20 alone ended 74 above
-# the floor where a damping was let go of, the mass 64 standard deviations off (benchmarks/twins.py, seed 311101).
+# Of the descent: in a narrow valley; elsewhere the first two do nearly all of it. At most so many times as many of a
+# law that explains x, as long as one gains more of chi-squared than tells a law from another by chance in a hundred:
+# 20 alone ended 74 above the floor where a damping was let go of, the mass 64 standard deviations off (seed 311101 of
+# benchmarks/twins.py). A law that does not explain x goes on straining its constants, and away from what is true.
 PASSES, LONGER, TELLING = 20, 5, 6.6
+FAR = 2.0  # times what a law leaves, or noise, beyond which another is of the wrong kind
 # Of a step, over the noise, tried in turn. Newton's step halved leads out of a bent valley: of a damped contact's
 # stiffness, damping and deflection it ended 79 of chi-squared above the floor, 5 % too stiff and sure of it.
 DAMPINGS = tuple(10.0**power for power in range(8))
@@ -55,13 +57,18 @@ def descended(belief: Belief, passes: int, *, roughly: bool = False) -> tuple[Be
             belief, fresh = _updated_by_broyden(belief, moved), False
             continue
         gained = 0.0 if moved is None else _chi_squared_gained(belief, moved)
-        ended, most = fresh and gained < SETTLED, passes if roughly or gained < TELLING else LONGER * passes
+        ended, longer = fresh and gained < SETTLED, gained > TELLING and explains(belief) and not roughly
         if moved is not None:
             belief, fresh = moved, False
-        if ended or taken >= most:
+        if ended or taken >= passes * (LONGER if longer else 1):
             break
         belief, fresh, taken = linearised(belief), True, taken + 1
     return belief, fresh
+
+
+def explains(belief: Belief) -> bool:
+    """Whether it leaves hardly more of the displacement than noise would."""
+    return belief.over_noise**2 < FAR
 
 
 def _chi_squared_gained(before: Belief, after: Belief) -> float:

@@ -43,7 +43,7 @@ from stickslip.twin.belief import (
     Belief,
     levelled,
 )
-from stickslip.twin.descent import QUESTION, SETTLED, descended, misfit, refined, slope_of
+from stickslip.twin.descent import FAR, QUESTION, SETTLED, descended, explains, misfit, refined, slope_of
 from stickslip.workers import Map
 
 # How many starts, cycles and passes: by trial on the rigs of benchmarks/twins.py with Stribeck's curve, constants half
@@ -51,7 +51,6 @@ from stickslip.workers import Map
 STARTS = 9  # of a grid, that are led over a first cycle: some end in a valley of their own
 KEPT = 4  # of them, the nearest, that are led further; one where a value is held: its valley is the same (seed 911)
 SAME = 0.01  # of its size, by which a part may differ between two searches that came to the same end
-FAR = 2.0  # times what the best law leaves of the beginning, beyond which a law is not led over the whole record
 HORIZONS = (1.0, 3.0)  # cycles over which a start is led to the record before it is over more
 STEPS = 4  # passes of it over each
 LEAST = 50  # samples
@@ -281,11 +280,11 @@ def _promising(families: list[list[Belief]], contained: Belief | None, best: Bel
     """Those that may still come to something.
 
     What leaves no less than the law that all of them contain, where one is certain to, is on its way back to that law:
-    on a rigid contact a stiffness goes on rising, for half of a search. What leaves far more than another, which leaves
-    hardly more than noise, is of the wrong kind.
+    on a rigid contact a stiffness goes on rising, for half of a search. What leaves far more than another that explains
+    x is of the wrong kind.
     """
     nearest = min((family[0] for family in families), key=misfit)
-    limits = [FAR * misfit(law) for law in (nearest, best) if law is not None and law.over_noise**2 < FAR]
+    limits = [FAR * misfit(law) for law in (nearest, best) if law is not None and explains(law)]
     if contained is not None and nearest.fit is not None:
         gained = nearest.fit.freedom * math.log(misfit(contained) / misfit(nearest))
         limits += [misfit(contained)] if gained > CERTAIN else []
