@@ -534,6 +534,13 @@ def test_help_is_there_before_the_heavy_libraries_are() -> None:
     assert ours < 3 * least
 
 
+def test_the_quick_questions_are_there_without_compiler_and_solver() -> None:
+    """They took half a second of every quick answer, for a question of the record's channels."""
+    code = "import sys, stickslip.answers.questions; print(*sys.modules)"
+    loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
+    assert not [name for name in loaded if name == "numba" or name.startswith(("stickslip.solve.", "stickslip.twin."))]
+
+
 def _processor_seconds(command: list[object]) -> float:
     """Of a program that has nothing to wait for; another program's load does not add to them."""
     begun = resource.getrusage(resource.RUSAGE_CHILDREN)

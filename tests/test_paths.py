@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from stickslip.figures.compact import LONG, compact
+from stickslip.figures.style import LONG, compact
 
 Array = NDArray[np.float64]
 

@@ -10,9 +10,9 @@ import pytest
 from numpy.typing import NDArray
 
 import stickslip as ss
+from stickslip.balance.lag import band_limited, unresolved_jumps
 from stickslip.errors import EstimateError, RecordError
 from stickslip.signals.alignment import Lines
-from stickslip.signals.jumps import band_limited, unresolved_jumps
 from stickslip.signals.response import derivative_spectra, window
 
 Array = NDArray[np.float64]

@@ -17,7 +17,7 @@ from stickslip.answers.preparation import AT_ONCE, CONSTANTS, MOTION, described,
 from stickslip.balance.balance import Balance, pulled_slider
 from stickslip.balance.force import FUSIONS, friction_force
 from stickslip.balance.likely_contact import STRAYING
-from stickslip.balance.motion import is_measured, slid_on
+from stickslip.balance.motion import is_measured, lacking, slid_on
 from stickslip.consistent.checks import Slip
 from stickslip.consistent.contradictions import consistency
 from stickslip.contact.cause import lag_or_compliance
@@ -33,7 +33,6 @@ from stickslip.record.flaws import constant
 from stickslip.record.record import RIG_UNITS, Record, require_record
 from stickslip.rig.settings import RigSettings, rig_settings
 from stickslip.statistics import student
-from stickslip.twin.search import lacking
 from stickslip.units import parse_unit
 
 STRETCH = 1 << 14  # samples in which the contact is fitted
@@ -152,7 +151,7 @@ def _findings(record: Record, rig: RigSettings, method: str, questions: Sequence
             answers[question.key] = inquiry.ask(question.name, partial(_answer, question, whole, fused, slid))
     slips = mistakes(record, rig, answers.get("consistency"), answers.get("loops"), unseen=base_unseen(whole))
     answers = doubted(answers, whole, slips, unknown=made.doubt, refusals=inquiry.refusals)
-    answers = untried(answers) if lacking(whole) is None else answers
+    answers = untried(answers) if lacking(whole, "the twin of a record") is None else answers
     if all(answer is None for answer in answers.values()):
         raise _nothing(name, record, inquiry.refusals)
     names = [question.key for question in QUESTIONS]

@@ -9,7 +9,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from stickslip.arrays import Array, Mask, Rows
-from stickslip.errors import EstimateError, RecordError
+from stickslip.errors import EstimateError, RecordError, StickslipError
 from stickslip.estimate import Estimate
 from stickslip.record.flaws import constant
 from stickslip.record.record import Record
@@ -18,6 +18,7 @@ from stickslip.signals.noise import noise_level
 from stickslip.statistics import least_squares, mean_of_cycles
 from stickslip.units import parse_value
 
+DRIVES = {"z": "base", "force": "force"}  # channels of what moves the mass, and what each moves
 LEAST = 32  # samples
 FORCES = {"m": "N", "rad": "N m"}  # what does work on a displacement, or an angle
 AUDIBLE = 5.0  # a speed of five standard deviations of its noise is motion
@@ -416,3 +417,30 @@ def definite_speed(motion: Motion) -> float:
 def _typical_peak(velocity: Array, edges: Array) -> float:
     starts = np.ceil(edges).astype(int)
     return float(np.median(np.maximum.reduceat(np.abs(velocity[: starts[-1]]), starts[:-1])))
+
+
+def driving(record: Record) -> str | None:
+    """The channel of what moves the mass: of the base's motion z, or of a force on it; None where neither changes."""
+    return next((name for name in DRIVES if name in record and np.ptp(record[name]) > 0), None)
+
+
+def lacking(record: Record, question: str) -> StickslipError | None:
+    """What a record lacks to have a twin, as an error; None where it lacks nothing."""
+    stated = record.rig
+    if stated is None or stated.mass is None or stated.stiffness is None or is_measured(record, "friction"):
+        return EstimateError(
+            "a friction without a balance of forces behind it",
+            f"{question} needs the mass and the spring that moved",
+            "state mass and stiffness",
+        )
+    try:
+        record.require("x", "v", question=question)
+    except StickslipError as error:
+        return error
+    if driving(record) is None:
+        return EstimateError(
+            "neither a motion z of the base nor an applied force",
+            f"{question} is moved as the record was",
+            "record what moves the mass",
+        )
+    return None

@@ -11,9 +11,8 @@ import numpy as np
 from stickslip.balance.balance import ALONE, Balance
 from stickslip.balance.force import FUSIONS
 from stickslip.balance.motion import FORCES, is_measured
-from stickslip.cycle.first_travel import LEAST, begun
 from stickslip.cycle.slips import FAST, Stroke, Strokes, find_strokes, ringing_of, sliding_swing
-from stickslip.cycle.static_peak import Peak, unseen
+from stickslip.cycle.static_peak import LEAST, Peak, begun, unseen
 from stickslip.cycle.sticks import find_sticks
 from stickslip.errors import EstimateError
 from stickslip.estimate import UNSTATED, Doubt, Estimate, Result, Status
@@ -288,7 +287,7 @@ def breakaway(record: Record, *, contact: str | None = None) -> Breakaway:
 
     A mass at rest has no inertia force: the contact bears exactly what pulls, :math:`p = k (z - x) + c\,\dot z + P`
     (the second term for a damper on the base), which is known without any differentiation. When the slip begins is
-    found, to a sample, from its first travel (:func:`~stickslip.cycle.first_travel.begun`), with a friction that falls
+    found, to a sample, from its first travel (:func:`~stickslip.cycle.static_peak.begun`), with a friction that falls
     at once or with the speed, whichever leaves less; the interval holds what each model as good would tell. Static
     friction is the pull at that instant, from a line through the stick's last fifth. A friction that was not measured
     is refused where the mass never rests: what pulls then also moves the mass. Of a friction that was measured, or

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from stickslip.arrays import Array
+from stickslip.balance.motion import DRIVES, driving
 from stickslip.drives.kinds import Belt, Drive, HarmonicBase, MultiTone, Recorded
 from stickslip.errors import EstimateError
 from stickslip.laws.coulomb import Coulomb
@@ -21,7 +22,6 @@ from stickslip.signals.derivatives import LEAST, Filter, best_bandwidth
 from stickslip.signals.noise import density_beside, noise_level, quantisation_step
 from stickslip.solve.simulate import simulate
 
-DRIVES = {"z": "base", "force": "force"}  # channels of what moves the mass, and what each moves
 HARMONICS = 5
 EXACT = 1e-6  # of a motion's range: what is left below is rounding
 SLOWLY = 0.1  # of a measured motion, that slow noise of its sensor may be
@@ -182,11 +182,6 @@ def possible_drives(record: Record, given: Drive) -> list[DriveFrom]:
     """The same, and for a motion that strays from its tones the tones alone: x tells whether that was slow noise."""
     channel = driving(record)
     return [Known(given)] if channel is None else list(_driven(record, channel, getattr(given, "contact", "ground")))
-
-
-def driving(record: Record) -> str | None:
-    """The channel of what moves the mass: of the base's motion z, or of a force on it; None where neither changes."""
-    return next((name for name in DRIVES if name in record and np.ptp(record[name]) > 0), None)
 
 
 def as_driven(record: Record, given: Drive) -> Record:

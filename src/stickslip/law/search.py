@@ -11,8 +11,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from stickslip.arrays import Array, Index
+from stickslip.balance.motion import DRIVES
 from stickslip.errors import ModelError
-from stickslip.law.driven import DRIVES, Sampled
+from stickslip.law.driven import Sampled
 from stickslip.law.stretch import Motion, Sensor, Stretch, attempted, clear, remembered
 from stickslip.laws.surfaces import RoughSurface
 from stickslip.oscillator import Oscillator

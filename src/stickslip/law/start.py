@@ -11,8 +11,9 @@ from typing import Any
 import numpy as np
 
 from stickslip.arrays import Array, Rows
+from stickslip.balance.motion import driving
 from stickslip.errors import UNNAMED, EstimateError, ModelError, RecordError
-from stickslip.law.driven import DriveFrom, as_driven, driving, measured_drive
+from stickslip.law.driven import DriveFrom, as_driven, measured_drive
 from stickslip.law.search import ABOVE, OF_MOUNTS, OF_SENSORS, Knob, Point, Problem, Profile, descend
 from stickslip.law.stretch import Sensor, Stretch
 from stickslip.oscillator import Oscillator

@@ -13,12 +13,11 @@ import numpy as np
 from stickslip.answers.findings import Findings, record_name
 from stickslip.answers.fits import Prediction, Predictions
 from stickslip.arrays import Array
-from stickslip.balance.motion import forcing_frequency
+from stickslip.balance.motion import driving, forcing_frequency
 from stickslip.drives.kinds import Drive, HarmonicBase, Ramp, Release
 from stickslip.errors import ModelError
 from stickslip.estimate import UNKNOWN, doubts_of
 from stickslip.figures.contact import law_plates
-from stickslip.law.driven import driving
 from stickslip.law.fit_curve import CurveFit
 from stickslip.law.law import LawFit
 from stickslip.law.verdict import LawComparison

@@ -11,8 +11,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from stickslip.arrays import Array
+from stickslip.balance.motion import driving
 from stickslip.errors import StickslipError
-from stickslip.law.driven import DriveFrom, Sampled, Tones, driving
+from stickslip.law.driven import DriveFrom, Sampled, Tones
 from stickslip.laws.compliant import CompliantContact
 from stickslip.laws.coulomb import Coulomb, LinearSlope
 from stickslip.laws.lugre import Dahl, LuGre

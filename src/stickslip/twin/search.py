@@ -10,10 +10,10 @@ from functools import partial
 
 import numpy as np
 
-from stickslip.balance.motion import is_measured
+from stickslip.balance.motion import driving, is_measured, lacking
 from stickslip.drives.kinds import HarmonicBase
-from stickslip.errors import EstimateError, StickslipError
-from stickslip.law.driven import DriveFrom, driving, possible_drives
+from stickslip.errors import StickslipError
+from stickslip.law.driven import DriveFrom, possible_drives
 from stickslip.laws.coulomb import LinearSlope
 from stickslip.oscillator import Oscillator
 from stickslip.record.flaws import saturated
@@ -112,7 +112,7 @@ def believe(record: Record, *, mapped: Map = map) -> Belief:
     >>> bool(abs(belief.kinetic - 1.0) < 0.01), len(belief.twin(np.random.default_rng(1))) == len(record)
     (True, True)
     """
-    if (lacks := lacking(record)) is not None:
+    if (lacks := lacking(record, QUESTION)) is not None:
         raise lacks
     stated = record.rig
     assert stated is not None
@@ -143,28 +143,6 @@ def _linear(record: Record, oscillator: Oscillator, drive: DriveFrom) -> Belief:
     begun = min(begun, begun.at(x=values["x"] - float(record["x"].mean())), key=misfit)
     led = _descended_along(begun, [record.rows(0, samples) for samples in _horizons(record)])
     return refined(replace(led, record=record))
-
-
-def lacking(record: Record) -> StickslipError | None:
-    """What a record lacks to have a twin, as the error that :func:`believe` raises; None where it lacks nothing."""
-    stated = record.rig
-    if stated is None or stated.mass is None or stated.stiffness is None or is_measured(record, "friction"):
-        return EstimateError(
-            "a friction without a balance of forces behind it",
-            f"{QUESTION} needs the mass and the spring that moved",
-            "state mass and stiffness",
-        )
-    try:
-        record.require("x", "v", question=QUESTION)
-    except StickslipError as error:
-        return error
-    if driving(record) is None:
-        return EstimateError(
-            "neither a motion z of the base nor an applied force",
-            f"{QUESTION} is moved as the record was",
-            "record what moves the mass",
-        )
-    return None
 
 
 def _without_chance(belief: Belief, *parts: str) -> Belief:
