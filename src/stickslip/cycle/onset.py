@@ -42,6 +42,7 @@ PULLED = 0.025  # share by which smoothing and lags move the level that a pull i
 # no more than one in 100 would, 18 did.
 ALIKE, CLEAR = math.log(2.5), 2.6
 NOTHING = 0.9  # of its level, by which a friction that tells nothing of its peak strays after a slip
+NOT_FELT = "the contact never sticks, and static friction is what it bears at rest"
 NOT_ABOVE = "not above sliding"  # the kind of doubt
 BELOW = "it lies below the sliding friction: the contact is not seen to bear more at rest than as it slides"
 EARLY = "the mass moves before the friction has come near its level: the first peak holds the ring that follows"
@@ -289,8 +290,8 @@ def breakaway(record: Record, *, contact: str | None = None) -> Breakaway:
     (the second term for a damper on the base), which is known without any differentiation. When the slip begins is
     found, to a sample, from its first travel (:func:`~stickslip.cycle.static_peak.begun`), with a friction that falls
     at once or with the speed, whichever leaves less; the interval holds what each model as good would tell. Static
-    friction is the pull at that instant, from a line through the stick's last fifth. A friction that was not measured
-    is refused where the mass never rests: what pulls then also moves the mass. Of a friction that was measured, or
+    friction is the pull at that instant, from a line through the stick's last fifth. By a balance of forces it is
+    unknown where the mass never rests: what pulls then also moves the mass. Of a friction that was measured, or
     found by all sensors together, it is the largest
     value before the contact moves, which noise makes too large by two of its deviations at most: the interval's low end
     goes as far down. It goes down by as much as a load cell that rises so and is let go would swing on, or to the level
@@ -336,7 +337,6 @@ def breakaway(record: Record, *, contact: str | None = None) -> Breakaway:
     True
     """
     strokes = find_strokes(record, contact=contact, question=QUESTION)
-    _require_rest(record, contact)
     borne = _borne(record, strokes)
     levels = [_level(borne, strokes, way, side) for way, side in SIDES]
     sliding = float(np.median([stroke.level for stroke in borne.strokes]))
@@ -354,19 +354,18 @@ def breakaway(record: Record, *, contact: str | None = None) -> Breakaway:
     swings = [sliding_swing(record, own[way], side) for way, side in SIDES]
     forward, back = (_flagged(level, status) for level in levels)
     ratio = _flagged(ratio, status) or ratio
+    if not _rests(record, contact):
+        forward, back = (level and level.unknown(NOT_FELT) for level in (forward, back))
+        ratio, status = ratio.unknown(NOT_FELT), NOT_FELT
     return Breakaway(forward, back, ratio, *heard, swings[0], swings[1], len(borne.strokes), status)
 
 
-def _require_rest(record: Record, contact: str | None) -> None:
-    """Refuse a balance of forces where the mass never rests: what pulls then also moves the mass."""
+def _rests(record: Record, contact: str | None) -> bool:
+    """Whether the mass rests at all, where a balance of forces tells it only then: what pulls also moves the mass."""
     fused = record.rig is not None and record.rig.method in FUSIONS
-    if fused or is_measured(record, "friction") or find_sticks(record, contact=contact, method="speed").share.value:
-        return
-    raise EstimateError(
-        "the contact never sticks",
-        "static friction is what it bears at rest: it is not felt in this motion",
-        "shake it less, or more slowly, until it sticks",
-    )
+    if fused or is_measured(record, "friction"):
+        return True
+    return bool(find_sticks(record, contact=contact, method="speed").share.value)
 
 
 def _level(borne: _Borne, strokes: Strokes, way: int, side: str) -> Estimate | None:

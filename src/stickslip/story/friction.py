@@ -262,7 +262,8 @@ def _of_breakaway(breakaway: Breakaway) -> Iterator[str]:
     ratio = breakaway.ratio
     low, high = ratio.interval
     if not math.isfinite(low + high):
-        yield f"The breakaway force is not known: {ratio.status}."
+        why = ratio.status if breakaway.status == "ok" else breakaway.status
+        yield f"The breakaway force is not known: {why}."
         return
     if not stands(ratio.status):
         if low < 1 and high > LOOSE:
