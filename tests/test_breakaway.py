@@ -38,6 +38,18 @@ def test_static_friction_is_found_whether_it_is_higher_or_not(static: float) -> 
     assert breakaway.status == "ok"
 
 
+@pytest.mark.parametrize("counts", [30, 50])
+def test_static_friction_is_told_or_not_of_a_displacement_in_coarse_counts(counts: int) -> None:
+    """All of a slip's first travel may lie within one count: no friction that falls with the speed moves that."""
+    law = ss.laws.Coulomb(2.0, static=2.6)
+    slider = ss.Oscillator(2.0, 800.0, law=law, drive=ss.drives.HarmonicBase(4e-3, frequency=1.0))
+    run = ss.simulate(slider, cycles=6).record(fs=2000)
+    step = float(np.ptp(run["x"])) / counts
+    record = ss.Record.of({"x": np.round(run["x"] / step) * step, "z": run["z"]}, fs=2000)
+    found = ss.cycle.breakaway(ss.friction_force(record, mass=2.0, stiffness=800.0))
+    assert not found.ratio.known or found.ratio.includes(1.3)
+
+
 @pytest.mark.parametrize("kind", ["Coulomb", "static", "Stribeck"])
 def test_a_contact_that_never_sticks_tells_no_static_friction(kind: str) -> None:
     """By the rigs of another integrator: what pulls as it turns round moves the mass: it is up to 20 times too much."""

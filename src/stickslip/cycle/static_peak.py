@@ -345,13 +345,17 @@ def _starts(travel: Array, pull: Array, mass: float, fs: float) -> list[tuple[fl
 
 
 def _left(wanted: Array, columns: list[Array]) -> tuple[Array, Array]:
-    """What columns leave of each row by least squares, all of them about their means, and the factors."""
+    """What columns leave of each row by least squares, all of them about their means, and the factors; infinite where a
+    column does not change, as that in proportion to the speed does not within one count of the travel."""
     wanted, *columns = (part - part.mean(axis=1, keepdims=True) for part in (wanted, *columns))
     products = np.array([[np.sum(one * other, axis=1) for one in columns] for other in columns])
     sides = np.array([np.sum(column * wanted, axis=1) for column in columns])
-    factors = np.linalg.solve(np.moveaxis(products, 2, 0), sides.T[:, :, None])[:, :, 0].T
+    matrices = np.moveaxis(products, 2, 0)
+    still = np.linalg.matrix_rank(matrices, hermitian=True) < len(columns)
+    matrices[still] = np.eye(len(columns))
+    factors = np.linalg.solve(matrices, sides.T[:, :, None])[:, :, 0].T
     rest = wanted - sum(factor[:, None] * column for factor, column in zip(factors, columns, strict=True))
-    return np.sum(rest**2, axis=1), factors
+    return np.where(still, np.inf, np.sum(rest**2, axis=1)), factors
 
 
 def _least(begins: Any, cost: Array, every: int) -> tuple[float, float]:
