@@ -75,6 +75,8 @@ def test_what_comes_back_to_the_law_it_contains_is_led_no_further(static: float 
     families = [[rigid], [stiff]]
     promising = search._promising(families, simple, None)
     assert promising == (families if static is None else [[rigid]])
+    runaway = [[simple.at(**{SLOPE: -1e5})]]  # whose motion outgrows all numbers
+    assert search._promising(runaway, simple, None) == runaway
 
 
 def test_a_memory_without_friction_has_slopes() -> None:

@@ -68,7 +68,7 @@ def descended(belief: Belief, passes: int, *, roughly: bool = False) -> tuple[Be
 
 def explains(belief: Belief) -> bool:
     """Whether it leaves hardly more of the displacement than noise would."""
-    return belief.over_noise**2 < FAR
+    return math.isfinite(misfit(belief)) and belief.over_noise**2 < FAR
 
 
 def _chi_squared_gained(before: Belief, after: Belief) -> float:

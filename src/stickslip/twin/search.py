@@ -263,7 +263,7 @@ def _promising(families: list[list[Belief]], contained: Belief | None, best: Bel
     """
     nearest = min((family[0] for family in families), key=misfit)
     limits = [FAR * misfit(law) for law in (nearest, best) if law is not None and explains(law)]
-    if contained is not None and nearest.fit is not None:
+    if contained is not None and nearest.fit is not None and math.isfinite(misfit(nearest)):
         gained = nearest.fit.freedom * math.log(misfit(contained) / misfit(nearest))
         limits += [misfit(contained)] if gained > CERTAIN else []
     kept = ([law for law in family if misfit(law) <= min(limits, default=math.inf)] for family in families)
