@@ -7,13 +7,16 @@ import json
 import signal
 import subprocess
 import sys
+from collections.abc import Callable, Iterator
+from functools import partial
 from typing import Any
 
 import numpy as np
 import pytest
 
 import stickslip as ss
-from stickslip.solve import kernel
+from stickslip.errors import SolveError
+from stickslip.solve import kernel, march
 from stickslip.solve.refusal import held_back
 
 RIGID = ss.Oscillator(
@@ -106,15 +109,47 @@ def test_a_long_run_is_heard_of(name: str, monkeypatch: pytest.MonkeyPatch) -> N
     assert not any(event.time > run.duration for event in run.events)
 
 
-def test_a_greater_question_ends_with_its_run(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The steady state is not sought on from a run that was cut."""
-    march, calls = kernel.march, itertools.count()
+@pytest.fixture
+def heard() -> Iterator[None]:
+    """A shell's background job is deaf to Ctrl-C."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
 
-    def stopped(*arguments: Any) -> Any:
-        if next(calls) == 1:
-            raise KeyboardInterrupt
-        return march(*arguments)
 
-    monkeypatch.setattr(kernel, "march", stopped)
+@pytest.fixture
+def struck(heard: None, monkeypatch: pytest.MonkeyPatch) -> Callable[[int], None]:
+    """Ctrl-C while the chunk of this number is marched, counted from 0."""
+
+    def strike(number: int) -> None:
+        calls = itertools.count()
+        for module in (kernel, march):
+            monkeypatch.setattr(module, "march", partial(marched, module.march, calls, number))
+
+    def marched(follow: Callable[..., Any], calls: Iterator[int], number: int, *arguments: Any) -> Any:
+        if next(calls) == number:
+            signal.raise_signal(signal.SIGINT)
+        return follow(*arguments)
+
+    return strike
+
+
+@pytest.mark.parametrize("name", ["many events", "curved law"])
+@pytest.mark.parametrize("ask", [ss.steady_state, partial(ss.simulate, duration=2e3)])
+def test_a_greater_question_ends_with_its_run(ask: Any, name: str, struck: Callable[[int], None]) -> None:
+    """Nothing is asked of a run that was cut, and Ctrl-C is not lost where nobody looks at the status."""
+    struck(2)
     with pytest.raises(KeyboardInterrupt):
-        ss.steady_state(RIGID)
+        ask(LONG[name])
+
+
+def test_ctrl_c_before_a_refusal_is_heard(heard: None) -> None:
+    """Who goes on after a refusal, as a search does, would else go on for ever."""
+
+    def refused() -> None:
+        with held_back():
+            signal.raise_signal(signal.SIGINT)
+            raise SolveError("too many events", "a period has some", "look at the law")
+
+    with pytest.raises(KeyboardInterrupt):
+        refused()

@@ -21,7 +21,7 @@ from stickslip.laws.stribeck import TimeDelay
 from stickslip.oscillator import Oscillator
 from stickslip.solve.assembly import table_of
 from stickslip.solve.curved import run_curved
-from stickslip.solve.simulate import opening, paced, run, stops_of
+from stickslip.solve.simulate import opening, run, stops_of
 from stickslip.solve.tables import System
 from stickslip.solve.tape import tape
 from stickslip.solve.trajectory import Trajectory
@@ -243,7 +243,7 @@ class March:
         table = self.table
         if isinstance(self.system, Oscillator) and isinstance(self.system.law, CurvedLaw):
             course = (span, stops_of(table, *span))
-            return run_curved(table, self.state, self.mode, course=course, budget=BUDGET, rtol=RTOL, tell=paced(None))
+            return run_curved(table, self.state, self.mode, course=course, budget=BUDGET, rtol=RTOL)
         return run(self.system, table, self.state, self.mode, span=span, budget=BUDGET)
 
     def _switch(self) -> None:

@@ -174,10 +174,13 @@ def run_curved(
     course: tuple[tuple[float, float], Stops],
     budget: int,
     rtol: float,
-    tell: Callable[[float], None],
+    tell: Callable[[float], None] | None = None,
     follow: March | None = None,
 ) -> CurvedTrajectory:
-    """March from a state at time 0 to the end of the course's time (laps, offset), in chunks."""
+    """March from a state at time 0 to the end of the course's time (laps, offset), in chunks.
+
+    An interrupted run is returned as by :func:`stickslip.solve.simulate.run`.
+    """
     (laps, offset), stops = course
     run = _Run(table, state, mode, total=offset + _lasting(laps, table.motion.period), budget=budget, rtol=rtol)
     status = "complete"
@@ -192,14 +195,16 @@ def run_curved(
                 elif run.heed is None:
                     run.heed = holding.enter_context(held_back())
                 outcome = run.chunk(stops, follow)
-                tell(run.share)
+                if tell:
+                    tell(run.share)
     except KeyboardInterrupt:
-        if not run.kept:
+        if tell is None or not run.kept:
             raise
         status, last = "interrupted", run.kept[-1]
         run.total = last.offsets[-1] + last.lengths[-1] + _lasting(last.laps[-1], table.motion.period)
     if status == "complete":
-        tell(1.0)
+        if tell:
+            tell(1.0)
         rests = march.rests(run.model.series, run.model.numbers, run.mode, run.state, run.work.step)
         status = "at rest" if rests else status
     return _assembled(table, run, status)

@@ -293,9 +293,7 @@ def global_error(run: Trajectory, *, looked: int = 200) -> GlobalError:
     laps = math.floor(run.duration / period) if math.isfinite(period) else 0
     span = (float(laps), run.duration - (laps * period if laps else 0.0))
     course = (span, stops_of(table, *span))
-    fine = run_curved(
-        table, run.states[0], int(run.modes[0]), course=course, budget=100_000, rtol=FINEST, tell=lambda _: None
-    )
+    fine = run_curved(table, run.states[0], int(run.modes[0]), course=course, budget=100_000, rtol=FINEST)
     times = np.linspace(0.0, min(run.duration, fine.duration), looked)
     mine, truth = (one.sample(times, ("state",))[0] for one in (run, fine))
     size = np.maximum(np.max(np.abs(truth), axis=1, keepdims=True), 1e-300)

@@ -311,7 +311,7 @@ def stretch(system: System, table: Table, state: Array, mode: int, *, span: tupl
     """The motion from a state at phase zero over a time (laps, offset)."""
     if isinstance(table, Tape):
         course = (span, stops_of(table, *span))
-        return run_curved(table, state, mode, course=course, budget=10_000, rtol=FINE, tell=lambda _: None)
+        return run_curved(table, state, mode, course=course, budget=10_000, rtol=FINE)
     return run(system, table, state, mode, span=span)
 
 

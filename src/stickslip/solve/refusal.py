@@ -140,4 +140,4 @@ def held_back() -> Iterator[Callable[[], None]]:
         yield heed
     finally:
         signal.signal(signal.SIGINT, handler)
-    heed()
+        heed()  # though the block ended in an error, which the next block may get over

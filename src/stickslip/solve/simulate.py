@@ -88,7 +88,8 @@ def simulate(
     Returns
     -------
     Trajectory
-        Where the user interrupts (Ctrl-C), what was simulated until then, with the status "interrupted".
+        With `progress`, where the user interrupts (Ctrl-C), what was simulated until then, with the status
+        "interrupted"; without, Ctrl-C ends whoever asked, so that no part is taken for the whole.
 
     Raises
     ------
@@ -123,7 +124,7 @@ def simulate(
     table = table_of(system)
     span = _end(system, table, duration, cycles)
     state, mode = opening(table, start or {})
-    return run(system, table, state, mode, span=span, budget=budget, tell=paced(progress))
+    return run(system, table, state, mode, span=span, budget=budget, tell=progress and paced(progress))
 
 
 def _scale(system: System | PlanarOscillator) -> float:
@@ -151,16 +152,16 @@ def _simulate_curved(
     span = _end(system, table, *time_)
     state, mode = opening(table, start)
     course = span, stops_of(table, *span)
-    return follow(table, state, mode, course=course, budget=budget, rtol=rtol, tell=paced(progress))
+    return follow(table, state, mode, course=course, budget=budget, rtol=rtol, tell=progress and paced(progress))
 
 
-def paced(progress: Callable[[float], object] | None) -> Callable[[float], None]:
+def paced(progress: Callable[[float], object]) -> Callable[[float], None]:
     """The same call, passed on once in a while and at the end."""
     due = time.monotonic() + PACE
 
     def tell(share: float) -> None:
         nonlocal due
-        if progress is not None and (share >= 1.0 or time.monotonic() >= due):
+        if share >= 1.0 or time.monotonic() >= due:
             progress(min(share, 1.0))
             due = time.monotonic() + PACE
 
