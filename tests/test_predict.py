@@ -22,6 +22,7 @@ SYSTEM = f"{LAW}[system]\nmass = 2.42\nstiffness = 2310\ndamping = 0.12\n[drive]
 STICKING = ss.Oscillator(
     law=ss.laws.Coulomb(1.1, static=1.3), drive=ss.drives.HarmonicBase(0.65e-3, frequency=2.5), **RIG
 )
+WEAKER = STICKING.having(kinetic=1.0)
 NOISE = 1e-6
 
 
@@ -61,6 +62,13 @@ def test_the_true_law_leaves_the_noise_and_a_wrong_one_more() -> None:
     assert wrong.plain["x"] > wrong.follows["x"]
     (plain,) = ss.answers.predict(record, STICKING.having(law=ss.laws.Coulomb(0.7))).parts
     assert not plain.plain, "the law is plain itself"
+
+
+def test_what_a_prediction_leaves_is_held_against_the_noise() -> None:
+    told = (ss.answers.predict(measured(STICKING), system, plain=False) for system in (STICKING, WEAKER))
+    right, wrong = (str(ss.summary(predictions).headline[0]) for predictions in told)
+    assert right.endswith(", all but the sensors' noise.")
+    assert "times the noise of x" in wrong
 
 
 def test_what_is_followed_is_the_fit_of_system_identification() -> None:

@@ -43,9 +43,10 @@ CYCLES = 6.0  # that are shown first of a fit: the lines of more run into one an
 STEADY = 0.05  # of its spread that a base may stray from a straight line: a tone over its half period strays by 0.2
 ALONE = "# a law alone: to simulate it, add [system] with its mass and stiffness, and [drive]"
 DEFINITION = (
-    "Follows: 100 (1 - |y - yhat| / |y - mean y|) %, the fit of system identification: 100 % is the record itself, 0 % "
+    "Fit: 100 (1 - |y - yhat| / |y - mean y|) %, the fit of system identification: 100 % is the record itself, 0 % "
     "no better than its mean. Nothing was fitted to it but how the motion begins and each sensor's zero."
 )
+LIKE_NOISE = 1.5  # times its noise, chosen: what a prediction leaves of a channel by noise alone
 COMPARED = "Coulomb: the same of one level of friction and a viscous damper, both fitted to the record itself."
 
 
@@ -269,7 +270,7 @@ def of_predictions(predictions: Predictions) -> Story:
     ]
     beside = [f"{first}, Coulomb"] if compared else []
     headings = ("record", *predictions.least, *beside, "stops per cycle", "predicted")
-    table = Table("How much is followed", headings, rows, f"{DEFINITION} {COMPARED}" if compared else DEFINITION)
+    table = Table("Fit of each channel", headings, rows, f"{DEFINITION} {COMPARED}" if compared else DEFINITION)
     return _noted(Story(f"{len(parts)} records predicted", [headline], tables=[table], parts=parts), predictions)
 
 
@@ -289,9 +290,9 @@ def _of_one(part: Prediction, law: str) -> Story:
         )
         for name, value in part.follows.items()
     ]
-    headings = ("channel", "follows", *(["Coulomb"] if part.plain else []), "left (rms)", "over its noise")
+    headings = ("channel", "fit", *(["Coulomb"] if part.plain else []), "left (rms)", "over its noise")
     note = f"{DEFINITION} {COMPARED}" if part.plain else DEFINITION
-    tables = [Table("How much is followed", headings, rows, note)]
+    tables = [Table("Fit of each channel", headings, rows, note)]
     if part.sticks:
         of = [(stick.per_cycle, stick.share) for stick in part.sticks]
         stops = [
@@ -314,7 +315,10 @@ def _of_one(part: Prediction, law: str) -> Story:
 
 
 def _headline(part: Prediction, law: str) -> Iterator[str]:
-    yield f"{law}, as it was given, follows {_listed(part.follows)} in {part.name}."
+    worst = max(part.fit.misfit, key=lambda name: part.fit.misfit[name])
+    times = part.fit.misfit[worst]
+    left = "all but the sensors' noise" if times < LIKE_NOISE else f"but leaves {times:.2g} times the noise of {worst}"
+    yield f"{law}, as it was given, follows {_listed(part.follows)} in {part.name}, {left}."
     better = {name: value for name, value in part.plain.items() if value >= part.follows[name]}
     if better:
         yield f"Plain Coulomb friction, fitted to this record, follows no less: {_listed(better)}."
