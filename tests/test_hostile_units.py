@@ -12,7 +12,7 @@ import pytest
 import stickslip as ss
 from limits import civil, limited, program
 from stickslip.errors import RecordError, StickslipError
-from stickslip.units import Unit, parse_unit, parse_value
+from stickslip.units import Unit, dimensions, parse_unit, parse_value
 
 BOMBS = [
     "9^9^9^9", "m^9^9^9^9", "m/0", "km^200", "km^1e300", "m^(9^9^9)", "m cubed cubed cubed cubed cubed", "m⁹⁹⁹⁹⁹⁹",
@@ -231,3 +231,11 @@ def test_a_unit_of_nothing_is_refused(tmp_path: Path, name: str) -> None:
     (tmp_path / "run.csv").write_text(f"t,x\n{ROWS}")
     with pytest.raises(RecordError, match="there is no channel or column"):
         ss.read_record(tmp_path / "run.csv", units={name: "mm"})
+
+
+@pytest.mark.parametrize("unit", ["1", "kg", "N", "N/m", "N s/m", "1/(N s)", "s/m", "m/s^2", "N m/rad", "N/m/s", "V/N"])
+def test_dimensions_of_a_unit_are_those_of_another_program(unit: str) -> None:
+    import pint
+
+    of = pint.UnitRegistry().Quantity(1.0, unit.replace(" ", "*")).dimensionality
+    assert dimensions(unit) == {name.strip("[]"): power for name, power in of.items()}

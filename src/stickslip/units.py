@@ -35,6 +35,10 @@ _CHAIN = rf"{_TERM}(?:[ /]{_TERM})*"
 _UNIT = re.compile(rf"(1/)?({_CHAIN})(?:/\(({_CHAIN})\))?")  # of all that pint would evaluate, only this reaches it
 _NUMBER = r"[-+]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][-+]?[0-9]+)?"
 PLUS_MINUS = r"(?:±|\+/-|\+-)"
+_SI_TERM = re.compile(r"([A-Za-z]+)(?:\^([0-9]))?")
+_BASES = {  # of what laws are made of: to ask pint takes a second, the first time
+    "kg": {"mass": 1}, "m": {"length": 1}, "s": {"time": 1}, "N": {"mass": 1, "length": 1, "time": -2}, "rad": {},
+}  # fmt: skip
 _SPREAD = re.compile(rf"({_NUMBER})\s*(%?)\s*(.*)")  # behind the sign
 _BRACKETED = re.compile(r"\((.*)\)\s*(.*)")  # (2.42 ± 0.02) kg
 _CONCISE = re.compile(r"([-+]?[0-9]+\.?([0-9]*))\(([0-9]*\.?[0-9]+)\)(?:[eE]([-+]?[0-9]+))?\s*(.*)")  # 2.42(2) kg
@@ -397,8 +401,15 @@ def dimensions(unit: str) -> Mapping[str, float]:
     >>> dimensions("N s/m")
     {'mass': 1, 'time': -1}
     """
-    of = _registry().Quantity(1.0, unit.replace(" ", "*")).dimensionality
-    return {name.strip("[]"): power for name, power in of.items()}
+    above, _, below = unit.partition("/")
+    terms = [(sign, *term) for sign, part in ((1, above), (-1, below)) for term in _SI_TERM.findall(part)]
+    if any(name not in _BASES for _, name, _ in terms):
+        of = _registry().Quantity(1.0, unit.replace(" ", "*")).dimensionality
+        return {name.strip("[]"): power for name, power in of.items()}
+    powers = collections.Counter[str]()
+    for sign, name, power in terms:
+        powers.update({base: sign * size * int(power or 1) for base, size in _BASES[name].items()})
+    return {base: power for base, power in powers.items() if power}
 
 
 def _powers(reciprocal: str | None, chain: str, below: str | None) -> dict[str, float]:

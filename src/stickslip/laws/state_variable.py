@@ -172,14 +172,15 @@ class StateVariable(Rigid):
 
 def _guesses(seen: Observed) -> list[SmoothStateVariable]:
     """The rate and steepness whose lagging backbone follows the friction best."""
-    from scipy.signal import lfilter
+    from scipy.linalg import solve_banded
 
-    step, tried = float(seen.step[0]), []
-    for steepness in np.geomspace(3.0, STEEPEST, GRID) / seen.fastest:
-        backbone = np.tanh(steepness * seen.speed)
-        for rate in seen.frequency * np.geomspace(*RATES, GRID):
-            kept = np.exp(-rate * step)
-            lagging = lfilter([1 - kept], [1, -kept], backbone)
+    steepnesses = np.geomspace(3.0, STEEPEST, GRID) / seen.fastest
+    backbones = np.tanh(np.multiply.outer(seen.speed, steepnesses))
+    band, tried = np.ones((2, len(backbones))), []
+    for rate in seen.frequency * np.geomspace(*RATES, GRID):
+        kept = np.exp(-rate * float(seen.step[0]))  # of a lag, from one reading to the next
+        band[1] = -kept
+        for steepness, lagging in zip(steepnesses, solve_banded((1, 0), band, (1 - kept) * backbones).T, strict=True):
             level = share(lagging, seen.friction)
             tried.append((seen.left(level * lagging), level, rate, steepness))
     _, level, rate, steepness = min(tried)
