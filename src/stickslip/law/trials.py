@@ -323,10 +323,14 @@ def extended(name: str, simpler: Trial, law: Any, known: Sequence[str], passes: 
         starts.append(np.concatenate([start[:2], now[2:], start[len(scale) :]]))
     point = problem.at(np.append(np.zeros(len(own)), simpler.point.u[kept]), tuple(starts))
     trial = Trial(name, problem, point)
-    # a curved law next to rigid says what the simpler one says, and each pass costs ten times another law's
+    # a curved law next to rigid says what the simpler one says, and each pass costs ten times another law's: it is
+    # led on only where a few passes bring it away from there
     limit = trial.stiff and hasattr(law, "rates")
     enough = NO_WORSE * simpler.point.chi2 if limit else -math.inf
-    if point.chi2 > enough:
+    if limit and point.chi2 > enough:
+        point = descend(problem, point, passes=LAST_PASSES, share=ENOUGH, enough=enough, tell=tell)
+        trial = replace(trial, point=point)
+    if point.chi2 > enough and not (limit and trial.stiff):
         point = descend(problem, point, passes=passes, share=ENOUGH, enough=enough, tell=tell)
     return replace(trial, point=point) if math.isfinite(point.chi2) else None
 
