@@ -19,14 +19,14 @@ FS, HALF, STROKE, RISE = 1000.0, 500, 4e-3, 0.4e-3  # Hz, samples of a stroke, m
 LOAD = 10.0
 
 
-def strokes(cycles=40, coefficient=0.3, noise=0.01, seed=0, load=None, patch=0.0):
+def strokes(cycles=40, coefficient=0.3, noise=0.01, seed=0, load=None, patch=0.0, rise=RISE):
     """Strokes of a crank; friction turns round over a way, as a contact gives way."""
     n = np.arange(2 * cycles * HALF)
     stroke, along = n // HALF, (1 - np.cos(np.pi * (n % HALF) / HALF)) / 2 * STROKE
     forward = stroke % 2 == 0
     x = np.where(forward, along, STROKE - along)
     level = coefficient * np.ones(cycles) if np.ndim(coefficient) == 0 else np.asarray(coefficient)
-    shape = 2 * np.minimum(along / RISE, 1) - 1
+    shape = 2 * np.minimum(along / rise, 1) - 1
     local = level[stroke // 2] * (1 + patch * (np.abs(x - 0.7 * STROKE) < 0.05 * STROKE))
     normal = LOAD * (1 + 0.02 * np.sin(2 * np.pi * stroke / 7)) if load == "measured" else LOAD
     friction = np.where(forward, 1, -1) * local * shape * normal
@@ -51,6 +51,27 @@ def test_each_definition_is_its_closed_form() -> None:
     assert coefficients.wear_in is None
     assert stands(coefficients.plateau.status)
     assert len(coefficients.time) == pytest.approx(40, abs=1)
+
+
+@pytest.mark.parametrize("slides", [0.2, 0.35, 0.5, 0.7, 0.85])
+def test_of_a_contact_that_slides_over_a_part_of_its_stroke_that_part_is_told(slides: float) -> None:
+    """Of a stroke half of which the contact gave way 0.48 was told for 0.5, of one with a fifth left 0.14: sure."""
+    told = friction_coefficients(strokes(coefficient=0.5, rise=(1 - slides) * STROKE), normal=LOAD).plateau
+    assert told.includes(0.5)
+    assert told.value == pytest.approx(0.5, rel=2e-3)
+    assert stands(told.status) == (slides > 0.75)
+    assert slides > 0.75 or f"{100 * slides:.0f} % of each stroke" in told.status
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.01, 0.5])
+def test_a_contact_that_never_slides_has_no_kinetic_coefficient(noise: float) -> None:
+    x = strokes()["x"]
+    elastic = 2e3 * (x - STROKE / 2) + np.random.default_rng(1).normal(0, noise, len(x))
+    test = analyze_tribometer(ss.Record.of({"x": x, "friction": elastic}, fs=FS), normal=LOAD)
+    assert not test.tribometer.plateau.known
+    assert str(ss.summary(test).headline[0]).startswith(
+        "No kinetic coefficient of friction is told: the contact slides"
+    )
 
 
 def test_a_zero_that_is_off_stays_in_the_mean_of_a_cycle_alone() -> None:

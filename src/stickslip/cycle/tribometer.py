@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -33,6 +34,11 @@ DEFINITIONS = {  # of the coefficient, beside what each is of a cycle
 }
 ALIKE, DIPS = 0.3, 0.5  # of the mean magnitude: an offset that leaves less than ALIKE keeps the force above 1 - ALIKE
 LIFTED = 0.05  # of the load: what friction a contact pressed by less has, its ratio does not tell
+LAST = 0.9  # of a stroke, past which its end is: there, what slides at all does
+MOSTLY = 0.75  # of a stroke: friction that is 15 % higher at both ends looks like 0.87 of it
+LEAST = 0.15  # of a stroke, chosen: what slides over less shows no plateau that its rounded corners leave
+NOT_SLIDING = "not sliding"  # kinds of doubt: the contact gives way over most of its stroke
+PARTLY = "partly sliding"
 AMPLE = 1.1  # times the way over which friction turns round: noise, and samples, pass half of it a little early
 
 
@@ -173,13 +179,14 @@ def friction_coefficients(
     friction = _without_drift(record["friction"], motion, cycles, label)
     forces = _forces(friction, motion, cycles, label)
     forces["by_cycle"] = _mean_magnitudes(record["friction"], label)
-    _refuse_magnitudes(record["friction"], forces, label)
     even = friction
     if load.method != "stated":
         for _ in range(2):  # the zero, too, is told under one load
-            levels = _levels(even, motion, cycles, label)
-            even = _under_mean_load(friction, record["normal"], loads, label, levels)
-        forces["plateau"] = np.asarray(sum(_levels(even, motion, cycles, label)) / 2)
+            zero = _levels(even, motion, cycles, label).zero
+            even = _under_mean_load(friction, record["normal"], loads, label, zero)
+    levels = _levels(even, motion, cycles, label)
+    forces["plateau"] = levels.middle
+    _refuse_magnitudes(record["friction"], forces, label)
     of_cycles = {name: values / loads for name, values in forces.items()}
     wear_in = fit_wear_in(of_cycles["plateau"])
     steady = _steady(wear_in, len(loads))
@@ -191,6 +198,7 @@ def friction_coefficients(
         name: _beside(mean_of_cycles(_called(name), of_cycles[name][steady:], unit="1", method=how), relative, status)
         for name, how in DEFINITIONS.items()
     }
+    coefficients["plateau"] = _as_far_as_it_slides(coefficients["plateau"], levels.share)
     position, cycle, forward, back = _map(even, motion, label, loads)
     return Coefficients(
         **coefficients,
@@ -262,7 +270,6 @@ def _forces(friction: Array, motion: Motion, cycles: Cycles, label: Rows) -> dic
     at = np.arange(len(work))
     per_cycle = [np.diff(np.interp(cycles.edges, at, values)) for values in (work, length)]
     return {
-        "plateau": np.asarray(sum(_levels(friction, motion, cycles, label)) / 2),
         "by_stroke": (means[0] - means[1]) / 2,
         "by_energy": per_cycle[0] / per_cycle[1],
     }
@@ -274,8 +281,26 @@ def _mean_magnitudes(friction: Array, label: Rows) -> Array:
     return np.asarray(np.bincount(label[whole], np.abs(friction[whole])) / np.bincount(label[whole]))
 
 
-def _levels(friction: Array, motion: Motion, cycles: Cycles, label: Rows) -> tuple[Array, Array]:
-    """The median of the friction of every cycle while it slides past where it turns round, forward and back [N]."""
+class _Levels(NamedTuple):
+    """Friction forward and back of every cycle [N], and over which part of each stroke the contact slides."""
+
+    forward: Array
+    back: Array
+    share: float
+
+    @property
+    def middle(self) -> Array:
+        """Of both ways."""
+        return np.asarray((self.forward + self.back) / 2)
+
+    @property
+    def zero(self) -> Array:
+        """Of the force, as it is half of what both ways differ by."""
+        return np.asarray((self.forward - self.back) / 2)
+
+
+def _levels(friction: Array, motion: Motion, cycles: Cycles, label: Rows) -> _Levels:
+    """The median of the friction of every cycle while it slides past where it turns round."""
     slides, count = sliding_parts(motion, cycles) & (label >= 0), len(cycles.edges) - 1
 
     def medians(chosen: Mask) -> tuple[Array, Array]:
@@ -283,15 +308,19 @@ def _levels(friction: Array, motion: Motion, cycles: Cycles, label: Rows) -> tup
         return forward, back
 
     levels = medians(slides)
-    past = slides & _turned(friction, motion, label, *levels)
-    return medians(past) if past.sum() > slides.sum() / 2 else levels
+    share, turned = _turned(friction, motion, label, *levels)
+    past = slides & turned
+    enough = past.sum() > min(1.0, share) * slides.sum() / 2
+    return _Levels(*(medians(past) if enough else levels), share)
 
 
-def _turned(friction: Array, motion: Motion, label: Rows, forward: Array, back: Array) -> Mask:
-    """Where the friction has turned round, which takes as much way as contact and holder give way by.
+def _turned(friction: Array, motion: Motion, label: Rows, forward: Array, back: Array) -> tuple[float, Mask]:
+    """Over which part of each stroke the contact slides, and where the friction has turned round.
 
-    What is still below the level there moves the median by its share of the way, in every cycle alike. A spring that
-    gives way passes half of the level at three quarters of that way.
+    That takes as much way as contact and holder give way by. What is still below the level there moves the median by
+    its share of the way, in every cycle alike. A spring that gives way passes half of the level at three quarters of
+    that way, where the contact slides over most of its stroke; and it gives back the work that it takes, so that of a
+    stroke s a contact that gives way by w dissipates F (s - w).
     """
     whole, way, count = label >= 0, motion.displacement, len(forward)
     low, high, passed = np.full(count, np.inf), np.full(count, -np.inf), np.full((2, count), np.inf)
@@ -299,17 +328,22 @@ def _turned(friction: Array, motion: Motion, label: Rows, forward: Array, back: 
     np.maximum.at(high, label[whole], way[whole])
     ahead = motion.velocity > 0
     gone = np.where(ahead, way - low[label], high[label] - way)
-    bears = np.where(ahead, 1.0, -1.0) * (friction - ((forward - back) / 2)[label])
+    bears = np.where(ahead, 1.0, -1.0) * (friction - np.nan_to_num((forward - back) / 2)[label])
+    stroke = high - low
+    last, weight = whole & (gone > LAST * stroke[label]), np.abs(motion.velocity)
+    work, level = (float(np.average(bears[part], weights=weight[part])) for part in (whole, last))
+    share = max(0.0, work / level) if level > 0 else 0.0
+    if share < MOSTLY:
+        return share, np.asarray(gone > AMPLE * (1 - share) * stroke[label])
     half = whole & (bears >= ((forward + back) / 4)[label])
     np.minimum.at(passed, (ahead[half].astype(int), label[half]), gone[half])
-    return np.asarray(gone > AMPLE * float(np.median(passed)) / 0.75)
+    return share, np.asarray(gone > AMPLE * float(np.median(passed)) / 0.75)
 
 
 def _without_drift(friction: Array, motion: Motion, cycles: Cycles, label: Rows) -> Array:
     """The friction with its zero as it is in the mean: a zero that moves on from a stroke to the next looks like more
     friction, or less."""
-    forward, back = _levels(friction, motion, cycles, label)
-    zero, middle = (forward - back) / 2, (cycles.edges[1:] + cycles.edges[:-1]) / 2
+    zero, middle = _levels(friction, motion, cycles, label).zero, (cycles.edges[1:] + cycles.edges[:-1]) / 2
     zero, middle = zero[np.isfinite(zero)], middle[np.isfinite(zero)]
     if len(zero) < FEW_CYCLES:
         return friction
@@ -319,9 +353,9 @@ def _without_drift(friction: Array, motion: Motion, cycles: Cycles, label: Rows)
     return np.asarray(friction - moved + zero.mean())
 
 
-def _under_mean_load(friction: Array, normal: Array, loads: Array, label: Rows, levels: tuple[Array, Array]) -> Array:
+def _under_mean_load(friction: Array, normal: Array, loads: Array, label: Rows, zero: Array) -> Array:
     """The friction as under the mean load of its cycle, wherever along the stroke it is pressed; its zero as it is."""
-    zero = np.nan_to_num((levels[0] - levels[1]) / 2)[label]
+    zero = np.nan_to_num(zero)[label]
     mean = loads[label]
     moved = zero + (friction - zero) * mean / np.maximum(np.abs(normal), LIFTED * mean)
     return np.where(label >= 0, moved, friction)
@@ -345,6 +379,18 @@ def _beside(coefficient: Estimate, relative: float, status: str) -> Estimate:
     """The coefficient with what load and gain are known to, and with what is to be said of all of them."""
     widened = replace(coefficient.widened(relative), status=Status(coefficient.status, status))
     return widened.within(0.0, otherwise=DRIVES)
+
+
+def _as_far_as_it_slides(plateau: Estimate, share: float) -> Estimate:
+    """The plateau, with a doubt where the contact slides over a part of each stroke; unknown where over hardly any."""
+    part = f"{100 * share:.0f} % of each stroke"
+    if share < LEAST:
+        words = f"the contact slides over no more than {part}: it gives way, and shows no plateau"
+        return plateau.unknown(Status(Doubt(words, NOT_SLIDING)))
+    if share < MOSTLY:
+        words = f"the contact slides over {part}, by its work, and gives way over the rest: the end of each is told"
+        return replace(plateau, status=Status(plateau.status, Doubt(words, PARTLY)))
+    return plateau
 
 
 def fit_wear_in(values: Array) -> WearIn | None:

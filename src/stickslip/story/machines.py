@@ -54,14 +54,17 @@ def of_tribometers(comparison: Comparison) -> Story:
 
 
 def _of_one_test(findings: Findings) -> Iterator[str]:
-    tribometer = findings.tribometer
-    doubt = "" if stands(tribometer.plateau.status) else f", which is not to be trusted ({tribometer.plateau.status})"
-    yield (
-        f"The kinetic coefficient of friction is {value_of(tribometer.plateau)} by the plateau "
-        f"(95 %: {interval_of(tribometer.plateau)}) under {value_of(tribometer.load)}{doubt}."
-    )
+    tribometer, plateau = findings.tribometer, findings.tribometer.plateau
+    if plateau.known:
+        doubt = "" if stands(plateau.status) else f", which is not to be trusted ({plateau.status})"
+        yield (
+            f"The kinetic coefficient of friction is {value_of(plateau)} by the plateau "
+            f"(95 %: {interval_of(plateau)}) under {value_of(tribometer.load)}{doubt}."
+        )
+    else:
+        yield f"No kinetic coefficient of friction is told: {plateau.status}."
     others = [getattr(tribometer, name) for name in DEFINITIONS if name != "plateau"]
-    if any(abs(one.value - tribometer.plateau.value) > APART * tribometer.plateau.value for one in others if one.known):
+    if any(abs(one.value - plateau.value) > APART * plateau.value for one in others if one.known):
         rest = ", ".join(f"{value_of(one)} {one.name.rpartition(', ')[2]}" for one in others if one.known)
         yield f"By other definitions it is {rest}: say which when you quote it."
     if findings.static is not None:
