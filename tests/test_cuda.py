@@ -101,7 +101,7 @@ def test_the_kernel_is_typed_and_lowered_for_a_gpu(monkeypatch: pytest.MonkeyPat
 
     blocks: list[tuple[Any, ...]] = []
 
-    def refused(given: Any, out: Any, size: int, physical: int, heed: Any) -> None:
+    def refused(given: Any, out: Any, size: int, physical: int) -> None:
         blocks.append((given, out, rooms(len(given.states), size, physical)))
         raise KeyboardInterrupt
 

@@ -21,8 +21,11 @@ import stickslip as ss
 from stickslip.errors import ModelError, SolveError
 from stickslip.laws.base import Exit, Mode, Rigid
 from stickslip.maps import engines
+from stickslip.maps.crowd import run_block
 from stickslip.maps.measures import FAILED, MOVING
 from stickslip.maps.plan import Arrays, Plan
+from stickslip.maps.sweep import planned
+from stickslip.solve import refusal
 
 pytest.importorskip("xarray")
 CIRCLE = 2 * math.pi
@@ -400,3 +403,30 @@ def test_an_interrupt_waits_for_no_block() -> None:
     finally:
         signal.signal(signal.SIGINT, before)
     assert next(asked) < 150
+
+
+@pytest.mark.parametrize("law", [ss.laws.Coulomb(0.5), ss.laws.Stribeck(0.5, 0.6, speed=0.1)], ids=["linear", "curved"])
+def test_an_interrupt_waits_for_no_motion(law: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A motion of many periods, its exponent and a block of many systems ended first: up to 13 s."""
+    looks, ended, real = itertools.count(1), threading.Event(), refusal.heed
+
+    def heed() -> None:
+        if next(looks) == 3:
+            ended.set()
+        real()
+
+    for room in ("solve.refusal", "solve.simulate", "solve.curved", "maps.crowd"):
+        monkeypatch.setattr(f"stickslip.{room}.heed", heed)
+    grid = {"frequency": np.linspace(0.1, 0.3, 64)}
+    plan = planned(UNIT.having(law=law), grid, measures=["lyapunov"], cycles=25, settle=0, start=None)
+
+    def block() -> None:
+        refusal.ended_by(ended)
+        with pytest.raises(KeyboardInterrupt):
+            run_block(plan, 0)
+
+    thread = threading.Thread(target=block)
+    thread.start()
+    thread.join()
+    assert ended.is_set()
+    assert next(looks) == 4

@@ -16,7 +16,21 @@ from stickslip.maps import measures as log
 from stickslip.maps.grid import START
 from stickslip.maps.measures import AT_REST, EVENTS, FAILED, LOG, MOVING, NO_SYSTEM, ORDERS, own_name
 from stickslip.maps.plan import BLOCK, Arrays, Plan
-from stickslip.maps.watch import CONSTANT, LAP, MARK, ROOM, VARIES, Counted, Given, Look, Rooms, repeats, watch_all
+from stickslip.maps.watch import (
+    CONSTANT,
+    CYCLES,
+    LAP,
+    MARK,
+    ROOM,
+    SETTLE,
+    VARIES,
+    Counted,
+    Given,
+    Look,
+    Rooms,
+    repeats,
+    watch_all,
+)
 from stickslip.oscillator import Oscillator
 from stickslip.parameters import changed, find
 from stickslip.solve.assembly import tables_of
@@ -24,19 +38,19 @@ from stickslip.solve.glide import Model, Past, blank_pieces
 from stickslip.solve.kernel import scratch
 from stickslip.solve.phasors import phasors_of
 from stickslip.solve.poincare import beat, derivative, lap, lyapunov, tables
+from stickslip.solve.refusal import heed
 from stickslip.solve.simulate import simulate
 from stickslip.solve.tables import System, Systems, Tables, by_value, kind_of_drive, kind_of_law, opened, oscillators
 from stickslip.solve.trajectory import Event, Trajectory
 
-Heed = Callable[[], None]  # raises where the block is wanted no more
-Watch = Callable[[Given, Counted, int, int, Heed], None]  # march what is given into what is left: its modes and entries
+Watch = Callable[[Given, Counted, int, int], None]  # march what is given into what is left: its modes and entries
 KINDS = {"stick": log.STICK, "microstick": log.MICROSTICK}
 PARTS = ("law", "drive")
 PATHS = {"micro_slips", "transition_speed", "energy"}  # measures of how far and how fast the contact slips
 KEPT = {"time": np.float64, "kind": np.str_, "mode": np.str_}  # of an event; the rest are whole numbers
 ORDER = 12  # Gauss points of a cell
 SEEN = 8  # looks at a cell for a turn
-AT_ONCE = 64  # motions between two looks at the keyboard: some 0.02 s
+AT_ONCE = 16_384  # periods, of one motion at least, between two looks at the keyboard: some 0.02 s
 Alone = Callable[[Plan, tuple[int, ...]], Mapping[str, Any]]  # the measures of one point by itself
 
 
@@ -73,6 +87,7 @@ def crowds(plan: Plan, number: int) -> Iterator[tuple[Index, Systems | None, dic
 def _kind_of_drive(plan: Plan, drive: Drive) -> Any:
     """The kind of a drive; None also where an exponent is asked of what it leaves to itself: all directions tell it,
     and the watch carries one."""
+    heed()
     alone = "lyapunov" in plan.measures and not math.isfinite(drive.motion().period)
     return None if alone else kind_of_drive(drive)
 
@@ -95,6 +110,7 @@ def _different(plan: Plan, steps: Index, part: str) -> tuple[list[Any], Index]:
     for key in np.stack(np.unravel_index(keys, shape), axis=-1) if shape else [()]:
         axes = [(plan.axes[number], own[number], step) for number, step in zip(columns, key, strict=True)]
         changes = tuple((axis.names[j], axis.values[step][j]) for axis, names, step in axes for j in names)
+        heed()
         plain = by_value(system) and all(isinstance(value, int | float | str) for _, value in changes)
         distinct.append((_known if plain else _made)(system, changes))
     return distinct, which
@@ -130,8 +146,9 @@ def _starts(plan: Plan, steps: Index) -> dict[str, Array]:
     }
 
 
-def watched(plan: Plan, systems: Systems, start: Mapping[str, Any], watch: Watch, heed: Heed) -> Arrays:
+def watched(plan: Plan, systems: Systems, start: Mapping[str, Any], watch: Watch) -> Arrays:
     """The measures of systems of one kind."""
+    heed()
     table = tables_of(systems)
     named = {measure for measure in plan.measures if isinstance(measure, str)}
     states, modes = opened(table, start)
@@ -157,7 +174,7 @@ def watched(plan: Plan, systems: Systems, start: Mapping[str, Any], watch: Watch
         np.zeros(count),
         np.full((count, physical, physical), np.nan),
     )
-    watch(given, out, states.shape[1], physical, heed)
+    watch(given, out, states.shape[1], physical)
     answers = _answers(plan, out, units)
     lost = out.statuses == FAILED
     for name, values in answers.items():
@@ -215,12 +232,13 @@ def _answers(plan: Plan, out: Counted, units: Array) -> Arrays:
     return answers
 
 
-def on_cpu(given: Given, out: Counted, size: int, physical: int, heed: Heed) -> None:
+def on_cpu(given: Given, out: Counted, size: int, physical: int) -> None:
     """One motion after another, in one scratch."""
     room, count = rooms(1, size, physical), len(given.states)
-    for first in range(0, count, AT_ONCE):
+    few = max(1, AT_ONCE // int(given.wants[SETTLE] + given.wants[CYCLES]))
+    for first in range(0, count, few):
         heed()
-        watch_all(given, out, room, first, min(first + AT_ONCE, count))
+        watch_all(given, out, room, first, min(first + few, count))
 
 
 def rooms(count: int, size: int, physical: int) -> Rooms:
@@ -243,7 +261,7 @@ def pasts(count: int) -> Past:
 
 
 def run_block(
-    plan: Plan, number: int, watch: Watch = on_cpu, *, alone: Alone | None = None, heed: Heed = lambda: None
+    plan: Plan, number: int, watch: Watch = on_cpu, *, alone: Alone | None = None
 ) -> tuple[Arrays, Arrays | None]:
     """The answers of one block, by the names of the plan's variables, and its events where they are asked for.
 
@@ -256,7 +274,7 @@ def run_block(
     left = set(range(len(points)))
     logs: list[list[Any]] = []
     for rows, systems, known in crowds(plan, number):
-        values = known if systems is None else watched(plan, systems, known, watch, heed)
+        values = known if systems is None else watched(plan, systems, known, watch)
         for name in columns.keys() & values.keys():
             columns[name][rows] = values[name]
         left -= set(rows.tolist())

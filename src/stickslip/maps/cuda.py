@@ -13,7 +13,7 @@ from numba.cuda.cudadrv.driver import CudaAPIError
 from stickslip.compiled import dispatcher_of
 from stickslip.errors import ModelError, SolveError
 from stickslip.maps import watch
-from stickslip.maps.crowd import Heed, rooms, run_block
+from stickslip.maps.crowd import rooms, run_block
 from stickslip.maps.measures import LOG
 from stickslip.maps.plan import Keep, Plan
 from stickslip.maps.watch import Counted, Given
@@ -53,8 +53,7 @@ def _watch_thread(given, out, rooms):
         watch_one(i, i, given, out, rooms)
 
 
-def _watch(given: Given, out: Counted, size: int, physical: int, heed: Heed) -> None:
-    heed()
+def _watch(given: Given, out: Counted, size: int, physical: int) -> None:
     count = len(given.states)
     with _driven():
         written = carried(out)

@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 from stickslip.errors import ModelError, SolveError
 from stickslip.maps.crowd import run_block
 from stickslip.maps.plan import Keep, Plan, required
+from stickslip.solve.refusal import ended_by
 from stickslip.workers import processors, unheard
 
 if TYPE_CHECKING:
@@ -44,18 +45,14 @@ def threads(plan: Plan, numbers: Sequence[int], keep: Keep, address: str | None 
     """
     count, ended = int(address) if address else processors(), Event()
 
-    def heed() -> None:
-        if ended.is_set():
-            raise KeyboardInterrupt
-
     left = iter(numbers)
-    with ThreadPoolExecutor(count, "sweep") as pool:
-        running = {pool.submit(run_block, plan, number, heed=heed): number for number in islice(left, 2 * count)}
+    with ThreadPoolExecutor(count, "sweep", ended_by, (ended,)) as pool:
+        running = {pool.submit(run_block, plan, number): number for number in islice(left, 2 * count)}
         try:
             while running:
                 for task in wait(running, return_when=FIRST_COMPLETED).done:
                     keep(running.pop(task), *task.result())
-                    running |= {pool.submit(run_block, plan, number, heed=heed): number for number in islice(left, 1)}
+                    running |= {pool.submit(run_block, plan, number): number for number in islice(left, 1)}
         except KeyboardInterrupt:
             ended.set()
             for task, number in running.items():

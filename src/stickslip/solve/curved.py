@@ -19,7 +19,7 @@ from stickslip.oscillator import Structure
 from stickslip.solve import collocation, march, taylor
 from stickslip.solve.collocation import Implicit, Model
 from stickslip.solve.march import LAPS, TIME, TRY, Dense, Leaps, Shown, Steps, Work
-from stickslip.solve.refusal import Budget, chatter, held_back, named, require_numbers, unproved
+from stickslip.solve.refusal import Budget, chatter, heed, held_back, named, require_numbers, unproved
 from stickslip.solve.tables import Stops, numbered
 from stickslip.solve.tape import Tape
 from stickslip.solve.taylor import expansion
@@ -184,6 +184,7 @@ def run_curved(
     (laps, offset), stops = course
     run = _Run(table, state, mode, total=offset + _lasting(laps, table.motion.period), budget=budget, rtol=rtol)
     status = "complete"
+    heed()
     try:
         with ExitStack() as holding:
             run.state[stops.places] = stops.values[0]

@@ -114,6 +114,20 @@ class Budget:
         return all((old.kind, old.side) == (new.kind, new.side) for _, old, new in changes)
 
 
+_work = threading.local()
+
+
+def ended_by(ended: threading.Event) -> None:
+    """Have :func:`heed` end what this thread works on: Ctrl-C is heard by the main thread alone."""
+    _work.ended = ended
+
+
+def heed() -> None:
+    """End the work of this thread where it is wanted no more."""
+    if hasattr(_work, "ended") and _work.ended.is_set():
+        raise KeyboardInterrupt
+
+
 @contextmanager
 def held_back() -> Iterator[Callable[[], None]]:
     """A first Ctrl-C waits until the block is done, or calls what it is given; a second comes at once.
@@ -122,7 +136,7 @@ def held_back() -> Iterator[Callable[[], None]]:
     """
     handler = signal.getsignal(signal.SIGINT)
     if threading.current_thread() is not threading.main_thread() or not callable(handler):
-        yield lambda: None
+        yield heed
         return
     heard: list[tuple[int, FrameType | None]] = []
 
@@ -131,13 +145,13 @@ def held_back() -> Iterator[Callable[[], None]]:
             handler(number, frame)
         heard.append((number, frame))
 
-    def heed() -> None:
+    def pass_on() -> None:
         if heard:
             handler(*heard.pop())
 
     signal.signal(signal.SIGINT, hear)
     try:
-        yield heed
+        yield pass_on
     finally:
         signal.signal(signal.SIGINT, handler)
-        heed()  # though the block ended in an error, which the next block may get over
+        pass_on()  # though the block ended in an error, which the next block may get over

@@ -26,7 +26,7 @@ from stickslip.solve.delayed import delayed_tape, run_delayed
 from stickslip.solve.glide import Clock, Model, Pieces, blank_past, blank_pieces, until
 from stickslip.solve.phasors import fast_tables, without
 from stickslip.solve.planar import planar_tape, run_planar
-from stickslip.solve.refusal import LISTED, Budget, chatter, held_back, named, require_numbers, unproved
+from stickslip.solve.refusal import LISTED, Budget, chatter, heed, held_back, named, require_numbers, unproved
 from stickslip.solve.roots import NOISE
 from stickslip.solve.tables import Stops, System, Tables, is_curved
 from stickslip.solve.tape import tape
@@ -254,6 +254,7 @@ def run(
     scale = period if math.isfinite(period) else 1 / system.frequency if system.frequency else total
     status = "complete"
     march = _March(table, state, mode, total, Budget(table, scale=scale, most=budget), tell)
+    heed()
     try:
         with march.holding:
             march.through(stops_of(table, laps, offset))
