@@ -14,6 +14,7 @@ from stickslip.errors import EstimateError
 from stickslip.estimate import Doubt, Estimate, Result, Status
 from stickslip.record.record import Record
 from stickslip.signals.alignment import Alignment, Pair, align, likely_delays
+from stickslip.signals.derivatives import convolved
 from stickslip.signals.noise import noise_level, quantisation_step
 
 QUESTION = "the delay between sensors"
@@ -451,12 +452,9 @@ def band_limited(values: Array, jumps: Array, sooner: float = 0.0) -> Array:
     """
     if not jumps.any():
         return values
-    from scipy.fft import irfft, next_fast_len, rfft  # half a second sooner there than scipy.signal, which convolves
     from scipy.special import sici
 
     times = np.arange(1 - REACH, REACH + 1) - 0.5
     step = 0.5 + sici(math.pi * (times + sooner))[0] / math.pi
     swing = (step - (times > 0)) * np.cos(math.pi * times / (2 * REACH)) ** 2
-    size = next_fast_len(len(jumps) + len(swing) - 1, real=True)
-    swung = irfft(rfft(jumps, size) * rfft(swing, size), size)
-    return np.asarray(values + swung[REACH - 1 : REACH - 1 + len(values)])
+    return np.asarray(values + convolved(jumps, swing)[REACH - 1 : REACH - 1 + len(values)])

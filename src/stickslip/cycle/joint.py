@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from stickslip.arrays import Array
-from stickslip.cycle.joint_fall import FALL, ROUNDING, Fall, bends, falling
+from stickslip.cycle.joint_fall import FALL, Fall, Misfit, bends, damps_error, falling, misfits
 from stickslip.cycle.joint_fit import (
     ADVICE,
     SURELY,
@@ -22,6 +22,7 @@ from stickslip.cycle.joint_fit import (
     fitted,
     joint_data,
     seating,
+    separable,
     turning,
     warmed,
 )
@@ -37,25 +38,16 @@ from stickslip.statistics import FEW_INDEPENDENT, LeastSquares, mixture
 DROWNED = 0.5
 LATEST = 0.1  # s that a torque may be late
 OFTEN, USUAL = 0.25, 0.02  # odds that a torque is late, chosen, and s by which it then usually is, chosen
+LOOP = (1e-3, 2e-3)  # s, delay of a controller, and how that varies, chosen: it holds its output for 0.2 to 10 ms
 # Times the power of noise in the torque's rate: noise alone had 0.9 to 1.2 on 10 logs, 41 others 1.4 at least.
 HEARD = 1.5
 STRAYS = 1.6  # times its chance that a delay strays: so it did on 60 joints of 15 ms, seeds 70100 to 70225
 NEARER, NEAR = 8, 1e-3  # steps towards the delay, and the last one's size in samples
 WAYS = ((1.0, "forward"), (-1.0, "back"))
 # Kinds of doubt.
-NOISY, LOADED, CONFOUNDED, SHIFTED, BENT, PLACE = "noisy", "loaded", "confounded", "shifted", "bent", "placed"
-RUBS = ("forward", "back", "viscous")  # terms by which friction is a line over the speed
-PLACED = ("forward", "back", "load", "sine", "cosine")  # terms that friction or torque of the place passes for
+NOISY, LOADED, CONFOUNDED, SHIFTED = "noisy", "loaded", "confounded", "shifted"
 BARELY = 0.5  # of a value: an interval that is wider on either side hardly tells it
 RICHER = {"load", "uneven", *WARM}  # what Coulomb and viscous friction of both directions alike do not have
-
-
-class Misfit(NamedTuple):
-    """What no term follows: the terms that it passes for, what is told of it, and what it may make of the torque."""
-
-    terms: tuple[str, ...]
-    doubt: Doubt
-    strays: Array = np.zeros((1, 1))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -114,8 +106,8 @@ class JointFriction(Result):
     exponent : float or None
         Of that Stribeck curve, the likeliest; the intervals count 1, 1.5 and 2.
     delay : Estimate or None
-        By how much the measured torque comes later [s] than the position; taken out where it is surely there. None of
-        a controller's torque, and where the motion does not tell it.
+        By how much the measured torque comes later [s] than the position, or a controller's than the error that it is
+        made of; taken out where it is surely there. None where the motion does not tell it.
     """
 
     level: Estimate
@@ -182,7 +174,8 @@ def regress_joint(
 
     (Swevers, Verdonck and De Schutter 2007, for a joint without load part; friction in proportion to the load is that
     of a gear's teeth). The torque is measured (``force``), that of a current with its constant, or that of the
-    controller, :math:`k_p (r - q) + k_d (\dot r - \dot q)`, whose `kd` is regressed too where it is not stated.
+    controller, :math:`k_p e(t - d) + k_d \dot e(t - d)` of its error :math:`e = r - q`, whose `kd` is regressed too
+    where it is not stated, and its delay d: what controllers usually have of that, 1 ms to 2 ms, is known beforehand.
     The balance is weighed by windows that lie within a stroke, so that sticking, and friction that differs near rest,
     do not enter, and is solved by least squares; where the log has the reference, its columns are the instruments
     (Gautier, Janot and Vandanjon 2013), so that the noise of the encoder pulls nothing towards zero; of a log without
@@ -253,51 +246,73 @@ def regress_joint(
     slow = punctual(slow, delay)
     fall = falling(slow, fit, terms, pull)
     data = slow if fall else data
-    if delay is None and data.source != "reference":
-        left_out = (*left_out, f"{WORDS['late']}: {ADVICE['late']}")
+    if delay is None:
+        left_out = (*left_out, f"{WORDS['lag' if data.source == 'reference' else 'late']}: {ADVICE['late']}")
     bent = fall is None and bends(slow, fit, terms, pull)
-    return replace(_answer(record, data, fit, terms, pull, left_out, fall, bent), delay=delay)
+    if fall is not None:
+        fit, terms, pull = fall.fits[fall.best], fall.terms, fall.pull
+    beside = misfits(data, fit, terms, bent, delay, turning(record))
+    if delay is not None and data.source == "reference":
+        delay = delay.within(0.0)
+    return replace(_answer(record, data, fit, terms, pull, left_out, fall, beside), delay=delay)
 
 
 def delay_of(data: JointData) -> Estimate | None:
-    """By how much a measured torque comes late; None of a controller's, and where the motion can not tell.
+    """By how much a torque comes late, measured or a controller's; None where the motion can not tell.
 
-    A torque that was filtered, or logged after the position, passes for friction that grows with the load. Its delay is
-    where its own column of the balance, :math:`-d\\,\\dot\\tau`, has nothing left to explain.
+    A torque that was filtered, or logged after the position, passes for friction that grows with the load. A controller
+    that holds its output, computes for a while and is heard late damps less, and by what its damping lags its joint
+    seems to be lighter. The delay is where its own column of the balance, :math:`-d\\,\\dot\\tau`, has nothing left to
+    explain.
     """
-    if any(log.torque is None for log in data.logs):
-        return None
     fs = data.logs[0].sliding.window.fs
     bare = tuple(term for term in data.terms if term not in RICHER)
-    most = int(LATEST * fs)
-    counts = [0, *(sign * 2**k for k in range(most.bit_length()) for sign in (1, -1))]
+    loop = data.source == "reference"
 
     def left(count: int) -> float:
         return float(np.linalg.norm(about_load(data.earlier(count / fs), bare)[0].residual))
 
-    def beside(late: float) -> tuple[LeastSquares, tuple[str, ...]]:
+    def beside(there: JointData) -> tuple[LeastSquares, tuple[str, ...]]:
         """The balance with what is left of a delay: without a load part where that does not settle beside it."""
-        there = data.earlier(late)
         try:
             return about_load(there, (*data.terms, "late"))[0], (*data.terms, "late")
         except EstimateError:
             return about_load(there, (*bare, "late"))[0], (*bare, "late")
 
+    most = int(LATEST * fs)
+    counts = [0, *(sign * 2**k for k in range(most.bit_length()) for sign in (1, -1))]
     try:
-        late = min(counts, key=left) / fs
+        late = LOOP[0] if loop else min(counts, key=left) / fs
+        there = damped(data.earlier(late), late)
         for _ in range(NEARER):
-            fit, terms = beside(late)
+            fit, terms = beside(there)
             step = coefficient(fit, terms, "late")
             late += min(max(step, -LATEST), LATEST)
+            there = damped(data.earlier(late), late, coefficient(fit, terms, "damping"))
             if abs(step) < NEAR / fs:
                 break
     except EstimateError:  # what else it can not tell is said where nothing is asked of a delay
         return None
-    if not _heard(data.earlier(late), fit, terms):
+    if not loop and not _heard(data.earlier(late), fit, terms):
         return None
-    sd = STRAYS * Telling(data, fit, terms, True, "ok", ()).sum({"late": 1.0}, WORDS["late"]).sd
+    name = WORDS["lag" if loop else "late"]
+    sd = (1.0 if loop else STRAYS) * Telling(data, fit, terms, True, "ok", ()).sum({"late": 1.0}, name).sd
+    sd = math.hypot(sd, NEAR / fs)
     late, sd = (late, sd) if abs(late) <= LATEST else (0.0, LATEST)  # beyond that it is some other fault's
-    return Estimate.normal(WORDS["late"], late, sd=sd, unit="s", method="the balance of torque, read later")
+    if loop and (sd > LOOP[1] or not damps_error(data, fit, terms, None)):  # as much is known of any controller
+        return None
+    return Estimate.normal(name, late, sd=sd, unit="s", method="the balance of torque, read later")
+
+
+def damped(data: JointData, late: float, damping: float | None = None) -> JointData:
+    """With what a controller's damping makes of a delay, where that is regressed: it is told as it damps."""
+    if data.source != "reference" or "damping" not in data.terms:
+        return data
+    if damping is None:
+        fit, terms, *_ = separable(data)
+        damping = coefficient(fit, terms, "damping")
+    own = damping + data.stated["kp"].value * late
+    return replace(data, logs=tuple(replace(log, damped=own) for log in data.logs))
 
 
 def _heard(data: JointData, fit: LeastSquares, terms: tuple[str, ...]) -> bool:
@@ -312,10 +327,23 @@ def _heard(data: JointData, fit: LeastSquares, terms: tuple[str, ...]) -> bool:
 
 def punctual(data: JointData, delay: Estimate | None) -> JointData:
     """The data with a torque read as much later as it surely is late, and unsure by how unsure that is."""
-    if delay is None:
+    if data.source == "reference":
+        late, unsure = _lag(delay)
+        data = damped(data.earlier(late), late)
+    elif delay is None:
         return data
-    data, unsure = (data.earlier(delay.value), delay.sd) if is_late(delay) else (data, _unseen(delay))
+    else:
+        data, unsure = (data.earlier(delay.value), delay.sd) if is_late(delay) else (data, _unseen(delay))
     return replace(data, unsure=(*data.unsure, unsure * data.columns(("late",), 0.0, (0.0, 0.0))[:, 0]))
+
+
+def _lag(delay: Estimate | None) -> tuple[float, float]:
+    """Delay of a controller [s] and its deviation, by what the log tells of it and by what controllers usually have."""
+    usual, spread = LOOP
+    if delay is None:
+        return usual, spread
+    share = spread**2 / (spread**2 + delay.sd**2)
+    return usual + share * (delay.value - usual), math.sqrt(share) * delay.sd
 
 
 def _unseen(delay: Estimate) -> float:
@@ -346,12 +374,9 @@ def _answer(
     pull: tuple[float, float],
     left_out: tuple[str, ...],
     fall: Fall | None,
-    bent: bool,
+    beside: tuple[Misfit, ...],
 ) -> JointFriction:
-    if fall is not None:
-        fit, terms, pull = fall.fits[fall.best], fall.terms, fall.pull
     status = Status(*_worries(data, fit, terms))
-    beside = misfits(data, fit, bent, turning(record))
     tell = Telling(data, fit, terms, turning(record), status, beside)
     if fall is not None:
         tell = Averaged(data, fit, terms, turning(record), status, beside, fall)
@@ -468,20 +493,6 @@ def _worries(data: JointData, fit: LeastSquares, terms: tuple[str, ...]) -> list
             doubt = f"{100 * noisy:.2g} % of the acceleration is noise of the encoder: log the reference too"
             worries.append(Doubt(doubt, NOISY))
     return worries
-
-
-def misfits(data: JointData, fit: LeastSquares, bent: bool, turning: bool) -> tuple[Misfit, ...]:
-    """What of the friction the terms do not follow."""
-    seen = []
-    if bent:
-        line = "friction bends with the speed: this is of the line nearest to it, as its interval is"
-        seen.append(Misfit(RUBS, Doubt(line, BENT)))
-    what, size, elsewhere = data.ripple(fit.residual)
-    if size > ROUNDING * float(np.sqrt(np.mean(data.torque**2))):
-        unit = (TURNING if turning else UNITS)["coulomb"]
-        doubt = Doubt(f"{what} changes along the way, by {size:.2g} {unit} r.m.s.", PLACE, lesser=True)
-        seen.append(Misfit(PLACED, doubt, elsewhere))
-    return tuple(seen)
 
 
 @dataclass(frozen=True)

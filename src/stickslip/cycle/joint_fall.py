@@ -1,17 +1,21 @@
-"""Friction of a joint that falls with the speed: which Stribeck curves its log allows, and whether it surely does."""
+"""Friction of a joint that falls with the speed: which Stribeck curves its log allows, and whether it surely does.
+
+And what no term follows: bends, what changes along the way, a controller that damps the speed."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
 from stickslip.arrays import Array
-from stickslip.cycle.joint_fit import JointData, Log, coefficient
-from stickslip.cycle.joint_slides import Sliding
+from stickslip.cycle.joint_fit import JointData, coefficient
+from stickslip.cycle.joint_slides import Log, Sliding
+from stickslip.cycle.regression import TURNING, UNITS
 from stickslip.errors import EstimateError
-from stickslip.estimate import Estimate
+from stickslip.estimate import Doubt, Estimate
 from stickslip.signals.derivatives import differentiate
 from stickslip.statistics import LeastSquares, correlation_time, least_squares
 
@@ -30,6 +34,12 @@ ROUNDING = 1e-5  # of the torque: of a log without noise derivatives leave some 
 SURELY = 3.5
 METHOD = "likelihood over Stribeck curves"
 FINER = 3  # rounds of likely curves closer together: three make 12 speeds of one step of the first
+# Kinds of doubt.
+CURVED, PLACE, SPEEDY = "bent", "placed", "speedy"
+SPEED = ("viscous", "uneven", "inertia")  # terms in which a controller's damping of the speed stands, and its delay
+RUBS = ("forward", "back", "viscous")  # terms by which friction is a line over the speed
+PLACED = ("forward", "back", "load", "sine", "cosine")  # terms that friction or torque of the place passes for
+HARDLY = 0.5  # of a stated kd, that a delay undoes, chosen: more of it makes a joint swing
 FALL = ("fall", "fall of load")  # the excess at rest under the mean load, and what each N m of load adds to it
 
 
@@ -295,3 +305,47 @@ def _spans(curves: Array) -> Array:
     """How much of the logarithm of the speed each curve stands for."""
     speeds = [curves[curves[:, 1] == exponent, 0] for exponent in dict.fromkeys(curves[:, 1])]
     return np.concatenate([np.gradient(np.log(speed)) for speed in speeds])
+
+
+# ---- what no term follows
+
+
+class Misfit(NamedTuple):
+    """What no term follows: the terms that it passes for, what is told of it, and what it may make of the torque."""
+
+    terms: tuple[str, ...]
+    doubt: Doubt
+    strays: Array = np.zeros((1, 1))
+
+
+def damps_error(data: JointData, fit: LeastSquares, terms: tuple[str, ...], delay: Estimate | None) -> bool:
+    """Whether a controller surely damps its error: one that is late by so much that it would hardly, does not."""
+    if "damping" in terms:
+        return fit.combined(np.eye(len(terms))[terms.index("damping")], "", "", "").interval[0] > 0
+    late = 0.0 if delay is None else delay.value
+    return data.stated["kd"].value == 0 or HARDLY * data.stated["kd"].value > data.stated["kp"].value * late
+
+
+def misfits(
+    data: JointData,
+    fit: LeastSquares,
+    terms: tuple[str, ...],
+    bent: bool,
+    delay: Estimate | None,
+    turning: bool,
+) -> tuple[Misfit, ...]:
+    """What of the friction the terms do not follow."""
+    seen = []
+    if bent:
+        line = "friction bends with the speed: this is of the line nearest to it, as its interval is"
+        seen.append(Misfit(RUBS, Doubt(line, CURVED)))
+    if data.source == "reference" and not damps_error(data, fit, terms, delay):
+        line = "the controller seems to damp the speed and not its error, which looks like viscous friction"
+        wrong = SPEED if "damping" in terms else (*SPEED, *PLACED)  # a stated kd is taken for that of the error
+        seen.append(Misfit(wrong, Doubt(line, SPEEDY)))
+    what, size, elsewhere = data.ripple(fit.residual)
+    if size > ROUNDING * float(np.sqrt(np.mean(data.torque**2))):
+        unit = (TURNING if turning else UNITS)["coulomb"]
+        doubt = Doubt(f"{what} changes along the way, by {size:.2g} {unit} r.m.s.", PLACE, lesser=True)
+        seen.append(Misfit(PLACED, doubt, elsewhere))
+    return tuple(seen)

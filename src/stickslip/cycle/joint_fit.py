@@ -13,12 +13,15 @@ import numpy as np
 from stickslip.arrays import Array
 from stickslip.balance.motion import require_fit
 from stickslip.cycle.joint_slides import (
+    DERIVATIVES,
     NARROW,
     SHORTEST,
+    Log,
     Sliding,
     Teeth,
     Window,
-    encoder_errors,
+    later,
+    motor_lead,
     places,
     seated,
     sliding,
@@ -26,8 +29,8 @@ from stickslip.cycle.joint_slides import (
 from stickslip.errors import EstimateError, ModelError, RecordError
 from stickslip.estimate import Constant, Estimate
 from stickslip.record.record import Record, Step, require_record
-from stickslip.signals.derivatives import five_point_difference, smooth
-from stickslip.signals.interpolate import band_limited, without_delays
+from stickslip.signals.derivatives import five_point_difference
+from stickslip.signals.interpolate import without_delays
 from stickslip.signals.noise import noise_level
 from stickslip.statistics import LeastSquares, least_squares, repeating
 
@@ -41,14 +44,14 @@ SURELY = 4.0  # deviations, by which the viscous friction of both directions dif
 # Of inertia and friction, what may be behind the teeth, chosen: of the joints drawn in tests it is 0.3 to 0.7.
 BEHIND = (0.25, 0.75)
 SEATINGS = 2  # rounds: by the torque of the regression on all rows, then by that of where they carry
-TOGETHER = 0.995  # correlation of motor and link: an encoder that wraps, or the motor of another joint, has less
 WORDS = {
     "inertia": "inertia", "viscous": "viscous friction", "uneven": "uneven viscous friction",
     "forward": "Coulomb friction forward", "back": "Coulomb friction back",
     "coulomb": "Coulomb friction", "load": "friction per load",
     "warming": "friction per kelvin", "thinning": "viscous friction per kelvin",
     "sine": "gravity, sine part", "cosine": "gravity, cosine part", "damping": "damping of the control loop",
-    "late": "delay of the torque", "fall": "friction that falls with the speed", "fall of load": "its part of the load",
+    "late": "delay of the torque", "lag": "delay of the controller", "fall": "friction that falls with the speed",
+    "fall of load": "its part of the load",
 }  # fmt: skip
 ADVICE = {
     "inertia": "accelerate harder, by steps or faster swings",
@@ -66,7 +69,6 @@ ADVICE = {
     "fall": "slide slower too",
     "fall of load": "slide slowly under several loads",
 }
-DERIVATIVES = ("inertia", "viscous", "uneven")  # terms in which the counts of an encoder are noise
 WARM = ("warming", "thinning")
 # Of the variance of a temperature, its counts' and its noise's: a regression on it is low by as much.
 ROUGHLY = 0.02
@@ -75,139 +77,6 @@ OPTIONAL: tuple[tuple[str, ...], ...] = (WARM, ("load",), ("sine", "cosine"))
 
 
 Fitted = tuple[LeastSquares, tuple[str, ...], tuple[float, float]]  # with its terms and gravity's sine and cosine part
-
-
-@dataclass(frozen=True)
-class Log:
-    """What a joint's log tells, as it enters the balance.
-
-    Attributes
-    ----------
-    position : ndarray, shape (n,)
-        Of the joint, behind its gear.
-    reference : ndarray or None
-        What its controller was told, which knows nothing of the encoder's noise.
-    sliding : Sliding
-        When it slides.
-    lead : ndarray
-        By how much the motor is ahead of the link; zeros where one encoder tells of both.
-    temperature : ndarray or None
-        Of the joint [K], where it was logged.
-    about : float
-        Temperature at which the friction is told [K].
-    torque : ndarray or None
-        As it was measured, apart from the position; None of a controller's, which is made of it.
-    ahead : ndarray or float
-        By how much what the encoder tells of is ahead of the link, by the play of the teeth between.
-    noise : ndarray, shape (3, 3)
-        ``E'E`` of the encoder's noise E in the columns of `DERIVATIVES`; none where the reference knows nothing of it.
-    """
-
-    position: Array
-    reference: Array | None
-    sliding: Sliding
-    lead: Array
-    temperature: Array | None = None
-    about: float = 0.0
-    torque: Array | None = None
-    ahead: Array | float = 0.0
-    noise: Array = field(default_factory=lambda: np.zeros((len(DERIVATIVES), len(DERIVATIVES))))
-
-    @property
-    def link(self) -> Array:
-        """The place of the link, on which gravity acts."""
-        return np.asarray(self.position - self.ahead)
-
-    @property
-    def turned(self) -> Array:
-        """The motion of motor and link, half of each."""
-        return np.asarray(self.position + self.lead / 2)
-
-    def columns(
-        self, terms: tuple[str, ...], load: float, pull: tuple[float, float], *, steered: bool = False
-    ) -> Array:
-        r"""The balance's columns at the rows.
-
-        Of :math:`\tau = J \ddot q + F_v \dot q + F_u |\dot q| \pm F_c + g_s \sin q + g_c \cos q +
-        \mathrm{sgn}(\dot q) \mu |g| - k_d \dot e + (\pm b + b_v \dot q)(T - \bar T) - d \dot\tau`,
-        linear about a load part `load` and gravity's torque `pull`.
-
-        Parameters
-        ----------
-        terms : tuple of str
-            Of inertia, viscous, uneven, forward, back, coulomb (both alike), sine,
-            cosine, load, damping, warming and thinning (Coulomb and viscous friction per kelvin), and late (by how much
-            the torque is).
-        load : float
-            The load part about which gravity's columns are linear.
-        pull : (float, float)
-            Gravity's sine and cosine part.
-        steered : bool
-            From the reference in place of the position: the instruments.
-        """
-        position, turned = self.link, self.turned
-        if steered and self.reference is not None:
-            position, turned = self.reference - self.ahead, self.reference
-        side, at, fs = self.sliding.side, self.sliding.at, self.sliding.window.fs
-        carried = pull[0] * np.sin(position) + pull[1] * np.cos(position)
-        warmer = 0.0 if self.temperature is None else self.temperature - self.about
-        stronger = 1 + load * side * np.sign(carried)
-        made = {
-            "inertia": lambda: at(turned, 2),
-            "viscous": lambda: at(turned, 1),
-            "uneven": lambda: at(side * five_point_difference(turned, 1) * fs),
-            "forward": lambda: at(np.maximum(side, 0.0)),
-            "back": lambda: at(np.minimum(side, 0.0)),
-            "coulomb": lambda: at(side),
-            "sine": lambda: at(np.sin(position) * stronger),
-            "cosine": lambda: at(np.cos(position) * stronger),
-            "load": lambda: at(side * np.abs(carried)),
-            "damping": lambda: self._error_rate(steered),
-            "warming": lambda: at(side * warmer),
-            "thinning": lambda: at(five_point_difference(turned, 1) * fs * warmer),
-            "late": lambda: -at(np.zeros_like(position) if self.torque is None else self.torque, 1),
-        }
-        return np.column_stack([made[term]() for term in terms])
-
-    def _error_rate(self, steered: bool) -> Array:
-        """How the error of the position changes; its instrument is what inertia makes of the reference."""
-        slides = self.sliding
-        if self.reference is None:
-            raise EstimateError("no channel reference", "a controller follows one", "name the column of the reference")
-        if steered:
-            return slides.at(five_point_difference(self.reference, 1) * slides.window.fs, 2)
-        return slides.at(self.position - self.reference, 1)
-
-    def noisy(self) -> Log:
-        """With the noise that its encoder makes of its columns."""
-        errors = encoder_errors(self.turned, self.sliding.window.fs)
-        drawn = [replace(self, position=error, lead=np.zeros_like(error)) for error in errors]
-        columns = [one.columns(DERIVATIVES, 0.0, (0.0, 0.0)) for one in drawn]
-        return replace(self, noise=np.mean([made.T @ made for made in columns], axis=0))
-
-    def quiet(self) -> Log:
-        """With the motion freed of its noise, beyond a stroke: that would bend a fit, but less than noise a prediction.
-
-        Within a short window the counts of an encoder are accelerations: of 95 joints they were what the worst tenth of
-        predictions missed, 17 % of the torque; without them that is 8 %.
-        """
-        fs = self.sliding.window.fs
-        link, motor = (smooth(motion, fs).values for motion in (self.position, self.position + self.lead))
-        return replace(self, position=link, lead=motor - link)
-
-    def unshared(self, inertia: float, viscous: float) -> tuple[Array, Array]:
-        """Standard deviations of the torque at the rows, as nobody knows what of these is the motor's, none to all."""
-        apart = self.lead / math.sqrt(12)  # of half of it, an evenly spread share leaves that
-        accelerated, moved = (self.sliding.at(apart, order) for order in (2, 1))
-        return inertia * accelerated, viscous * moved
-
-
-def motor_lead(link: Array, motor: Array) -> Array | None:
-    """By how much a motor is ahead of its link, the gear's ratio found beside; None where they do not turn together."""
-    if np.ptp(link) == 0 or np.ptp(motor) == 0 or abs(np.corrcoef(link, motor)[0, 1]) < TOGETHER:
-        return None
-    ratio, offset = np.polyfit(link, motor, 1)
-    return np.asarray((motor - offset) / ratio - link)
 
 
 # ---- what is regressed
@@ -250,19 +119,28 @@ class JointData:
         return np.asarray(self.known + columns @ fit.coefficients[[terms.index(term) for term in bare]])
 
     def earlier(self, late: float) -> JointData:
-        """With the torque read by so much later [s] as it comes late."""
-        logs = []
-        for log in self.logs:
-            assert log.torque is not None
-            rows = np.arange(len(log.torque), dtype=float) + late * log.sliding.window.fs
-            inside = (rows >= 0) & (rows <= len(rows) - 1)
-            torque = np.full(len(rows), log.torque[-1])
-            torque[rows < 0] = log.torque[0]
-            torque[inside] = band_limited(log.torque, rows[inside])
-            logs.append(replace(log, torque=torque))
+        """With the torque read by so much later [s] as it comes late; a controller's, of an error so long ago."""
+        if self.source == "reference":
+            return self._lagging(late)
+        logs = [replace(log, torque=later(log.torque, late * log.sliding.window.fs)) for log in self.logs]
         smoothed = [log.sliding.at(np.asarray(log.torque)) for log in logs]
         raw = np.concatenate([np.asarray(log.torque) for log in logs])
         return replace(self, logs=tuple(logs), torque=np.concatenate(smoothed), raw=raw)
+
+    def _lagging(self, late: float) -> JointData:
+        r"""With a controller's torque as it acts, :math:`k_p e(t - d) + k_d \dot e(t - d)`.
+
+        Damping that is regressed is told as it damps, :math:`k_d - k_p d`: the rest of it stands with the gain.
+        """
+        logs, regressed = [], "damping" in self.terms
+        for log in self.logs:
+            fs = log.sliding.window.fs
+            torque, error = (later(values, -late * fs) for values in (log.torque, log.error))
+            if regressed:
+                torque = torque + late * fs * five_point_difference(torque, 1)
+            logs.append(replace(log, torque=torque, error=error))
+        smoothed = [log.sliding.at(np.asarray(log.torque)) for log in logs]
+        return replace(self, logs=tuple(logs), torque=np.concatenate(smoothed))
 
     def ripple(self, residual: Array) -> tuple[str, float, Array]:
         """What of the residual repeats along the way: whether as friction, which changes with the side, or as torque,
@@ -424,14 +302,16 @@ def _data_of(
     else:
         assert reference is not None
         scale, source = constants["kp"], "reference"
-        raw = scale.value * (reference - position)
-        torque = slides.at(raw)
+        error = reference - position
+        raw = made = scale.value * error
         if "kd" in constants:
-            rate = slides.at(reference - position, 1)
-            raw = raw + constants["kd"].value * slides.window.apply(reference - position, 1)
-            torque, unsure = torque + constants["kd"].value * rate, [*unsure, constants["kd"].sd * rate]
+            kd, rate = constants["kd"], five_point_difference(error, 1) * record.fs
+            raw, made = raw + kd.value * slides.window.apply(error, 1), made + kd.value * rate
+            unsure = [*unsure, kd.sd * slides.at(rate)]
         else:
             terms.append("damping")
+        torque = slides.at(made)
+        log = replace(log, torque=made, error=error)
     if scale is not None:
         unsure.append(scale.sd / scale.value * torque)
     if "bodies" in record:
@@ -457,7 +337,7 @@ def _refuse_still(slides: Sliding, record: Record) -> None:
 
 def fitted(data: JointData) -> tuple[LeastSquares, tuple[str, ...], tuple[float, float], tuple[str, ...]]:
     """The regression, with viscous friction of each direction where these differ surely."""
-    fit, terms, pull, left_out = _separable(data)
+    fit, terms, pull, left_out = separable(data)
     _refuse_driving(data, fit, terms)
     richer = (*terms, "uneven")
     try:
@@ -519,7 +399,7 @@ def _refuse_driving(data: JointData, fit: LeastSquares, terms: tuple[str, ...]) 
         )
 
 
-def _separable(data: JointData) -> tuple[LeastSquares, tuple[str, ...], tuple[float, float], tuple[str, ...]]:
+def separable(data: JointData) -> tuple[LeastSquares, tuple[str, ...], tuple[float, float], tuple[str, ...]]:
     """The regression with as many terms as the motion tells apart, and what was left out."""
     terms, left_out = data.terms, list[str]()
     for optional in (*OPTIONAL, ()):

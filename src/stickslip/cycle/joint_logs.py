@@ -12,20 +12,19 @@ import numpy as np
 
 from stickslip.arrays import Array, stretches
 from stickslip.balance.motion import away_from
-from stickslip.cycle.joint import RICHER, JointFriction, Telling, delay_of, misfits, punctual
-from stickslip.cycle.joint_fall import bends
+from stickslip.cycle.joint import RICHER, JointFriction, Telling, delay_of, punctual
+from stickslip.cycle.joint_fall import bends, misfits
 from stickslip.cycle.joint_fit import (
     JointData,
     about_load,
     fitted,
     joint_data,
-    motor_lead,
     pooled,
     seating,
     turning,
     warmed,
 )
-from stickslip.cycle.joint_slides import sliding
+from stickslip.cycle.joint_slides import motor_lead, sliding
 from stickslip.errors import EstimateError, RecordError
 from stickslip.estimate import NORMAL_95, Constant, Estimate, Result
 from stickslip.parameters import finite
@@ -493,7 +492,7 @@ def regress_joint_logs(
     delay = delay_of(pooled(data))
     data, slow = [punctual(one, delay) for one in data], [punctual(one, delay) for one in slow]
     fit, terms, pull, left_out = fitted(pooled(data))
-    beside = misfits(pooled(data), fit, bends(pooled(slow), fit, terms, pull), turning(records[0]))
+    beside = misfits(pooled(data), fit, terms, bends(pooled(slow), fit, terms, pull), delay, turning(records[0]))
     tell = Telling(pooled(data), fit, terms, turning(records[0]), "ok", beside)
     known = {term: tell.one(term) for term in terms if term != "uneven"}
     predictions = [
@@ -512,7 +511,7 @@ def regress_joint_logs(
         thinning=known.get("thinning"),
         predictions=tuple(predictions),
         left_out=left_out,
-        delay=delay,
+        delay=delay.within(0.0) if delay is not None and data[0].source == "reference" else delay,
     )
 
 

@@ -561,6 +561,15 @@ def _half_power(response: Callable[[Any], Array], top: float) -> float:
     return float(brentq(lambda f: float(response(f)) - math.sqrt(0.5), 0, top))
 
 
+def convolved(values: Array, kernel: Array) -> Array:
+    """Both convolved in full, as scipy.signal.fftconvolve has it, whose import takes a second."""
+    from scipy.fft import irfft, next_fast_len, rfft
+
+    count = len(values) + len(kernel) - 1
+    size = next_fast_len(count, real=True)
+    return np.asarray(irfft(rfft(values, size) * rfft(kernel, size), size)[:count])
+
+
 def five_point_difference(values: Array, order: int) -> Array:
     """Five-point difference along the first axis; two samples beyond each end are put on the parabola there."""
     if order == 0:

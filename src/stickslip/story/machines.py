@@ -186,7 +186,8 @@ def _of_one_joint(findings: Findings) -> Iterator[str]:
     if joint.delay is not None and is_late(joint.delay):
         delay, way = joint.delay, "later" if joint.delay.value > 0 else "earlier"
         moved = number(abs(delay.value), delay.sd, "s")
-        yield f"It comes {moved} {way} than the position (95 %: {interval_of(delay)}), which is taken out."
+        known = "error that it is made of" if joint.source == "reference" else "position"
+        yield f"It comes {moved} {way} than the {known} (95 %: {interval_of(delay)}), which is taken out."
     if findings.breakaway is not None:
         ratio = findings.breakaway.ratio
         yield f"It breaks away at {value_of(ratio)} times its sliding friction (95 %: {interval_of(ratio)})."

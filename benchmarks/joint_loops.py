@@ -1,0 +1,156 @@
+"""How often do a joint's intervals hold where its controller is a computer: held, late, and with an encoder of its own?
+
+Joints of a third integrator: Runge and Kutta's fourth order at 20 kHz, at rest as long as friction bears the torque.
+A PD controller at 1 kHz reads counts of 10 to 16 bit, computes for none to three of its periods, and holds its output;
+logged are counts and reference at its own instants, at 100 Hz to 1 kHz. Its kp is stated, and its kd or not; "speed":
+it damps the measured speed in place of the error's. Counted are the numbers that stand without a grave doubt.
+
+    python benchmarks/joint_loops.py --draws 40 --first 70000
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+
+import numba
+import numpy as np
+
+import stickslip as ss
+
+FINE, CONTROL = 20_000, 1_000  # steps and periods of the controller in a second
+SECONDS = 30
+KINDS = ("kd unknown", "kd stated", "speed")
+TOLD = ("level", "forward", "back", "load", "viscous", "inertia", "sine", "cosine", "damping", "delay")
+
+
+@numba.njit(cache=True)
+def accelerated(p, q, v, side, torque):  # type: ignore[no-untyped-def]
+    """Acceleration while it slides to a side."""
+    inertia, forward, back, share, viscous, sine, cosine = p
+    weight = sine * np.sin(q) + cosine * np.cos(q)
+    level = (forward if side > 0 else back) + share * abs(weight)
+    return (torque - weight - viscous * v - side * level) / inertia
+
+
+@numba.njit(cache=True)
+def march(p, gains, loop, reference, slope, steps):  # type: ignore[no-untyped-def]
+    """Angles at every `steps` instants; `loop` is periods of delay, whether kd is of the speed, and a count."""
+    kp, kd = gains
+    late, of_speed, count = int(loop[0]), loop[1] > 0, loop[2]
+    dt, held = 1.0 / FINE, FINE // CONTROL
+    angle = np.zeros((len(reference) - 1) // steps)
+    waiting = np.zeros(late + 1)
+    q, v, torque, rests = reference[0], 0.0, 0.0, True
+    for i in range(len(angle) * steps):
+        if i % held == 0:
+            waiting[:-1] = waiting[1:]
+            read = np.round(q / count) * count
+            waiting[-1] = kp * (reference[i] - read) + kd * ((0.0 if of_speed else slope[i]) - v)
+            torque = waiting[0]
+        if i % steps == 0:
+            angle[i // steps] = q
+        if rests:
+            free = accelerated(p[:], q, 0.0, 0.0, torque)
+            side = 1.0 if free > 0 else -1.0
+            if accelerated(p[:], q, 0.0, side, torque) * side <= 0:
+                continue
+        else:
+            side = 1.0 if v > 0 else -1.0
+        a1 = accelerated(p, q, v, side, torque)
+        v2 = v + dt / 2 * a1
+        a2 = accelerated(p, q + dt / 2 * v, v2, side, torque)
+        v3 = v + dt / 2 * a2
+        a3 = accelerated(p, q + dt / 2 * v2, v3, side, torque)
+        v4 = v + dt * a3
+        a4 = accelerated(p, q + dt * v3, v4, side, torque)
+        q, v = q + dt / 6 * (v + 2 * v2 + 2 * v3 + v4), v + dt / 6 * (a1 + 2 * a2 + 2 * a3 + a4)
+        rests = v * side <= 0
+        if rests:
+            v = 0.0
+    return angle
+
+
+def reference(time: np.ndarray, chance: np.random.Generator) -> np.ndarray:
+    """Two sines, five, a chirp, or strokes between rests."""
+    about, size, kind = chance.uniform(-0.8, 0.8), chance.uniform(0.5, 1.3), chance.integers(4)
+    if kind == 0:
+        slow, fast = chance.uniform(0.1, 0.3), chance.uniform(0.5, 1.6)
+        turned = np.sin(2 * np.pi * slow * time) + chance.uniform(0.15, 0.5) * np.sin(2 * np.pi * fast * time + 1)
+    elif kind == 1:
+        tones = np.exp(chance.uniform(np.log(0.1), np.log(2.5), 5))
+        parts = zip(chance.uniform(0.4, 1, 5) / tones**0.7, tones, chance.uniform(0, 6.28, 5), strict=True)
+        turned = sum(a * np.sin(2 * np.pi * f * time + p) for a, f, p in parts)
+    elif kind == 2:
+        last = chance.uniform(1, 3)
+        turned = np.sin(2 * np.pi * (0.1 * time + (last - 0.1) * time**2 / 2 / time[-1])) / (1 + time / time[-1])
+    else:
+        turned, now, place = np.zeros_like(time), 0.0, 0.0
+        while now < time[-1]:
+            lasts, rests, begins, place = *chance.uniform((0.5, 0.2), (2.5, 1.0)), place, chance.uniform(-1, 1)
+            here = (time >= now) & (time <= now + lasts + rests)
+            share = np.clip((time[here] - now) / lasts, 0, 1)
+            turned[here] = begins + (place - begins) * (1 - np.cos(np.pi * share)) / 2
+            now += lasts + rests
+    return np.asarray(about + size * turned / np.abs(turned).max())
+
+
+def drawn(seed: int, kind: str) -> tuple[ss.Record, dict[str, float]]:
+    """A log by chance, and the truth."""
+    chance = np.random.default_rng([seed, KINDS.index(kind)])
+    inertia = np.exp(chance.uniform(np.log(0.002), np.log(0.5)))
+    swing, ratio = 2 * np.pi * chance.uniform(2.5, 8), chance.uniform(0.2, 0.9)
+    kp, kd = inertia * swing**2, 2 * ratio * inertia * swing
+    level = kp * np.exp(chance.uniform(np.log(0.003), np.log(0.03)))
+    forward, back = level * chance.uniform(0.85, 1.15, 2)
+    viscous, weight, tilt = level * chance.uniform(0.05, 0.6), level * chance.uniform(1, 8), chance.uniform(-3.1, 3.1)
+    share, late = chance.uniform(0.05, 0.25), int(chance.integers(0, 4))
+    fs, count = int(chance.choice([100, 125, 200, 250, 500, 1000])), 2 * np.pi / 2 ** int(chance.integers(10, 17))
+    fine = np.arange(SECONDS * FINE + 1) / FINE
+    told = reference(fine, chance)
+    p = np.array([inertia, forward, back, share, viscous, weight * np.cos(tilt), weight * np.sin(tilt)])
+    loop = np.array([late, kind == "speed", count], dtype=float)
+    angle = march(p, (kp, kd), loop, told, np.gradient(told, fine), FINE // fs)
+    delay = (late + 0.5) / CONTROL  # of what is held, half of its time
+    names = ("inertia", "forward", "back", "load", "viscous", "sine", "cosine")
+    truth = {**dict(zip(names, p.tolist(), strict=True)), "kp": kp, "kd": kd, "delay": delay}
+    truth["damping"] = -kp * delay + (kd if kind != "speed" else 0.0)
+    logged = {"theta": np.round(angle / count) * count, "reference": told[: -1 : FINE // fs]}
+    return ss.Record.of(logged, fs=fs, units={"reference": "rad"}), truth
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--draws", type=int, default=40, help="joints of each kind")
+    parser.add_argument("--first", type=int, default=70000, help="seed of the first")
+    parser.add_argument("--kinds", default=",".join(KINDS), help="which, with commas")
+    options = parser.parse_args()
+    for kind in options.kinds.split(","):
+        held: dict[str, list[tuple[bool, float]]] = {name: [] for name in TOLD}
+        refused, begun = 0, time.process_time()
+        for seed in range(options.first, options.first + options.draws):
+            record, truth = drawn(seed, kind)
+            try:
+                kd = {"kd": truth["kd"]} if kind == "kd stated" else {}
+                joint = ss.cycle.regress_joint(record, kp=truth["kp"], **kd)
+            except ss.StickslipError:
+                refused += 1
+                continue
+            place = record["theta"][np.rint(joint.time * record.fs).astype(int)]
+            carried = np.abs(truth["sine"] * np.sin(place) + truth["cosine"] * np.cos(place))
+            truth["level"] = (truth["forward"] + truth["back"]) / 2 + truth["load"] * float(carried.mean())
+            for name in TOLD:
+                estimate = getattr(joint, name)
+                if estimate is not None and estimate.known and ss.estimate.stands(estimate.status):
+                    half = (estimate.interval[1] - estimate.interval[0]) / 2
+                    held[name].append((estimate.includes(truth[name]), half / abs(truth[name])))
+        spent = (time.process_time() - begun) / options.draws
+        print(f"{kind}: {options.draws - refused} of {options.draws} answered, {spent:.1f} s each, rig included")
+        for name, told in held.items():
+            if told:
+                holds, half = np.array(told).T
+                print(f"  {name:8} held {int(holds.sum())} of {len(told)}, half width {np.median(half):.2%}")
+
+
+if __name__ == "__main__":
+    main()

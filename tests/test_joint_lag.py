@@ -1,0 +1,68 @@
+"""A controller's output comes late, as it is held and computed: by what its damping lags a joint seems lighter."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.signal import cont2discrete, lfilter
+
+import stickslip as ss
+from stickslip.estimate import stands
+
+INERTIA, KP, KD, LEVEL, VISCOUS = 0.02, 18.0, 0.6, 0.06, 0.03
+FS, FINER = 500, 20
+
+
+def moved(late: float, *, of_speed: bool = False) -> ss.Record:
+    """A joint that moves by sines, and the reference from which a controller that is late makes just its torque.
+
+    Its error e solves ``kp e + kd e' = torque(t + d)`` (of a controller that damps the speed, without its kd), by the
+    exact response of that equation to a torque which is a straight line from instant to instant.
+    """
+    time = np.arange(30 * FS * FINER) / (FS * FINER)
+    sines = [(0.8, 0.21, 0.3), (0.3, 0.83, 1.1), (0.1, 2.3, 0.2)]
+
+    def motion(at: np.ndarray, order: int) -> np.ndarray:
+        turn = np.pi / 2 * order
+        return sum(a * (2 * np.pi * f) ** order * np.sin(2 * np.pi * f * at + p + turn) for a, f, p in sines)
+
+    later = time + late
+    speed = motion(later, 1)
+    torque = INERTIA * motion(later, 2) + VISCOUS * speed + LEVEL * np.sign(speed)
+    if of_speed:
+        error = (torque + KD * motion(time, 1)) / KP
+    else:
+        system = cont2discrete(([1.0], [KD, KP]), 1 / (FS * FINER), method="foh")
+        error = lfilter(system[0].ravel(), system[1], torque)
+    rows = slice(2 * FS * FINER, None, FINER)  # without what was before the first instant
+    counted = np.round(motion(time, 0) / 1e-4) * 1e-4
+    return ss.Record.of({"theta": counted[rows], "reference": (motion(time, 0) + error)[rows]}, fs=FS)
+
+
+@pytest.mark.parametrize("late", [0.5e-3, 3e-3])
+@pytest.mark.parametrize("stated", [True, False], ids=["kd stated", "kd unknown"])
+def test_a_late_controller_makes_no_joint_lighter(late: float, stated: bool) -> None:
+    given = {"kd": KD} if stated else {}
+    joint = ss.cycle.regress_joint(moved(late), kp=KP, gravity=False, **given)
+    assert joint.inertia.includes(INERTIA)
+    assert joint.inertia.value == pytest.approx(INERTIA, rel=2e-3)
+    assert joint.viscous.includes(VISCOUS)
+    assert joint.level.includes(LEVEL)
+    assert joint.delay is not None
+    assert joint.delay.includes(late)
+    assert joint.delay.sd < 0.5e-3
+    if not stated:
+        assert joint.damping is not None
+        assert joint.damping.includes(KD - KP * late)
+
+
+def test_damping_of_the_speed_is_doubted_to_be_viscous_friction() -> None:
+    joint = ss.cycle.regress_joint(moved(0.5e-3, of_speed=True), kp=KP, gravity=False)
+    assert joint.viscous.value == pytest.approx(VISCOUS + KD, rel=0.02)
+    assert joint.delay is None
+    assert not stands(joint.viscous.status)
+    assert not stands(joint.inertia.status)
+    assert stands(joint.level.status)
+    joint = ss.cycle.regress_joint(moved(0.5e-3), kp=KP, gravity=False)
+    assert stands(joint.viscous.status)
+    assert stands(joint.inertia.status)
