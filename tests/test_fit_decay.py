@@ -542,3 +542,19 @@ def test_the_mean_of_several_candidates_lies_within_its_interval():
     found = _mean(rows, np.array([0.9, 0.1]), np.eye(6), ends, [(3,), (4,)], [(), ()])
     assert np.all(found.values == pytest.approx(1.1))
     assert np.all((found.ends[:, 0] <= found.values) & (found.values <= found.ends[:, 1]))
+
+
+@pytest.mark.parametrize("counts", [0.0, 0.02])
+@pytest.mark.parametrize("held", [1, 2, 4])
+def test_an_acceleration_that_is_released_at_a_sample_is_damped_as_it_is(held: int, counts: float) -> None:
+    """The jump of the release stood in one sample, passed for drift, and took 30 deviations off the damping ratio."""
+    slider = ss.Oscillator(mass=1.0, stiffness=2000.0, damping=0.5, law=ss.laws.Coulomb(0.3))
+    run = ss.simulate(slider, duration=4.0, start={"x": 5e-3})
+    motion = ss.Rig.perfect("a").measure(run, fs=2000, rng=0)["a"][1:]
+    samples = np.concatenate([np.zeros(held), motion])
+    samples = samples + np.random.default_rng(held).normal(0, 0.02, len(samples))
+    samples = np.round(samples / counts) * counts if counts else samples
+    decay = ss.fit_decay(ss.Record.of({"a": samples}, fs=2000))
+    for estimate, truth in ((decay.damping_ratio, 0.25 / 2000**0.5), (decay.dry_displacement, 1.5e-4)):
+        assert abs(estimate.value - truth) < 3 * estimate.sd
+        assert estimate.sd < 0.2 * truth

@@ -112,7 +112,9 @@ def find_noise(blocks: Blocks, fits: Array, samples: Array, step: float, kind: s
 
 def _left(samples: Array, blocks: Blocks, n: int, p: Array) -> float:
     """Standard deviation of the samples from a motion; the blocks' would take a count's steady error for more."""
-    values, _ = _single(samples, blocks).motion(p, n)
+    single = _single(samples, blocks)
+    values, jacobian = single.motion(p, n)
+    single.leave_out_release(p, values, jacobian)
     return float(np.sqrt(np.mean((samples - values) ** 2)))
 
 
@@ -155,6 +157,7 @@ def quantised(counts: Blocks, n: int, step: float) -> Objective:
         if not (abs(p[1]) < STEEPEST and p[0] > 0 and p[6] < 700):
             return math.inf, slope, curvature
         sample_motion(p[:6], n, counts, values, jacobian, work)
+        counts.leave_out_release(p, values, jacobian)
         level = math.hypot(math.exp(p[6]), least)
         total = add_counts(values, jacobian, samples, step, level, slope, curvature)
         share, off = (math.exp(p[6]) / level) ** 2, p[6] - math.log(least)
@@ -174,6 +177,7 @@ def _transformed(blocks: Blocks, n: int, p: Array) -> tuple[Array, Array]:
 
     whole = blocks.total // blocks.size
     values, jacobian = blocks.motion(p, n)
+    blocks.leave_out_release(p, values, jacobian)
     residual = dct((blocks.means - values)[:whole], norm="ortho")
     return np.asarray(residual), np.asarray(dct(jacobian[:, :whole], norm="ortho"))
 

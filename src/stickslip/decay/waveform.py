@@ -60,6 +60,15 @@ class Blocks(NamedTuple):
         sample_motion(p, n, self, values, jacobian, np.empty((3, 7, 6)))
         return values, jacobian
 
+    def leave_out_release(self, p: Array, values: Array, jacobian: Array) -> None:
+        """Take the block in which an acceleration jumps, as it is released, as it was measured: it tells nothing.
+
+        A release within microseconds of a sample, as simulated records have it, else leaves all of the jump there.
+        """
+        jump = block_of(p[RELEASE], self.dt, self.size) if self.order == 2 else -1
+        if 0 <= jump < len(values):
+            values[jump], jacobian[:, jump] = self.means[jump], 0.0
+
 
 @compiled(**FAST)
 def fall(p, state, advance):
