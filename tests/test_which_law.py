@@ -95,6 +95,19 @@ def test_a_family_is_found_through_wrong_gains(name: str) -> None:
     assert comparison.status == "ok"
 
 
+def test_without_dry_friction_no_sign_is_blamed() -> None:
+    """Of a mass with the damper that is stated alone, friction of -1.5 mN was laid to the signs of its channels."""
+    damped = slider().having(law=ss.laws.Coulomb(0.0), damping=8.0)
+    driven = damped.having(drive=ss.drives.HarmonicBase(1.1e-3, frequency=8.7))
+    rig = ss.Rig.perfect("x", "z").having("x", white=2e-6).having("z", white=2e-6)
+    measured = rig.measure(ss.simulate(driven, duration=3.0), fs=1000, rng=3, start=1.5)
+    with pytest.raises(ss.errors.EstimateError, match="no dry friction is seen"):
+        ss.compare_laws(measured, damped.having(law=ss.laws.Coulomb(1.0)))
+    turned = record("Coulomb").with_channel("z", -record("Coulomb")["z"], unit="m")
+    with pytest.raises(ss.errors.EstimateError, match="correct the signs"):
+        ss.compare_laws(turned, slider())
+
+
 def test_the_best_law_says_what_it_leaves() -> None:
     """It was called the friction's law, and its verdict was "best", whatever it left of the motion."""
     lagging = ss.Oscillator(

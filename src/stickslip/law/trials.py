@@ -37,6 +37,7 @@ TURNS = 24  # of the motion, after which a record tells laws apart no better
 SILENT = 0.2  # of a channel's size, left by the best law: nothing is known of such a sensor
 COARSE = 0.3  # of the calibration's error, by which a base's motion may be missed where laws are compared
 FIRST = ("damping", EXPONENT)  # what is far off would be made up for by the gains, were they free from the first
+SCATTERED = 0.3  # of its scatter while it slides, chosen: what of a friction may be none; of a wrong sign it is many
 SLOW = 0.05  # of the largest speed, below which the contact may hold
 EDGE = 24  # samples at either end that a smoother knows less of
 
@@ -411,19 +412,31 @@ class Seen(Observed):
         fast = np.abs(speed) > FAST * np.abs(speed).max()
         level = float(np.median((friction * np.sign(speed))[fast]))
         if not level > 0:
-            still = not any({"z", "force"} & set(record) for record in records) and oscillator.drive == Release()
-            raise EstimateError(
-                f"friction of {level:.3g} N while it slides" + (", the base taken to be at rest" if still else ""),
-                "friction opposes the velocity",
-                "give the base's motion as channel z, or the drive; where the motion is imposed, fit a curve of "
-                "friction (fit_curve, --curve)"
-                if still
-                else "correct the signs of the channels, or mass= and stiffness=",
-            )
+            raise _without_friction(records, oscillator, level, float(np.std(friction[fast])))
         way, around = float(np.std(np.concatenate(ways))), Rests.together(rests)
         excess, turns = _excess(speed, friction, level, around), float(np.std(speed)) / way
         slip, step = np.concatenate(slips), np.concatenate(steps)
         return cls(slip, speed, friction, step, level, excess, turns, oscillator.mass, around)
+
+
+def _without_friction(records: Sequence[Record], oscillator: Oscillator, level: float, scatter: float) -> EstimateError:
+    """Why no law is compared where nothing opposes the motion: there is no dry friction, or the balance is wrong."""
+    why = f"friction of {level:.3g} N while it slides"
+    if abs(level) < SCATTERED * scatter:
+        return EstimateError(
+            f"{why}, which scatters by {scatter:.3g} N",
+            "beside the damper that is stated no dry friction is seen",
+            "correct damping= if there should be some; 'stickslip analyze' says what would have been seen",
+        )
+    if not any({"z", "force"} & set(record) for record in records) and oscillator.drive == Release():
+        return EstimateError(
+            f"{why}, the base taken to be at rest",
+            "friction opposes the velocity",
+            "give the base's motion as channel z, or the drive; where the motion is imposed, fit a curve of friction "
+            "(fit_curve, --curve)",
+        )
+    remedy = "correct the signs of the channels, or mass=, stiffness= and damping="
+    return EstimateError(why, "friction opposes the velocity", remedy)
 
 
 def seen_by(records: Sequence[Record], systems: Sequence[Oscillator]) -> list[tuple[Oscillator, Seen]]:
@@ -433,7 +446,7 @@ def seen_by(records: Sequence[Record], systems: Sequence[Oscillator]) -> list[tu
         try:
             seen.append((system, Seen.of(records, system)))
         except EstimateError as error:
-            refused = error
+            refused = refused or error  # of the damper as it was stated
     if refused and not seen:
         raise refused
     return seen
