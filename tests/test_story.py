@@ -11,7 +11,7 @@ import pytest
 
 import stickslip as ss
 from stickslip.estimate import Doubt, Status
-from stickslip.story.story import TELLERS, Story
+from stickslip.story.story import ABOVE, TELLERS, Line, Story
 
 LEVEL = ss.Estimate.normal("sliding friction", 1.318, sd=0.004, unit="N", method="by hand")
 
@@ -57,3 +57,11 @@ def test_the_marks_of_the_leading_rows_are_counted_from_one() -> None:
     later = [replace(LEVEL, name=f"quantity {j}", status="ok" if j < 8 else "by eye") for j in range(9)]
     story = ss.summary([crude, *later])
     assert [story.marks(line) for line in story.lines] == ["1", *[""] * 8, "2"]
+
+
+def test_a_mark_is_explained_beside_the_answer() -> None:
+    """Every row of a decay bore a mark whose reason stood in a sentence that only --all printed."""
+    line = Line.of(LEVEL.doubted(Status("the residual is 27 times the noise")), None)
+    told = Story("slow", ["It slides.", "The residual is 27 times the noise.", "It was warm."], lines=[line])
+    assert told.marks(line) == ABOVE
+    assert told.explaining([line]) == ["The residual is 27 times the noise."]

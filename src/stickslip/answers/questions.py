@@ -22,7 +22,7 @@ from stickslip.consistent.checks import Slip
 from stickslip.consistent.contradictions import consistency
 from stickslip.contact.cause import lag_or_compliance
 from stickslip.contact.contact import contact_damping, contact_stiffness, coupled_frequency, transition_speed
-from stickslip.cycle.loops import friction_loops
+from stickslip.cycle.loops import Loops, friction_loops
 from stickslip.cycle.onset import breakaway, presliding
 from stickslip.cycle.regression import Regression, regress_friction
 from stickslip.cycle.sticks import find_sticks
@@ -352,7 +352,7 @@ def doubted(
     """The answers, flagged by the gravest doubt that concerns each; `unknown` is what is not stated of the rig."""
     results, gravest = dict(answers), dict[str, Doubt | str]()
     contradiction = slipped(slips) or untrue(results.get("consistency"))
-    for reason, keys in _reasons(contradiction, record, unknown, refusals):
+    for reason, keys in _reasons(contradiction, record, results.get("loops"), unknown, refusals):
         for key in keys:
             if gravest.setdefault(key, reason) == reason:
                 results[key] = flagged(results.get(key), reason)
@@ -360,13 +360,19 @@ def doubted(
 
 
 def _reasons(
-    contradiction: str, record: Record, unknown: Doubt | None, refusals: Sequence[StickslipError]
+    contradiction: str,
+    record: Record,
+    loops: Loops | None,
+    unknown: Doubt | None,
+    refusals: Sequence[StickslipError],
 ) -> Iterator[tuple[Doubt | str, Iterable[str]]]:
     """Each doubt with the questions that it concerns, the gravest first."""
     if contradiction:
         yield contradiction, (*BY_FORCE, "sticks")
     if base_unseen(record):
         yield NO_BASE, (*BY_FORCE, "sticks")
+    if loops is not None and not loops.level.known:  # on a belt that is not stated a mass that moves with it sticks
+        yield loops.level.status, (*BY_FORCE, "sticks")
     if unknown:
         yield unknown, BY_FORCE
     if unstated := [f"{name} is read as {known.unit}" for name, known in record.channels.items() if known.assumed]:

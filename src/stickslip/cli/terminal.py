@@ -299,7 +299,8 @@ def _print_short(story: Story) -> None:
     """At most MOST_LINES lines: the answer, the rows that lead, their cautions, and what else there is."""
     in_tables = sum(len(table.rows) for table in story.tables if not table.folded)
     rows, lines = story.lines[: MOST_ROWS - min(in_tables, OF_TABLES)], []
-    sentences = [] if story.lines or story.tables else story.others  # without rows the sentences are all
+    # without rows the sentences are all
+    sentences = story.explaining(rows) if story.lines or story.tables else story.others
     for text in (*story.opening, *sentences, *(f"{part.title}: {part.answer}" for part in story.parts[:MOST_PARTS])):
         lines += _lines(text)
     lines += [*_remedies(story), *_numbers(story, rows)]

@@ -394,6 +394,11 @@ class Story:
         """The sentences behind the answer."""
         return [sentence for sentence in self.headline if not isinstance(sentence, Caution)][1:]
 
+    def explaining(self, rows: Sequence[Line]) -> list[str]:
+        """Those of them that say why some of these rows are not sure."""
+        reasons = [flag.reason.casefold() for flag in flags((line.name, line.status) for line in rows)]
+        return [sentence for sentence in self.others if any(reason in sentence.casefold() for reason in reasons)]
+
     @functools.cached_property
     def notices(self) -> list[Caution]:
         """The cautions, each reason once: those of rows in the rows' order, which numbers them, then the others."""
