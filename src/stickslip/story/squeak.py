@@ -88,7 +88,8 @@ def _headline(findings: Findings) -> Iterator[str]:
         return
     creaks = [f"{burst.rate:.3g}" for burst in squeaks.of("creak")]
     if not heard and creaks:
-        yield f"It {_likely(squeaks)}creaks{where}: stick-slip pulses, {' and '.join(creaks)} in a second."
+        rates = f"stick-slip pulses, {' and '.join(creaks)} in a second{_by_sound_alone(findings)}"
+        yield f"It {_likely(squeaks)}creaks{where}: {rates}."
     elif squeaks.answer == "can not be told":
         yield f"Whether it squeaks{where} can not be told: {_untold(squeaks)}."
         yield from _power(squeaks)
@@ -99,7 +100,8 @@ def _headline(findings: Findings) -> Iterator[str]:
     else:
         many = f"{len(heard)} times in {record.duration:.3g} s" if len(heard) > 1 else "once"
         tone = squeaks.frequency.value
-        yield f"It {_likely(squeaks)}{squeaks.answer}{where} {many}, at {number(tone, tone / 500, 'Hz')}."
+        pitch = f"at {number(tone, tone / 500, 'Hz')}{_by_sound_alone(findings)}"
+        yield f"It {_likely(squeaks)}{squeaks.answer}{where} {many}, {pitch}."
     loudest = squeaks.loudest
     if loudest is not None:
         yield _of_one(loudest, squeaks)
@@ -172,6 +174,12 @@ def _likely(squeaks: Squeaks) -> str:
     """A word before the verb where nothing but the sound or the motion speaks for friction."""
     shown = any(burst.friction == "shown" for burst in squeaks.of("squeak", "squeal", "creak"))
     return "" if shown else "likely "
+
+
+def _by_sound_alone(findings: Findings) -> str:
+    """What else would sound alike, where no motion was recorded beside the sound."""
+    alone = _likely(findings.squeaks) and {"x", "v"}.isdisjoint(findings.record)
+    return ", if it is a contact that sounds: electronic tones and birds that glide sound alike" if alone else ""
 
 
 def _power(squeaks: Squeaks) -> Iterator[str]:
