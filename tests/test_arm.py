@@ -81,13 +81,14 @@ def bodies(q: Array, v: Array, a: Array) -> Array:
 FRICTION = {"shoulder": (0.9, 0.7, 0.4, 0.08), "elbow": (0.5, 0.55, 0.2, 0.03)}  # forward, back, viscous, rotor
 
 
-def log(seed: int = 1, *, noise: float = 0.05, counts: int = 2**16) -> ss.Record:
-    """What a robot writes: positions in counts, and torques that move bodies, rotors and friction."""
+def log(seed: int = 1, *, noise: float = 0.05, counts: int = 2**16, load: float = 0.0) -> ss.Record:
+    """What a robot writes: positions in counts, and torques that move bodies, rotors and friction, partly of a load."""
     _, q, v, a = moved()
     chance, count = np.random.default_rng(seed), 2 * np.pi / counts
     taken, written, units = bodies(q, v, a), dict[str, Array](), dict[str, str]()
     for j, (name, (forward, back, viscous, rotor)) in enumerate(FRICTION.items()):
         own = np.where(v[j] > 0, forward, -back) + viscous * v[j] + rotor * a[j]
+        own += load * np.abs(taken[j]) * np.sign(v[j])
         written[f"position_{name}_joint"] = np.round(q[j] / count) * count
         written[f"effort_{name}_joint"] = taken[j] + own + noise * chance.standard_normal(q.shape[1])
         units |= {f"position_{name}_joint": "rad", f"effort_{name}_joint": "N m"}
@@ -130,6 +131,24 @@ def test_the_friction_of_each_axis_is_what_is_left(urdf: Path, axis: str) -> Non
     sliding = np.abs(moved()[2][list(FRICTION).index(axis)]) > 0.3
     left = findings.record["friction"][sliding]
     assert abs(np.median(np.abs(left)) - np.median(np.abs(joint.friction))) < 0.1
+
+
+@pytest.mark.parametrize("axis", list(FRICTION))
+def test_friction_that_grows_with_the_torque_of_the_bodies_is_said(urdf: Path, axis: str) -> None:
+    """Either direction's, and the viscous part, took it in without a word; else nothing is said."""
+    doubted, sure = (
+        ss.answers.analyze_joint(ss.answers.without_bodies(log(load=load), urdf=urdf, axis=axis)).joint
+        for load in (0.1, 0.0)
+    )
+    assert "0.1 of it" in doubted.forward.status
+    for estimate in (doubted.forward, doubted.back, doubted.viscous):
+        assert not ss.estimate.stands(estimate.status)
+    for estimate in (sure.forward, sure.back, sure.viscous, sure.level, doubted.level):
+        assert ss.estimate.stands(estimate.status)
+    row = list(FRICTION).index(axis)
+    _, q, v, a = moved()
+    carried = np.abs(bodies(q, v, a)[row])[np.abs(v[row]) > 0.1].mean()
+    assert doubted.level.value == pytest.approx(sum(FRICTION[axis][:2]) / 2 + 0.1 * carried, rel=0.1)
 
 
 def test_without_its_bodies_an_arm_is_told_wrongly(urdf: Path) -> None:

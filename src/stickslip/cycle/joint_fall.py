@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from stickslip.arrays import Array
-from stickslip.cycle.joint_fit import JointData, coefficient
+from stickslip.cycle.joint_fit import JointData, about_load, coefficient
 from stickslip.cycle.joint_slides import Log, Sliding
 from stickslip.cycle.regression import TURNING, UNITS
 from stickslip.errors import EstimateError
@@ -35,7 +35,7 @@ SURELY = 3.5
 METHOD = "likelihood over Stribeck curves"
 FINER = 3  # rounds of likely curves closer together: three make 12 speeds of one step of the first
 # Kinds of doubt.
-CURVED, PLACE, SPEEDY = "bent", "placed", "speedy"
+CURVED, PLACE, SPEEDY, BORNE = "bent", "placed", "speedy", "borne"
 SPEED = ("viscous", "uneven", "inertia")  # terms in which a controller's damping of the speed stands, and its delay
 RUBS = ("forward", "back", "viscous")  # terms by which friction is a line over the speed
 PLACED = ("forward", "back", "load", "sine", "cosine")  # terms that friction or torque of the place passes for
@@ -326,6 +326,17 @@ def damps_error(data: JointData, fit: LeastSquares, terms: tuple[str, ...], dela
     return data.stated["kd"].value == 0 or HARDLY * data.stated["kd"].value > data.stated["kp"].value * late
 
 
+def _grows(data: JointData, terms: tuple[str, ...]) -> float:
+    """By how much of the bodies' torque friction surely grows; 0 where it does not, or the motion does not tell it."""
+    richer = tuple(term for term in terms if term not in FALL)
+    try:
+        fit, _ = about_load(data, (*richer, "borne"))
+    except EstimateError:
+        return 0.0
+    share = fit.combined(np.eye(len(richer) + 1)[-1], "", "", "")
+    return share.value if abs(share.value) > SURELY * share.sd else 0.0
+
+
 def misfits(
     data: JointData,
     fit: LeastSquares,
@@ -343,6 +354,9 @@ def misfits(
         line = "the controller seems to damp the speed and not its error, which looks like viscous friction"
         wrong = SPEED if "damping" in terms else (*SPEED, *PLACED)  # a stated kd is taken for that of the error
         seen.append(Misfit(wrong, Doubt(line, SPEEDY)))
+    if all(log.bodies is not None for log in data.logs) and (grows := _grows(data, terms)):
+        line = f"friction surely grows with the torque of the bodies, by {grows:.2g} of it: this is a mean over that"
+        seen.append(Misfit(RUBS, Doubt(line, BORNE, lesser=True)))
     what, size, elsewhere = data.ripple(fit.residual)
     if size > ROUNDING * float(np.sqrt(np.mean(data.torque**2))):
         unit = (TURNING if turning else UNITS)["coulomb"]

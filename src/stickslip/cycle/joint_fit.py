@@ -315,6 +315,7 @@ def _data_of(
     if scale is not None:
         unsure.append(scale.sd / scale.value * torque)
     if "bodies" in record:
+        log = replace(log, bodies=record["bodies"])
         taken = slides.at(record["bodies"])
         known, unsure = known + taken, [*unsure, record.channels["bodies"].gain_sd * taken]
     gain_sd = max((record.channels[name].gain_sd for name in ("force", "current") if name in record), default=0.0)

@@ -244,6 +244,8 @@ class Log:
         Of a controller whose torque is not measured: how far the position is from the reference.
     damped : float
         By what that controller damps its error [N m s/rad], where that is regressed.
+    bodies : ndarray or None
+        What a robot's bodies take of the torque, where a URDF tells it.
     ahead : ndarray or float
         By how much what the encoder tells of is ahead of the link, by the play of the teeth between.
     noise : ndarray, shape (3, 3)
@@ -259,6 +261,7 @@ class Log:
     torque: Array | None = None
     error: Array | None = None
     damped: float = 0.0
+    bodies: Array | None = None
     ahead: Array | float = 0.0
     noise: Array = field(default_factory=lambda: np.zeros((len(DERIVATIVES), len(DERIVATIVES))))
 
@@ -285,8 +288,8 @@ class Log:
         ----------
         terms : tuple of str
             Of inertia, viscous, uneven, forward, back, coulomb (both alike), sine,
-            cosine, load, damping, warming and thinning (Coulomb and viscous friction per kelvin), and late (by how much
-            the torque is).
+            cosine, load, damping, warming and thinning (Coulomb and viscous friction per kelvin), late (by how much
+            the torque is), and borne (friction per torque of the bodies).
         load : float
             The load part about which gravity's columns are linear.
         pull : (float, float)
@@ -315,6 +318,7 @@ class Log:
             "warming": lambda: at(side * warmer),
             "thinning": lambda: at(five_point_difference(turned, 1) * fs * warmer),
             "late": lambda: self._torque_rate(steered),
+            "borne": lambda: at(side * np.abs(np.zeros_like(position) if self.bodies is None else self.bodies)),
         }
         for term in terms:
             if term not in GRAVITY and (term, steered) not in self.kept:
