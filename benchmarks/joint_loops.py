@@ -1,9 +1,10 @@
 """How often do a joint's intervals hold where its controller is a computer: held, late, and with an encoder of its own?
 
 Joints of a third integrator: Runge and Kutta's fourth order at 20 kHz, at rest as long as friction bears the torque.
-A PD controller at 1 kHz reads counts of 10 to 16 bit, computes for none to three of its periods, and holds its output;
-logged are counts and reference at its own instants, at 100 Hz to 1 kHz. Its kp is stated, and its kd or not; "speed":
-it damps the measured speed in place of the error's. Counted are the numbers that stand without a grave doubt.
+A PD controller at 1 kHz reads counts of 10 to 16 bit, computes for none to three of its periods, and holds its
+output; logged are counts and reference at its own instants, at 100 Hz to 1 kHz. Its kp is stated, and its kd or not;
+"speed": it damps the measured speed in place of the error's; "torque": what it sets is logged, with noise. Counted
+are the numbers that stand without a grave doubt.
 
     python benchmarks/joint_loops.py --draws 40 --first 70000
 """
@@ -20,7 +21,7 @@ import stickslip as ss
 
 FINE, CONTROL = 20_000, 1_000  # steps and periods of the controller in a second
 SECONDS = 30
-KINDS = ("kd unknown", "kd stated", "speed")
+KINDS = ("kd unknown", "kd stated", "speed", "torque")
 TOLD = ("level", "forward", "back", "load", "viscous", "inertia", "sine", "cosine", "damping", "delay")
 
 
@@ -40,6 +41,7 @@ def march(p, gains, loop, reference, slope, steps):  # type: ignore[no-untyped-d
     late, of_speed, count = int(loop[0]), loop[1] > 0, loop[2]
     dt, held = 1.0 / FINE, FINE // CONTROL
     angle = np.zeros((len(reference) - 1) // steps)
+    taken = np.zeros(len(angle))
     waiting = np.zeros(late + 1)
     q, v, torque, rests = reference[0], 0.0, 0.0, True
     for i in range(len(angle) * steps):
@@ -49,7 +51,7 @@ def march(p, gains, loop, reference, slope, steps):  # type: ignore[no-untyped-d
             waiting[-1] = kp * (reference[i] - read) + kd * ((0.0 if of_speed else slope[i]) - v)
             torque = waiting[0]
         if i % steps == 0:
-            angle[i // steps] = q
+            angle[i // steps], taken[i // steps] = q, torque
         if rests:
             free = accelerated(p[:], q, 0.0, 0.0, torque)
             side = 1.0 if free > 0 else -1.0
@@ -68,7 +70,7 @@ def march(p, gains, loop, reference, slope, steps):  # type: ignore[no-untyped-d
         rests = v * side <= 0
         if rests:
             v = 0.0
-    return angle
+    return angle, taken
 
 
 def reference(time: np.ndarray, chance: np.random.Generator) -> np.ndarray:
@@ -110,12 +112,16 @@ def drawn(seed: int, kind: str) -> tuple[ss.Record, dict[str, float]]:
     told = reference(fine, chance)
     p = np.array([inertia, forward, back, share, viscous, weight * np.cos(tilt), weight * np.sin(tilt)])
     loop = np.array([late, kind == "speed", count], dtype=float)
-    angle = march(p, (kp, kd), loop, told, np.gradient(told, fine), FINE // fs)
+    angle, taken = march(p, (kp, kd), loop, told, np.gradient(told, fine), FINE // fs)
     delay = (late + 0.5) / CONTROL  # of what is held, half of its time
     names = ("inertia", "forward", "back", "load", "viscous", "sine", "cosine")
     truth = {**dict(zip(names, p.tolist(), strict=True)), "kp": kp, "kd": kd, "delay": delay}
     truth["damping"] = -kp * delay + (kd if kind != "speed" else 0.0)
     logged = {"theta": np.round(angle / count) * count, "reference": told[: -1 : FINE // fs]}
+    if kind == "torque":
+        logged["force"] = taken + 0.01 * np.abs(taken).max() * chance.standard_normal(len(taken))
+        truth["delay"] = -0.5 / CONTROL  # what is set at an instant acts half of a period later, on average
+        return ss.Record.of(logged, fs=fs, units={"reference": "rad", "force": "N m"}), truth
     return ss.Record.of(logged, fs=fs, units={"reference": "rad"}), truth
 
 
@@ -132,7 +138,8 @@ def main() -> None:
             record, truth = drawn(seed, kind)
             try:
                 kd = {"kd": truth["kd"]} if kind == "kd stated" else {}
-                joint = ss.cycle.regress_joint(record, kp=truth["kp"], **kd)
+                given = {} if kind == "torque" else {"kp": truth["kp"], **kd}
+                joint = ss.cycle.regress_joint(record, **given)
             except ss.StickslipError:
                 refused += 1
                 continue
