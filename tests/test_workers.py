@@ -22,6 +22,14 @@ if __name__ == "__main__":
     time.sleep(600)
 """
 
+UNGUARDED = """
+import time
+from stickslip.workers import workers
+with workers(2, "stickslip", among=True) as mapped:
+    for _ in range(1000):
+        list(mapped(time.sleep, [0.1] * 5))
+"""
+
 
 def _slowly(number: int) -> tuple[int, int]:
     time.sleep(0.05)
@@ -29,12 +37,23 @@ def _slowly(number: int) -> tuple[int, int]:
 
 
 def test_the_one_that_asks_takes_its_part_and_results_stay_in_order() -> None:
+    by, end = set[int](), time.monotonic() + 120
     with workers(2, "stickslip", among=True) as mapped:
-        for _ in range(2):  # while the other process begins, and with it
-            numbers, by = zip(*mapped(_slowly, range(60)), strict=True)
-            assert numbers == tuple(range(60))
-            assert os.getpid() in by
-    assert len(set(by)) == 2
+        while len(by) < 2 and time.monotonic() < end:  # alone while the other process begins, and then with it
+            numbers, asked = zip(*mapped(_slowly, range(20)), strict=True)
+            assert numbers == tuple(range(20))
+            assert os.getpid() in asked
+            by |= set(asked)
+    assert len(by) == 2
+
+
+def test_a_script_that_every_process_runs_anew_is_told_so(tmp_path: Path) -> None:
+    """It ended in a traceback of concurrent.futures, and then never."""
+    path = tmp_path / "asks.py"
+    path.write_text(UNGUARDED, encoding="utf-8")
+    ended = subprocess.run([sys.executable, path], capture_output=True, text=True, timeout=300, check=False)
+    assert ended.returncode == 1
+    assert ended.stderr.splitlines()[-1].startswith("stickslip.errors.StickslipError: another process ended before")
 
 
 @pytest.mark.skipif(os.name != "posix", reason="nothing is killed by a signal here")

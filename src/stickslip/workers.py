@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from functools import partial
@@ -11,9 +12,12 @@ from importlib import import_module
 from threading import Thread
 from typing import TYPE_CHECKING, Any
 
-if TYPE_CHECKING:
-    from concurrent.futures import ProcessPoolExecutor
+from stickslip.errors import StickslipError
 
+if TYPE_CHECKING:
+    from concurrent.futures import Future, ProcessPoolExecutor
+
+FEW = 2  # tasks left, above which each process has its next one waiting while this one works
 Map = Callable[..., Iterator[Any]]
 
 
@@ -38,22 +42,50 @@ def workers(count: int, module: str, *, among: bool = False) -> Iterator[Map]:
     if count < 2:
         yield map
         return
+    from concurrent.futures import BrokenExecutor
+
     processes = pool(count - among, module)
     try:
-        yield partial(_shared, processes) if among else processes.map
+        yield partial(_shared, processes, count - 1, processes.submit(_load, module)) if among else processes.map
+    except BrokenExecutor as error:
+        raise StickslipError(
+            "another process ended before its work was done",
+            "each of them imports the script that asks for them, and needs its own memory",
+            'ask under if __name__ == "__main__":, or for fewer processes',
+        ) from error
     finally:
         processes.shutdown(wait=False, cancel_futures=True)
 
 
-def _shared(processes: ProcessPoolExecutor, function: Callable[[Any], Any], over: Iterable[Any]) -> Iterator[Any]:
-    """`map` over these processes and this one, which takes the last that none has begun while the next is not done."""
-    asked = list(over)
-    futures, own, end = [processes.submit(function, one) for one in asked], dict[int, Any](), len(asked)
-    for number, future in enumerate(futures):
-        while number < end and not future.done() and futures[end - 1].cancel():
-            end -= 1
-            own[end] = function(asked[end])
-        yield own.pop(number) if number >= end else future.result()
+def _shared(
+    processes: ProcessPoolExecutor,
+    count: int,
+    ready: Future[None],
+    function: Callable[[Any], Any],
+    over: Iterable[Any],
+) -> Iterator[Any]:
+    """`map` over so many processes, once they are ready, and this one, which takes the last of what they have not.
+
+    Nothing is taken back from them: of a pool that breaks the end would be waited for for ever.
+    """
+    from concurrent.futures import FIRST_COMPLETED, wait
+
+    waiting, number, done = deque(enumerate(over)), 0, dict[int, Any]()
+    running: dict[int, Future[Any]] = {}
+    while waiting or running or done:
+        while waiting and ready.done() and len(running) < count + (len(waiting) > FEW):
+            place, one = waiting.popleft()
+            running[place] = processes.submit(function, one)
+        for place in [place for place, future in running.items() if future.done()]:
+            done[place] = running.pop(place).result()
+        while number in done:
+            yield done.pop(number)
+            number += 1
+        if waiting:
+            place, one = waiting.pop()
+            done[place] = function(one)
+        elif running:
+            wait(running.values(), return_when=FIRST_COMPLETED)
 
 
 def pool(count: int, module: str) -> ProcessPoolExecutor:
