@@ -24,7 +24,7 @@ from stickslip.law.search import Knob, Problem
 from stickslip.law.start import Shown, nuisance_knobs
 from stickslip.law.stretch import channels_of
 from stickslip.law.trials import Seen, Trial, like
-from stickslip.law.verdict import Remainder
+from stickslip.law.verdict import Remainder, doubt_of
 from stickslip.laws.guessing import _by_units, _natural, asked_for, hypotheses
 from stickslip.record.record import Step
 
@@ -106,6 +106,18 @@ def test_without_dry_friction_no_sign_is_blamed() -> None:
     turned = record("Coulomb").with_channel("z", -record("Coulomb")["z"], unit="m")
     with pytest.raises(ss.errors.EstimateError, match="correct the signs"):
         ss.compare_laws(turned, slider())
+
+
+def test_a_gain_is_wrong_where_all_of_its_interval_is() -> None:
+    """A gain of 1.07 that may as well be 1.01 was taken for a wrong unit, and no state variable named on rough rigs."""
+    fit = ss.fit_law(record("Coulomb"), slider(), free=["kinetic"], intervals=False)
+
+    def doubt(sd: float) -> str:
+        gain = ss.Estimate.normal("gain of x", 1.07, sd=sd, unit="1", method="by hand")
+        return doubt_of(replace(fit, parameters={**fit.parameters, "x.gain": gain}), slider(), 0.01)
+
+    assert not doubt(0.032)
+    assert doubt(0.001).startswith("the gain of x comes out as 1.07")
 
 
 def test_the_best_law_says_what_it_leaves() -> None:
