@@ -24,7 +24,7 @@ from stickslip.solve.assembly import table_of
 from stickslip.solve.curved import degree, run_curved
 from stickslip.solve.delayed import delayed_tape, run_delayed
 from stickslip.solve.glide import Clock, Model, Pieces, blank_past, blank_pieces, until
-from stickslip.solve.phasors import fast_tables, without
+from stickslip.solve.phasors import fast_tables
 from stickslip.solve.planar import planar_tape, run_planar
 from stickslip.solve.refusal import LISTED, Budget, chatter, heed, held_back, named, require_numbers, unproved
 from stickslip.solve.roots import NOISE
@@ -39,7 +39,6 @@ CHUNK = 16384  # pieces between two looks at the clock and the keyboard
 FEW, SHORT = 16, 2048  # pieces and cells of a chunk that Python runs: tenths of a second, and some
 CELLS = 65536  # Taylor cells between two looks, of a state of up to `SMALL` entries; of larger ones less by the square
 SMALL = 8
-LONG = 32  # periods from which the fast path, 20 to 60 us a period sooner, earns the 2 ms that its tables take
 MOST_CELLS = 1e10  # of a run: some hours
 SURE, MOST_PIECES = 1_000_000, 2e8  # after which it is foretold how many a run will keep; of the latter some 10 GB
 PACE = 0.1  # s between two calls of progress
@@ -282,8 +281,7 @@ class _March:
     ) -> None:
         size = len(table.names)
         self.table, self.total, self.events, self.tell, self.holding = table, total, events, tell, ExitStack()
-        fast = fast_tables(table) if total > LONG * table.motion.period else without(1).of(0)
-        self.model = Model(table.linear, fast, table.motion.period)
+        self.model = Model(table.linear, fast_tables(table), table.motion.period)
         self.past, self.work = blank_past(), kernel.scratch(size)
         self.clock, self.state, self.mode, self.stop = Clock(0.0, 0.0, 0.0), state.copy(), mode, 0
         tonal = len(table.tones) == 1 and size == table.physical + 3
