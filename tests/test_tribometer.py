@@ -74,6 +74,12 @@ def test_a_contact_that_never_slides_has_no_kinetic_coefficient(noise: float) ->
     )
 
 
+def test_strokes_of_three_samples_are_told_though_none_lies_at_their_end() -> None:
+    phase = 2 * np.pi * np.arange(240) / 6 + np.pi / 4
+    record = ss.Record.of({"x": 1e-3 * np.sin(phase), "friction": 3 * np.sign(np.cos(phase))}, fs=6.0)
+    assert friction_coefficients(record, normal=LOAD).plateau.value == pytest.approx(0.3, rel=1e-12)
+
+
 def test_a_zero_that_is_off_stays_in_the_mean_of_a_cycle_alone() -> None:
     record = strokes()
     off = ss.Record.of({"x": record["x"], "friction": record["friction"] + 5.0}, fs=FS)

@@ -331,8 +331,10 @@ def _turned(friction: Array, motion: Motion, label: Rows, forward: Array, back: 
     bears = np.where(ahead, 1.0, -1.0) * (friction - np.nan_to_num((forward - back) / 2)[label])
     stroke = high - low
     last, weight = whole & (gone > LAST * stroke[label]), np.abs(motion.velocity)
-    work, level = (float(np.average(bears[part], weights=weight[part])) for part in (whole, last))
-    share = max(0.0, work / level) if level > 0 else 0.0
+    share = 1.0  # where no sample lies at the end of a stroke it can not be told
+    if weight[last].any():
+        work, level = (float(np.average(bears[part], weights=weight[part])) for part in (whole, last))
+        share = max(0.0, work / level) if level > 0 else 0.0
     if share < MOSTLY:
         return share, np.asarray(gone > AMPLE * (1 - share) * stroke[label])
     half = whole & (bears >= ((forward + back) / 4)[label])
