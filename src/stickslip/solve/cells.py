@@ -75,7 +75,11 @@ def derivatives(quantity: Rows, flow: Rows) -> Rows:
 
 @compiled(**OPTIONS, nogil=True)
 def derive(flows, first, series, places, work):
-    """As :func:`derivatives`, of every exit of many systems in doubles; `series` holds the quantities."""
+    """As :func:`derivatives`, of every exit of many systems in doubles.
+
+    `flows` is (B, M, N, N) [1/s], `first` (M + 1,); `series` (B, E, DEGREE + 1, N) holds the quantities in its first
+    row; `places` (2, N^2) and `work` (N^2,) are scratch.
+    """
     count, modes, n, _ = flows.shape
     for b in range(count):
         for m in range(modes):
@@ -87,6 +91,7 @@ def derive(flows, first, series, places, work):
                         filled += 1
                 places[1, j] = filled
             for e in range(first[m], first[m + 1]):
+                # row k + 1 is row k times A, over the entries that are there: most of a flow is zero
                 for k in range(series.shape[2] - 1):
                     f = 0
                     for j in range(n):
@@ -96,6 +101,7 @@ def derive(flows, first, series, places, work):
                             total += term
                             size += abs(term)
                             f += 1
+                        # the rounding of equals that cancel is no derivative: a root at the start would not be seen
                         series[b, e, k + 1, j] = total if abs(total) > CANCELLED * size else 0.0
 
 
@@ -225,11 +231,13 @@ def _exponentials(flow: Array, time: Array) -> tuple[Any, Any]:
 
 @compiled(**OPTIONS)
 def distinct(rows, where, which):
-    """Where each different row stands first, and which of them each row is; how many there are. Rows that are far apart
-    may count as different though they are equal."""
+    """Where each different row (R, W) stands first, and which of them each is, both (R,); how many there are. Rows that
+    are far apart may count as different though they are equal."""
     count, width = 0, rows.shape[1]
     for r in range(rows.shape[0]):
         which[r] = -1
+        # the latest NEAR alone, newest first: neighbours of a sweep are alike,
+        # and all pairs would cost the square of their number
         for u in range(count - 1, max(-1, count - 1 - NEAR), -1):
             j = 0
             while j < width and rows[where[u], j] == rows[r, j]:

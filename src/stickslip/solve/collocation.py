@@ -114,9 +114,10 @@ def room(nodes: int, size: int, physical: int) -> Stages:
 
 @compiled(**EXACT)
 def solve(a, b):
-    """Gauss's elimination with row pivots, in place; whether it could."""
+    """Gauss's elimination with row pivots, in place: a is (n, n), b (n,) becomes the solution; whether it could."""
     count = len(b)
     for k in range(count):
+        # Pivot: the column's largest; where that is zero or no number there is no solution.
         best = k
         for i in range(k + 1, count):
             if abs(a[i, k]) > abs(a[best, k]):
@@ -127,12 +128,14 @@ def solve(a, b):
             for j in range(k, count):
                 a[k, j], a[best, j] = a[best, j], a[k, j]
             b[k], b[best] = b[best], b[k]
+        # Eliminate below; many factors are zero, as entries do not all depend on one another.
         for i in range(k + 1, count):
             factor = a[i, k] / a[k, k]
             if factor != 0.0:
                 for j in range(k + 1, count):
                     a[i, j] -= factor * a[k, j]
                 b[i] -= factor * b[k]
+    # Substitute back.
     for k in range(count - 1, -1, -1):
         for j in range(k + 1, count):
             b[k] -= a[k, j] * b[j]
@@ -142,16 +145,18 @@ def solve(a, b):
 
 @compiled(**EXACT)
 def _slopes(implicit, mode, i, big, stages):
-    """Rates at stage i, their derivatives by differences, and the values of all nodes."""
+    """Rates at stage i, their derivatives by differences, and the values of all nodes; `big` (N,) is what each entry of
+    the state is measured by."""
     rates = coded(implicit.rates)
     numbers, physical = implicit.model.numbers, implicit.physical
-    stage, value, slope, every = stages.values[i], stages.rates[i], stages.slopes[i], stages.nodes[i]
+    stage, value, slope, nodes = stages.values[i], stages.rates[i], stages.slopes[i], stages.nodes[i]
     work, moved = stages.one, stages.moved
+    # a series of order one: value and rate of each node side by side
     rates(numbers, mode, stage, 1.0, work)
     for j in range(physical):
         value[j] = work[2 * j + 1]
-    for j in range(len(every)):
-        every[j] = work[2 * j]
+    for j in range(len(nodes)):
+        nodes[j] = work[2 * j]
     degrees = len(implicit.faces)
     for j in range(len(stage)):
         moved[j] = stage[j]
@@ -161,9 +166,11 @@ def _slopes(implicit, mode, i, big, stages):
             step = 1e-7 * abs(stage[d] - _faced(implicit.faces[d - degrees], stage)) + 1e-13 * big[d]
         else:
             step = 1e-7 * abs(stage[d]) + 1e-10 * big[d]
+        # an entry that is zero and always was
         if step == 0.0:
             step = 1e-14
         moved[d] = stage[d] + step
+        # by what the entry has really moved: the sum was rounded
         step = moved[d] - stage[d]
         rates(numbers, mode, moved, 1.0, work)
         moved[d] = stage[d]
@@ -176,12 +183,14 @@ def settle(implicit, mode, state, h, big, stages):
     """Newton's method for the stages, which hold the drive's signals and a guess: the last change, or infinity.
 
     Where rounding keeps it above the tolerance (a small velocity between large forces), the change tells by how much.
+    `state` is (N,), `h` the step [s], `big` (N,) what each entry is measured by.
     """
     matrix, physical, tolerance = implicit.scheme.matrix, implicit.physical, implicit.model.tolerance
     a, b, change, before = stages.matrix, stages.right, math.inf, math.inf
     for iteration in range(NEWTON):
         for i in range(STAGES):
             _slopes(implicit, mode, i, big, stages)
+        # Equations: Y_i - y - h sum_m a_im f(Y_m) = 0, with the derivative I - h a_im f'(Y_m).
         for i in range(STAGES):
             for j in range(physical):
                 row, total = i * physical + j, 0.0
@@ -191,6 +200,7 @@ def settle(implicit, mode, state, h, big, stages):
                         a[row, m * physical + d] = -h * matrix[i, m] * stages.slopes[m, j, d]
                 a[row, row] += 1.0
                 b[row] = stages.values[i, j] - state[j] - h * total
+        # Step, and its largest change in units of each entry.
         if not solve(a, b):
             return math.inf
         change = 0.0
@@ -201,8 +211,10 @@ def settle(implicit, mode, state, h, big, stages):
                     return math.inf
                 stages.values[i, j] -= b[i * physical + j]
                 change = max(change, moved)
+        # done: the next change would be smaller still, by far
         if change <= max(1e-2 * tolerance, 1e-15):
             return change
+        # no longer halved: rounding is all that is left, or the guess was too far off
         if not change < math.inf or (iteration > 3 and change > 0.5 * before):
             break
         before = change
@@ -222,17 +234,20 @@ def fitted(values, column, start, fit, c):
 
 @compiled(**EXACT)
 def growth(c, big, tolerance):
-    """Step in units of this one at which the last two Chebyshev terms of every entry are its tolerance."""
+    """Step in units of this one at which the last two Chebyshev terms of every entry are its tolerance; `c` is
+    (N, WIDTH), `big` (N,)."""
     last, before = 0.0, 0.0
     for i in range(len(big)):
         scale = max(big[i], abs(at(c[i], 1.0)))
         if scale > 0.0:
             last = max(last, abs(c[i, STAGES]) / scale)
             before = max(before, abs(c[i, STAGES - 1]) / scale)
+    # the power w^n has 2^(n-1) times the coefficient of T_n; two terms, as one alone may vanish by parity
     last, before = last / 2.0 ** (STAGES - 1), before / 2.0 ** (STAGES - 2)
     if not last + before < math.inf:
         return 0.0
     grow = math.log(5.0)
+    # term n goes with the n-th power of the step; at most five times as long, less a tenth for safety
     if last > 0.0:
         grow = min(grow, math.log(tolerance / last) / STAGES)
     if before > 0.0:
@@ -262,9 +277,11 @@ def _faced(face, state):
 def leap(implicit, mode, unit, state, big, h, poly, work):
     """A step of length h [s] as polynomials of w, and the length of the next in units of h; 0 where it failed.
 
-    `unit` is that of the Taylor series [s]: the drive's signals are polynomials, or tones.
+    `unit` is that of the Taylor series [s]: the drive's signals are polynomials, or tones. `state` and `big` are (N,),
+    `poly` (N, WIDTH).
     """
     step, stages, scheme, model = work.step, work.stages, implicit.scheme, implicit.model
+    # Guess: the drive's signals are true at each stage, masses and memory as they are now.
     for i in range(STAGES):
         advance(step.s, step.order, scheme.points[i] * h / unit, stages.values[i])
         turn(model.tones, state, scheme.points[i] * h, stages.values[i])
@@ -277,6 +294,7 @@ def leap(implicit, mode, unit, state, big, h, poly, work):
     change = settle(implicit, mode, state, h, big, stages)
     if change == math.inf:
         return 0.0
+    # Polynomials, of the signals too: exits and outputs are forms of all.
     for j in range(len(state)):
         fitted(stages.values, j, state[j], scheme.fit, poly[j])
     return growth(poly, big, max(model.tolerance, 10.0 * change))
@@ -291,11 +309,13 @@ def _fitted_node(node, size, fit, work):
 
 @compiled(**EXACT)
 def landing(implicit, mode, big, work):
-    """Where a leap ends, as w, and by which exit (-1 where by none): an exit, or a sleeping function that wakes."""
+    """Where a leap ends, as w from -1 to 1, and by which exit (-1 where by none): an exit, or a sleeping function that
+    wakes. `big` is (N,)."""
     model, fit, step = implicit.model, implicit.scheme.fit, work.step
     exits, guards = model.exits, model.guards
     c, noise, size, asleep = step.c, step.noise, len(big), 4.0 - math.log(model.tolerance)
     end, leaving = 1.0, -1
+    # Wake: the stages do not know what a sleeping function does once it is awake.
     for g in range(guards.first[mode], guards.first[mode + 1]):
         start = step.s[guards.argument[g] * (step.order + 1)]
         if not awake(guards.kind[g], start, asleep):
@@ -307,9 +327,11 @@ def landing(implicit, mode, big, work):
             noise[0] = 0.0
             w = first_rise(c, noise, WIDTH, 0, 1.0, -1.0, 1.0)
             end = end if w == NONE else min(end, w)
+    # Exit: the first rise of any, no later than the end so far.
     for e in range(exits.first[mode], exits.first[mode + 1]):
         node = exits.node[e]
         _fitted_node(node, size, fit, work)
+        # the rounding of the fit goes with the largest of entry and terms
         most = big[node] if node < size else 0.0
         for k in range(WIDTH):
             c[k] *= exits.factor[e]

@@ -189,13 +189,16 @@ def _holds(model, past, steps, big, step):
 def _recall(model, past, steps, count, clock, state, big, step):
     """Set the chain of the past to the step at the cursor, and its edge to where that step's polynomial ends to hold.
 
-    The polynomial of a step that was cut short may hold over the steps that follow it.
+    The polynomial of a step that was cut short may hold over the steps that follow it. `state` and `big` are (N,); of
+    `steps` the first `count` are known.
     """
     s, width, period, slip = step.s, step.order + 1, model.period, past.slip
     j = past.cursor[0]
     side = past.sides[steps.modes[j]]
+    # Step: its polynomial, and how long that holds [s].
     holds, h = _holds(model, past, steps, big, step)
     scale = model.tolerance * big[PAST]
+    # Reach: on over the steps at whose ends it is still true, for fewer edges; a change of side is a kink of the speed.
     e = j + 1
     while e < count and past.sides[steps.modes[e]] == side:
         end = (steps.laps[e + 1], steps.offsets[e + 1]) if e + 1 < count else (clock[LAPS], clock[TIME])
@@ -208,6 +211,7 @@ def _recall(model, past, steps, count, clock, state, big, step):
         if not abs(total - _along(slip, steps.states[e + 1] if e + 1 < count else state)) <= scale:
             break
         e += 1
+    # Edge: where its reach ends, a lag later, in laps and time.
     edge = past.edge
     if e < count:
         edge[0], edge[1] = steps.laps[e], steps.offsets[e] + past.lag
@@ -217,6 +221,7 @@ def _recall(model, past, steps, count, clock, state, big, step):
         edge[0] += 1.0
         edge[1] -= period
     past.cursor[0] = e
+    # Chain: Taylor coefficients of the speed by time over the lag, whose first entry is the speed itself.
     power = 1.0
     for k in range(step.order + 1):
         state[PAST + k] = side * _coefficient(slip, s, width, k) * power
@@ -226,18 +231,21 @@ def _recall(model, past, steps, count, clock, state, big, step):
 
 @compiled(**EXACT)
 def _march(model, past, clock, state, big, mode, until, steps, count, step):
-    """As `march`, from edge to edge of the past; `count` steps are known, and new ones are put behind them."""
+    """As `march`, from edge to edge of the past; `count` steps are known, and new ones are put behind them. `state` and
+    `big` are (N,), `until` (2,): laps and time [s]."""
     edge, cursor = past.edge, past.cursor
     while True:
         if cursor[1]:
             _recall(model, past, steps, count, clock, state, big, step)
             cursor[1] = 0
+        # whichever comes first, the edge or the end
         first = _apart((edge[0], edge[1]), (until[0], until[1]), model.period) <= 0.0
         aim = (edge[0], edge[1]) if first else (until[0], until[1])
         clock[TRY] = min(clock[TRY], past.lag)  # at rest steps would grow for ever
         outcome, count, mode = march.march(model, clock, state, big, mode, aim, steps, count, step)
         if outcome != DONE:
             return outcome, count, mode
+        # onto the edge to the last digit, not to the sum of the steps; the next step of the past is due
         if first:
             clock[LAPS], clock[TIME] = edge[0], edge[1]
             cursor[1] = 1

@@ -165,15 +165,17 @@ def new_lap(past):
 
 @compiled(**FAST, forceinline=True)
 def _turned(nodes, turn, t):
-    """e^{rate t} from the nearest node."""
+    """e^{rate t} from the nearest node; `nodes` is (K, 3) as in ``Phasors``, t in s."""
     j = min(turn.nodes - 1, int(t * turn.density + 0.5))
     r = t - nodes[turn.first + j, 2]
+    # within HALF_STEP of a node: the series to degree 9 leave 1e-17
     z = turn.rate.imag * r
     q = z * z
     c = 1.0 + q * (-0.5 + q * (1 / 24 + q * (-1 / 720 + q * (1 / 40320))))
     s = z * (1.0 + q * (-1 / 6 + q * (1 / 120 + q * (-1 / 5040 + q * (1 / 362880)))))
     if turn.rate.real != 0.0:
         y = turn.rate.real * r
+        # of a weak decay the term of order six is below 1e-22
         e = 1 / 120
         if abs(y) > 5e-4:
             e += y * (1 / 720 + y * (1 / 5040 + y * (1 / 40320 + y * (1 / 362880))))
@@ -227,12 +229,13 @@ def _parted(fast, own, mode, here, state, omega):
 def _due(model, own, mode, here, free, state, omega, piece):
     """Due: the exit that ends the mode at once (-1: none), and whether one is too close to call.
 
-    Where none is, `piece` has a row for each exit.
+    Where none is, `piece` (MOST_EXITS, 16) has a row for each exit, in the columns from LEVEL on; `state` is (N,).
     """
     fast, first = model.fast, model.linear.first
     for q in range(first[mode + 1] - first[mode]):
         e = first[mode] + q
         way = way_out(fast, e)
+        # G: what rests; of a mass that is held, its displacement and velocity too
         level, scale = 0.0, 0.0
         for i in range(fast.level.shape[1]):
             term = fast.rest[e, i] * state[2 + i]
@@ -241,6 +244,7 @@ def _due(model, own, mode, here, free, state, omega, piece):
         if not own.slides:
             level += way.x * here.x + way.v * here.v
             scale += abs(way.x * here.x)
+        # D and W, turned to the start of the piece, and the Taylor coefficients there
         d, w = way.drive * here.drive, way.free * free.start
         g, rate, bend, jerk = _derived(level, d, w, omega, own.free.rate)
         # the first that is not zero within its rounding decides, as roots.opening_order has it
@@ -257,6 +261,7 @@ def _due(model, own, mode, here, free, state, omega, piece):
         piece[q, LEVEL], piece[q, DRIVE], piece[q, DRIVE + 1] = level, d.real, d.imag
         piece[q, FREE], piece[q, FREE + 1] = w.real, w.imag
         piece[q, VALUE], piece[q, RATE], piece[q, BEND], piece[q, JERK] = g, rate, bend, jerk
+        # |g''''| <= |D| omega^4 + |W| |l|^4, as long as the free motion does not grow
         fourth = way.drive_size * omega * omega * omega * omega
         piece[q, FOURTH] = fourth + way.free_size * free.size * own.speed * own.speed * own.speed * own.speed
     return -1, False
@@ -266,8 +271,9 @@ def _due(model, own, mode, here, free, state, omega, piece):
 def _looked(nodes, drive, own, piece, exits, longest):
     """Near which time some exit first rises through zero, and which: looks at some distance, only to start from.
 
-    (-1, 0) where none is seen. What lies between two looks is not seen, and left to the certificate.
+    (-1, 0) where none is seen. What lies between two looks is not seen, and left to the certificate. `longest` is in s.
     """
+    # LOOK by whichever of the two phasors turns faster
     step = LOOK / max(drive.rate.imag, own.speed)
     count = int(longest / step) + 1
     for j in range(1, count + 1):
@@ -276,6 +282,7 @@ def _looked(nodes, drive, own, piece, exits, longest):
         for q in range(exits):
             g = piece[q, LEVEL] + piece[q, DRIVE] * n.real - piece[q, DRIVE + 1] * n.imag
             g += piece[q, FREE] * m.real - piece[q, FREE + 1] * m.imag
+            # the first look has the value at the start before it
             before = piece[q, VALUE] if j == 1 else piece[q, SEEN]
             piece[q, SEEN] = g
             if g > 0.0:
@@ -314,9 +321,11 @@ def _polished(nodes, drive, own, piece, k, t):
         n, m = _turned(nodes, drive, t), _freely(nodes, own, t)
         g, d, h, _ = _later(piece, k, n, m, omega, rate)
         step = -2.0 * g * d / (2.0 * d * d - g * h)
+        # not onto a rise, or far from the guess: another exit, or none
         if not (d > 0.0 and abs(step) < 0.2 * t):
             break
         t += step
+        # it converges cubically: (2e-6)^3 is below rounding
         if abs(step) * max(omega, own.speed) < 2e-6:
             # the phasors follow the last correction by their Taylor polynomials
             z = omega * step
@@ -360,16 +369,19 @@ def _clear(nodes, drive, own, piece, exits, last, end, parts):
             n, m = _turned(nodes, drive, at), _freely(nodes, own, at)
         for q in range(exits):
             fourth = piece[q, FOURTH] * spread
+            # the start, by the values that `due` took for zero where rounding decides
             if j == 0:
                 if not _below(piece[q, VALUE], piece[q, RATE], piece[q, BEND], piece[q, JERK], fourth, half):
                     return False
                 continue
             g, d, h, jerk = _later(piece, q, n, m, omega, rate)
             if j == parts:
+                # the rounding of its polish is no crossing
                 if q == last:
                     g = 0.0
             elif not _below(g, d, h, jerk, fourth, half):
                 return False
+            # back in time, where odd derivatives change sign
             if not _below(g, -d, h, -jerk, fourth, half):
                 return False
     return True
@@ -380,16 +392,20 @@ def _tried(kind, model, own, drive, mode, piece, past, left):
     """Guess and certify: how the piece ends, if this guess is right."""
     nodes, first = model.fast.nodes, model.linear.first[mode]
     exits, none = model.linear.first[mode + 1] - first, complex(0.0, 0.0)
+    # Guess.
     t, leaving, parts = _guessed(kind, model, own, drive, mode, piece, past, left)
     if not t > 0.0:
         return End(False, 0.0, -1, 1, none, none)
+    # Certify: by the limit, or by the polished zero of the exit guessed.
     if kind == LASTS:
         sure, n, m, last = True, _turned(nodes, drive, t), _freely(nodes, own, t), -1
     else:
         last = leaving - first
         sure, t, n, m = _polished(nodes, drive, own, piece, last, t)
+        # next to the limit, or longer than a lap: the general march's
         sure = sure and t < 0.9999 * left and t < model.period
     end = End(True, t, leaving, parts, n, m)
+    # a bound of fourth order: half the interval has a sixteenth of its slack
     while sure and parts <= SPLITS and not _clear(nodes, drive, own, piece, exits, last, end, parts):
         parts *= 2
     return End(sure and parts <= SPLITS, t, leaving, parts, n, m)
@@ -503,35 +519,42 @@ def glide(model, clock, state, mode, limit, past, out, count, work):
     while chain < MOST_AT_ONCE:
         if model.linear.first[mode + 1] - model.linear.first[mode] > MOST_EXITS:
             break
+        # Due: what is above zero already is taken without time.
         own = slide_of(model.fast, mode)
         free = _parted(model.fast, own, mode, here, state, omega)
         leaving, doubtful = _due(model, own, mode, here, free, state, omega, piece)
         if doubtful:
             break
         if leaving < 0:
+            # time passes here, but there is no room for the piece
             settled = count == capacity
             if settled:
                 break
             left = until(clock, limit, model.period)
+            # Guess and certify.
             end = _tried(BEFORE, model, own, drive, mode, piece, past, left)
             if not end.proved:
                 end = _otherwise(model, own, drive, mode, piece, past, left)
             if not end.proved:
                 break
+            # Step.
             _write(out, count, clock, mode, here, state, end)
             count += 1
             remember(past, mode, end.leaving, end.time, end.parts)
             clock = _ticked(clock, end, limit, model.period, past)
             since += 1
             turned = here.drive * end.drive
+            # a product of turns gathers rounding: by the clock anew
             if since >= EXACT:
                 angle = omega * clock.time + phase
                 turned, since = complex(math.cos(angle), math.sin(angle)), 0
             here = _stepped(own, here, free, omega, end.free, turned)
+            # by no exit: this was the limit
             settled = end.leaving < 0
             if settled:
                 break
             leaving, chain = end.leaving, -1
+        # Exit: what it leaves, and the mode behind; `chain` counts those without time between.
         here = _left(model, leaving, here, state, fresh)
         mode = model.linear.target[leaving]
         chain += 1

@@ -48,7 +48,7 @@ def parts_of(work, size):
 
 @compiled(**OPTIONS)
 def set_tones(tones, state, time, period):
-    """Keep the turning signals of the drive true.
+    """Keep the turning signals of the drive true: `tones` is (J, 4) as in ``Linear``, `time` and `period` are in s.
 
     One tone whose period is the drive's is put where it is at `time`, which stays within it. Several have no period in
     common, and beside a belt time goes on and on: each is only brought back to unit length, because far from zero a
@@ -60,6 +60,7 @@ def set_tones(tones, state, time, period):
             angle = tones[j, 2] * time + tones[j, 3]
             state[c], state[s] = math.cos(angle), math.sin(angle)
         else:
+            # one step of Newton for 1 / sqrt(q), which near q = 1 is 1.5 - q / 2
             length = 1.5 - 0.5 * (state[c] * state[c] + state[s] * state[s])
             state[c] *= length
             state[s] *= length
@@ -93,7 +94,8 @@ def multiply(matrix, state, out):
 def leap(hop, state, tail, work):
     """state + tail = exp(A cell) (state + tail), in twice the digits: a long piece has thousands of cells.
 
-    `hop` is (3, N, N), see :func:`stickslip.solve.cells.halved`; `tail` is what rounding took from the state.
+    `hop` is (3, N, N), see :func:`stickslip.solve.cells.halved`; `tail` (N,) is what rounding took from the state (N,);
+    `work` is (2, N). Sums are those of Dot2 (Ogita, Rump and Oishi, SIAM J. Sci. Comput. 26, 2005).
     """
     n = state.shape[0]
     for i in range(n):
@@ -107,11 +109,14 @@ def leap(hop, state, tail, work):
             x -= x - state[j]
             y = state[j] - x
             term = a * x
+            # two-sum (Knuth): what this addition rounds away
             step = total + term
             seen = step - total
             rest += (total - (step - seen)) + (term - seen)
+            # lower products: their own rounding is of second order
             rest += a * y + (b * state[j] + (a * tail[j] + hop[2, i, j] * state[j]))
             total = step
+        # normalised: state and tail overlap in no bit
         work[0, i] = total + rest
         work[1, i] = rest - (work[0, i] - total)
     for i in range(n):
@@ -120,10 +125,14 @@ def leap(hop, state, tail, work):
 
 @compiled(**OPTIONS)
 def advance(flow, state, tail, time, work):
-    """state + tail = exp(A time) (state + tail) by the Taylor series, for a time within one cell; `work` is (2, N)."""
+    """state + tail = exp(A time) (state + tail) by the Taylor series, for a time [s] within one cell.
+
+    `flow` is A (N, N) [1/s], `state` and `tail` are (N,), `work` (2, N).
+    """
     n = state.shape[0]
     for i in range(n):
         work[0, i] = state[i]
+    # rate * time <= 1 within a cell: term k is 1 / k! of its scale, the 23rd far below rounding
     for k in range(1, 24):
         scale = time / k
         for i in range(n):
@@ -134,12 +143,15 @@ def advance(flow, state, tail, time, work):
         small = True
         for i in range(n):
             work[0, i] = work[1, i]
+            # terms gather in the tail, so that the state rounds once, at the end
             before = state[i] + tail[i]
             tail[i] += work[1, i]
             small = small and before + work[1, i] == before
+        # near rest an early term may be lost in every entry, and the next one not
         if small and k > 4:
             break
     for i in range(n):
+        # two-sum: the tail keeps what the state has no room for
         whole = state[i] + tail[i]
         seen = whole - state[i]
         tail[i] = (state[i] - (whole - seen)) + (tail[i] - seen)
@@ -165,12 +177,17 @@ def expand(series, state, scale, cell, c, noise):
 
 @compiled(**OPTIONS)
 def settle(linear, mode, state, cell, work):
-    """Take every exit that is due at once; returns the mode in which time passes, or -1 if the chain does not end."""
+    """Take every exit that is due at once; returns the mode in which time passes, or -1 if the chain does not end.
+
+    `state` (N,) is carried over; exits are expanded over `cell` [s]; `work` is :class:`Scratch`.
+    """
     for _ in range(CHAIN + linear.first.shape[0]):  # a table of speeds may have to be gone through line by line
         fired = -1
         for e in range(linear.first[mode], linear.first[mode + 1]):
+            # what counts by a crossing must have been below zero first
             if linear.crossing[e]:
                 continue
+            # the first derivative that stands out from its noise decides (rules of roots)
             expand(linear.series[e], state, work.scale, cell, work.c, work.noise)
             order = opening_order(work.c, work.noise, work.c.shape[0])
             if order < work.c.shape[0] and work.c[order] > 0.0:
@@ -178,6 +195,7 @@ def settle(linear, mode, state, cell, work):
                 break
         if fired < 0:
             return mode
+        # one at a time, in the order of the table: the mode behind is asked anew
         multiply(linear.reset[fired], state, work.pair[0])
         for i in range(state.shape[0]):
             state[i] = work.pair[0, i]
@@ -207,11 +225,13 @@ def next_exit(linear, mode, opened, armed, span, work):
     best, which = NONE, -1
     count = c.shape[0]
     for e in range(linear.first[mode], linear.first[mode + 1]):
+        # over u = t / cell, with the noise of each coefficient
         expand(linear.series[e], work.moving, work.scale, cell, c, noise)
         low = opening_order(c, noise, count)
         if low == count:
             continue  # on the tie, and staying there
         low = low if opened else 0
+        # sought no farther than the first found so far; at a tie the earlier row of the table wins
         limit = min(1.0, best)
         start = 0.0
         bit = 1 << (e - linear.first[mode])
@@ -252,11 +272,12 @@ def _polished(linear, mode, leaving, dt, work):
 @compiled(**OPTIONS)
 def _crossed(model, mode, clock, left, patience, work):
     """Take the state `work.moving` through a mode until an exit ends it, the time that is left is over, or `patience`
-    cells are gone through: the time [s], the exit (-1: none) and the cells."""
+    cells are gone through: the time [s], the exit (-1: none) and the cells. `left` is in s, `work` :class:`Scratch`."""
     linear, moving, tail = model.linear, work.moving, work.tail
     cell, gone, armed, cells = linear.cell[mode], 0.0, np.int64(0), 0
     while True:
         span = left - gone
+        # Exit: the first of this cell, if any.
         dt, leaving, armed = next_exit(linear, mode, cells == 0, armed, span, work)
         if leaving == UNTOLD:
             return gone, leaving, cells
@@ -265,15 +286,18 @@ def _crossed(model, mode, clock, left, patience, work):
             gone += dt
             gone += _polished(linear, mode, leaving, dt, work)
             return gone, leaving, cells
+        # Limit: the cell holds all the time that is left.
         if span <= cell:
             advance(linear.flow[mode], moving, tail, span, work.pair)
             return left, leaving, cells
-        # in twice the digits: a long piece has thousands of cells
+        # Cell: over its whole length, in twice the digits: a long piece has thousands of cells.
         leap(linear.hop[mode], moving, tail, work.pair)
+        # an entry keeps the rounding of the largest that it was in this piece
         for i in range(moving.shape[0]):
             work.scale[i] = max(work.scale[i], abs(moving[i]))
         cells += 1
         gone = cells * cell
+        # the phase by the clock: thousands of turns would gather rounding
         if linear.tones.shape[0] == 1 and model.period < math.inf:
             set_tones(linear.tones, moving, clock.time + gone, model.period)
             tail[int(linear.tones[0, 0])], tail[int(linear.tones[0, 1])] = 0.0, 0.0
@@ -321,16 +345,19 @@ def march(model, clock, state, mode, limit, past, out, work, patience):
     while True:
         if quick:
             # as far as two phasors tell it; the piece in doubt is the general march's
-            count, came, settled, clock = glide(model, clock, state, mode, limit, past, out, count, room.fast)
-            mode = came if settled else settle(linear, came, state, linear.cell[came], room)
+            count, following, settled, clock = glide(model, clock, state, mode, limit, past, out, count, room.fast)
+            mode = following if settled else settle(linear, following, state, linear.cell[following], room)
             if mode < 0:
-                return CHATTER, count, came, clock
+                return CHATTER, count, following, clock
+        # Room and patience: the caller takes the pieces and calls again.
         if count == capacity or spent >= patience:
             return FULL, count, mode, clock
+        # Time: less than two roundings of the clock is none.
         left = until(clock, limit, model.period)
         if left <= 4e-16 * limit.time:
             return DONE, count, mode, clock
         set_tones(linear.tones, state, clock.time, model.period)
+        # Piece: how it begins, and through its mode to its end.
         out.laps[count], out.offsets[count], out.modes[count] = clock.laps, clock.time, mode
         for i in range(out.states.shape[1]):
             out.states[count, i] = state[i]
@@ -340,10 +367,12 @@ def march(model, clock, state, mode, limit, past, out, work, patience):
         spent += cells
         if leaving == UNTOLD:
             return UNPROVED, count, mode, clock
+        # End: an exit, the limit, or (exit -1, time left) cut for lack of patience.
         out.durations[count], out.exits[count] = gone, leaving
         count += 1
         remember(past, mode, leaving, gone, 1)
         over = leaving < 0 and gone >= left
+        # the limit itself, not a sum that rounds: the next stop begins there
         now = Clock(limit.laps, limit.time, 0.0) if over else later(clock, gone, model.period)
         if now.laps > clock.laps:
             new_lap(past)
@@ -360,11 +389,13 @@ def march(model, clock, state, mode, limit, past, out, work, patience):
         multiply(linear.reset[leaving], state, moving)
         for i in range(n):
             state[i] = moving[i]
+        # what an entry was counts by half at each event: one next to zero still has its rounding
         measure(linear.tones, state, room.scale, 0.5)
-        came = linear.target[leaving]
-        mode = settle(linear, came, state, min(linear.cell[came], left), room)
+        following = linear.target[leaving]
+        mode = settle(linear, following, state, min(linear.cell[following], left), room)
         if mode < 0:
-            return CHATTER, count, came, clock
+            return CHATTER, count, following, clock
+        # settled, and yet left without time: rounding decides, and it would go on for ever
         if gone <= 0.0:
             return LOST, count, mode, clock
 
@@ -377,6 +408,7 @@ def course(model, clock, state, mode, stops, stop, past, out, work, patience):
     last = Clock(stops.ends[-1, 0], stops.ends[-1, 1], 0.0)
     while True:
         end = Clock(stops.ends[stop, 0], stops.ends[stop, 1], 0.0)
+        # the room behind the pieces written so far
         rest = Pieces(
             out.laps[done:],
             out.offsets[done:],
@@ -389,12 +421,14 @@ def course(model, clock, state, mode, stops, stop, past, out, work, patience):
         done += count
         if status != DONE or stop + 1 == stops.ends.shape[0]:
             return status, done, mode, clock, stop
+        # Stop: entries take new values, as a recorded drive has a new polynomial; the mode may end there.
         stop += 1
         for j in range(stops.places.shape[0]):
             state[stops.places[j]] = stops.values[stop, j]
-        came, mode = mode, begin(model.linear, mode, state, until(clock, last, model.period), 1.0, work)
+        # no time passes in it: the rounding measured so far counts in full (1.0)
+        entered, mode = mode, begin(model.linear, mode, state, until(clock, last, model.period), 1.0, work)
         if mode < 0:
-            return CHATTER, done, came, clock, stop
+            return CHATTER, done, entered, clock, stop
 
 
 @compiled(**OPTIONS)
@@ -426,20 +460,23 @@ def follow(linear, mode, state, time, work):
 def outputs(flow, state, tail, rows, cell, c, work):
     """Taylor coefficients of linear forms of the state, by time over the cell; returns how many there are.
 
-    `rows` is (R, N), `c` (R, DEGREE + 1), `work` (2, N).
+    `flow` is (N, N) [1/s], `state` and `tail` (N,), `rows` (R, N), `cell` in s, `c` (R, DEGREE + 1), `work` (2, N).
     """
     n = state.shape[0]
     for i in range(n):
         work[0, i] = state[i]
+    # coefficient k: each row times A^k S cell^k / k!
     for k in range(c.shape[1]):
         for r in range(rows.shape[0]):
             total = 0.0
             for i in range(n):
                 total += rows[r, i] * work[0, i]
+            # the tail counts in the value alone; in a derivative it is below rounding
             if k == 0:
                 for i in range(n):
                     total += rows[r, i] * tail[i]
             c[r, k] = total
+        # the series ends where a term changes no entry, as in `advance`
         small = True
         for i in range(n):
             total = 0.0
@@ -480,6 +517,7 @@ def sample(linear, begin, modes, states, times, rows, piece, out, work, c):
     scratch, moving, tail = work[:2], work[2], work[3]
     j, count, known = -1, 0, 0
     for t in range(times.shape[0]):
+        # Piece: the state where it begins.
         if j < 0 or (j < last and begin[j + 1] <= times[t]):
             j = max(j, 0)
             while j < last and begin[j + 1] <= times[t]:
@@ -490,13 +528,16 @@ def sample(linear, begin, modes, states, times, rows, piece, out, work, c):
         mode = modes[j]
         cell = linear.cell[mode]
         time = times[t] - begin[j]
+        # Cell: carried over those that are over, in twice the digits.
         while time - count * cell > cell:
             leap(linear.hop[mode], moving, tail, scratch)
             count += 1
             known = 0
+        # where nothing turns one cell lasts for ever, and any unit of time serves
         unit = cell if cell < math.inf else 1.0
         if known == 0:
             known = outputs(linear.flow[mode], moving, tail, rows[mode], unit, c, scratch)
+        # Instant: Horner's rule.
         share = (time - count * cell if count else time) / unit
         piece[t] = j
         for r in range(rows.shape[1]):

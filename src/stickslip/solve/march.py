@@ -130,11 +130,13 @@ def _rounds(model, node, mode, h, state, big, step):
 def _explicit(model, mode, h, u, big, ignored, step):
     """The Taylor step, shortened to where a function wakes or an exit ends the mode, and that exit (-1: none).
 
-    A negative length: a root could neither be found nor excluded.
+    A negative length: a root could neither be found nor excluded. `h` is the unit of the series [s], `u` and the length
+    are in units of it; `big` (N,) is what each entry is measured by.
     """
     exits, guards, s, order, size = model.exits, model.guards, step.s, step.order, len(big)
     width, asleep, safe = order + 1, 4.0 - math.log(model.tolerance), max(NOISE, 1e3 * model.tolerance)
     leaving = -1
+    # Wake: until then the series does not know of the function.
     for g in range(guards.first[mode], guards.first[mode + 1]):
         a = guards.argument[g] * width
         if not awake(guards.kind[g], s[a], asleep):
@@ -146,9 +148,11 @@ def _explicit(model, mode, h, u, big, ignored, step):
         if e == ignored:
             continue
         i, factor = exits.node[e], exits.factor[e]
+        # Exit: most are shown by their coefficients alone to stay below zero.
         far = i < size and factor * s[i * width] < -abs(factor) * safe * big[i]
         if far and surely_below(s, i * width, order, factor, 0.0, u):
             continue
+        # no farther than its own series is resolved; a step that is cut no longer reaches an exit beyond
         top = order if i < size else order - 1
         clear = resolved(s, i * width, top, NOISE * (big[i] if i < size else abs(s[i * width])), u)
         leaving, u = leaving if clear == u else -1, clear
@@ -174,10 +178,12 @@ def _arrived(clock, until, model, remaining, ahead, leaving, state):
     """The clock after a step; whole periods count as laps.
 
     The tones are turned from step to step: a release must find them as they were a moment before, to rounding. Each
-    lap sets them anew, so that they gather no error of the steps.
+    lap sets them anew, so that they gather no error of the steps. `until` is (laps, time [s]); `remaining` and `ahead`
+    are in s.
     """
     laps, period = clock[LAPS], model.period
     if leaving < 0 and ahead >= remaining:
+        # the end itself, not a sum that rounds
         clock[LAPS], clock[TIME] = until[0], until[1]
     else:
         clock[TIME] += ahead
@@ -295,36 +301,44 @@ def march(model, clock, state, big, mode, until, steps, row, step):
 def _attempt(implicit, clock, state, big, mode, remaining, poly, work):
     """Try a leap: how far its polynomials reach [s], how far they are followed (0: it failed), and to which exit.
 
-    The clock takes what to try next, and when: whatever made a leap fail, a Taylor step brings the march on.
+    The clock takes what to try next, and when: whatever made a leap fail, a Taylor step brings the march on. `state`
+    and `big` are (N,), `remaining` is in s, `poly` (N, WIDTH).
     """
+    # Reach: as the leap before foretold; the first, as far as the Taylor steps that it costs.
     h, full = clock[TRY], length(work.step.s, work.step.order, big, implicit.model.tolerance)
     clock[REACH] = LEAP * full * h if clock[REACH] == 0.0 else clock[REACH]
     reach, ahead, leaving = min(clock[REACH], remaining), 0.0, -1
     grow = leap(implicit, mode, h, state, big, reach, poly, work)
+    # Accept: the error is the tolerance where `growth` leaves its tenth for safety.
     if grow >= 0.9:
         w, leaving = landing(implicit, mode, big, work)
         ahead = 0.5 * (w + 1.0) * reach
         if ahead > 0.0:
             clock[DUE] = PATIENCE
+    # Next: one cut short by the end of the time tells nothing, unless it failed.
     if not grow >= 0.9 or reach == clock[REACH]:
         clock[REACH] = reach * max(grow, 0.2)
+    # Given up: an exit too near, or no longer than half of what it costs; tried again ever more seldom.
     if ahead == 0.0 and (grow >= 0.9 or clock[REACH] < 0.5 * LEAP * full * h):
         clock[REACH], clock[STEADY], clock[DUE] = 0.0, 0.0, min(2.0 * clock[DUE], 64.0 * PATIENCE)
     elif ahead == 0.0:
+        # shorter, after one Taylor step
         clock[STEADY] = clock[DUE] - 1.0
     return reach, ahead, leaving
 
 
 @compiled(**EXACT)
 def strides(implicit, clock, state, big, mode, until, steps, row, leapt, work):
-    """As :func:`march`, with a leap where one is due, if it can be: also the number behind those written."""
+    """As :func:`march`, with a leap where one is due, if it can be: also the number behind those written, `leapt`."""
     model, leaps = implicit.model, work.leaps
     while True:
+        # Taylor steps, until a leap is due.
         outcome, row, mode = march(model, clock, state, big, mode, until, steps, row, work.step)
         if outcome != STIFF:
             return outcome, row, leapt, mode
         if leapt == len(leaps.polys):
             return FULL, row, leapt, mode
+        # Leap: tried, and where it comes to nothing a Taylor step is next.
         h, remaining, poly = clock[TRY], remaining_of(clock, until, model.period), leaps.polys[leapt]
         reach, ahead, leaving = _attempt(implicit, clock, state, big, mode, remaining, poly, work)
         if ahead > 0.0:
@@ -332,6 +346,7 @@ def strides(implicit, clock, state, big, mode, until, steps, row, leapt, work):
             for i in range(len(state)):
                 state[i] = at(poly[i], 2.0 * ahead / reach - 1.0)
             leaps.reach[leapt] = reach
+            # the Taylor step to come: a leap leaves the series of before as it was
             clock[TRY] = h * length(work.step.s, work.step.order, big, model.tolerance)
             passed(model, clock, until, remaining, ahead, leaving, steps.states[row], state, big)
             row, leapt = row + 1, leapt + 1
@@ -371,18 +386,21 @@ def rests(series, numbers, mode, state, step):
 
 @compiled(**EXACT)
 def sample(shown, steps, times, nodes, plain, out, row, work):
-    """Values of nodes (by mode) at increasing times, and the step each one falls in; `plain` where all nodes are
-    entries of the state, so that nothing else need be worked out."""
+    """Values of nodes (M, R), by mode, at increasing times (T,) [s] to `out` (R, T), and the step that each falls in to
+    `row` (T,); `plain` where all nodes are entries of the state, so that nothing else need be worked out. `work` has a
+    series, a state and the outputs."""
     series = coded(shown.series)
     outputs = coded(shown.outputs)
     s, state, values = work
     j, known = 0, -1
     for t in range(len(times)):
+        # Step: the one that the instant falls in; rounding may put it before the first.
         while j + 1 < len(steps.starts) and steps.starts[j + 1] <= times[t]:
             j += 1
         row[t] = j
         h, mode = steps.lengths[j], steps.modes[j]
         passed = max(0.0, times[t] - steps.starts[j])
+        # State: by the polynomial of a leap, or by a series worked out once a step.
         if steps.leaps[j] >= 0:
             poly, whole = steps.polys[steps.leaps[j]], steps.reach[steps.leaps[j]]
             for i in range(len(state)):
@@ -392,6 +410,7 @@ def sample(shown, steps, times, nodes, plain, out, row, work):
                 series(shown.numbers, mode, steps.states[j], h, s)
                 known = j
             advance(s, shown.order, min(1.0, passed / h), state)
+        # Outputs.
         if plain:
             for r in range(nodes.shape[1]):
                 out[r, t] = state[nodes[mode, r]]

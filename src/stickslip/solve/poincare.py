@@ -236,7 +236,7 @@ def carry_tangents(linear, leap, pieces, after, tangents, work):
         Mode that follows the last piece.
     tangents : ndarray (K, N)
         Differences of the state, updated.
-    work : ndarray (9, N)
+    work : ndarray (8 or more, N)
         Scratch.
 
     Returns
@@ -251,11 +251,13 @@ def carry_tangents(linear, leap, pieces, after, tangents, work):
     least = 1.0
     scratch, end, begin, before, carried, fresh = work[:3], work[3], work[4], work[5], work[6], work[7]
     for j in range(modes.shape[0]):
+        # Piece: the mode is linear, so that a difference moves as the state does.
         mode, e = modes[j], exits[j]
         for k in range(tangents.shape[0]):
             follow(linear, mode, tangents[k], durations[j], scratch)
         if e < 0:
             continue
+        # Event: S and f = A S before it, S and f' behind it and the modes in which no time passes.
         following = modes[j + 1] if j + 1 < modes.shape[0] else after
         for i in range(n):
             end[i] = states[j, i]
@@ -263,6 +265,7 @@ def carry_tangents(linear, leap, pieces, after, tangents, work):
         multiply(reset[e], end, scratch[0])
         multiply(leap[target[e], following], scratch[0], begin)
         multiply(flow[mode], end, before)
+        # Graze: the derivative divides by q f.
         speed, size = 0.0, 0.0
         for i in range(n):
             term = series[e, 0, i] * before[i]
@@ -270,6 +273,7 @@ def carry_tangents(linear, leap, pieces, after, tangents, work):
             size += abs(term)
         if size > 0.0:
             least = min(least, abs(speed) / size)
+        # Saltation: R f and f', and the jump of each difference.
         multiply(reset[e], before, scratch[0])
         multiply(leap[target[e], following], scratch[0], carried)
         multiply(flow[following], begin, fresh)

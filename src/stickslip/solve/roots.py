@@ -77,8 +77,9 @@ def first_rise(c, noise, count, low, sign, start, limit):
     """First u in (start, limit] at which sign * polynomial rises through zero; else `NONE` or `UNSURE`.
 
     The polynomial starts at coefficient `low` (the zeros at the start divided out) and is negative at `start` once
-    multiplied by `sign`.
+    multiplied by `sign`. `c` and `noise` are (`count` or more,), in one unit; |u| <= 1.
     """
+    # a bound of |g'''| where |u| <= 1: the moduli of its terms there
     third = 0.0
     for k in range(low + 3, count):
         j = k - low
@@ -101,6 +102,7 @@ def first_rise(c, noise, count, low, sign, start, limit):
                 return NONE
             u = ahead
             continue
+        # clear to the end by the largest slope and curvature that are left
         if g + max(d, 0.0) * left + 0.5 * max(most, 0.0) * left * left < 0.0:
             return NONE
         step = _clear(g, d, most, left)
@@ -111,6 +113,7 @@ def first_rise(c, noise, count, low, sign, start, limit):
         if step >= left:
             end = sign * _curve(c, low, count, limit)[0]
             return limit if end >= 0.0 else NONE
+        # steps below rounding end at the root
         if step <= 4e-16 * max(u, 1e-3):
             return u if d > 0.0 else NONE
         u += step

@@ -201,11 +201,13 @@ def _turned(matrix, change, scale, both):
 
 @compiled(**OPTIONS)
 def grow(flow, change, time, both, term):
-    """Carry a state and its derivatives through a time within one cell: `both` is (1 + K, N), the state first."""
+    """Carry a state and its derivatives through a time [s] within one cell: `both` is (1 + K, N), the state first;
+    `flow` (N, N) and its derivatives `change` (K, N, N) are in 1/s; `term` (2, 1 + K, N) is scratch."""
     count, n = both.shape
     for p in range(count):
         for i in range(n):
             term[0, p, i] = both[p, i]
+    # term k of exp(A time) and its derivatives is term k - 1 turned by A and its derivatives
     for k in range(1, TERMS):
         _turned(flow, change, time / k, term)
         small = True
@@ -214,6 +216,7 @@ def grow(flow, change, time, both, term):
                 before = both[p, i]
                 both[p, i] += term[0, p, i]
                 small = small and both[p, i] == before
+        # as in `kernel.advance`: near rest an early term may be lost, and the next one not
         if small and k > 4:
             break
 
@@ -271,7 +274,7 @@ def carry_parameters(linear, changes, passing, pieces, signals, begun, later, wo
 
     `changes` are the derivatives of flow, exits' quantities, resets and leaps; `passing` whole cells and modes passed
     through at once; `signals` the entries that are set anew where each piece begins, and by what share of themselves
-    each parameter makes them larger.
+    each parameter makes them larger. `begun` is (n, K, N), `later` (n, K) [s a unit], `work` (4, 1 + K, N).
     """
     knotted, scaled = signals
     hops, leap = passing
@@ -281,11 +284,13 @@ def carry_parameters(linear, changes, passing, pieces, signals, begun, later, wo
     both, spare = work[0], work[3]
     for j in range(modes.shape[0] - 1):
         mode, e, following = modes[j], exits[j], modes[j + 1]
+        # Piece: state and derivatives to its end.
         for i in range(n):
             both[0, i] = states[j, i]
             for p in range(count):
                 both[1 + p, i] = begun[j, p, i]
         through(linear, flow, hops, mode, durations[j], work[:3])
+        # Event: the neighbour's exit comes later by `late`, by the formula at the top of this file.
         if e >= 0:
             multiply(linear.flow[mode], both[0], spare[0])
             speed = 0.0
@@ -311,6 +316,7 @@ def carry_parameters(linear, changes, passing, pieces, signals, begun, later, wo
                 multiply(linear.flow[following], states[j + 1], work[1, 1])
                 for i in range(n):
                     both[1 + p, i] += work[2, 1, i] - work[1, 1, i] * late
+        # Start of the next: signals set anew there do not remember what was carried.
         for p in range(count):
             for i in range(n):
                 begun[j + 1, p, i] = both[1 + p, i]
@@ -321,7 +327,8 @@ def carry_parameters(linear, changes, passing, pieces, signals, begun, later, wo
 @compiled(**OPTIONS)
 def series_of(linear, change, forms, used, series, work):
     """Taylor coefficients over a cell of a linear form of the state, as forms of the state where the cell begins, and
-    their derivatives: (M, DEGREE + 1, 1 + K, N), of the modes that are used."""
+    their derivatives: `series` (M, DEGREE + 1, 1 + K, N), of the modes that are used. `forms` are rows (M, N) and their
+    derivatives (K, M, N), `change` (K, M, N, N) those of the flows [1/s], `work` (2, 1 + K, N)."""
     rows, moved = forms
     _, degrees, count, n = series.shape
     for mode in range(series.shape[0]):
@@ -329,12 +336,14 @@ def series_of(linear, change, forms, used, series, work):
             continue
         cell = linear.cell[mode]
         unit = cell if cell < np.inf else 1.0
+        # by columns: what becomes of each entry alone, term by term, seen through the row
         for column in range(n):
             _only(column, work[0])
             for k in range(degrees):
                 for p in range(count):
                     total = 0.0
                     for i in range(n):
+                        # product rule: the row times the moved state, the moved row times the state
                         total += rows[mode, i] * work[0, p, i]
                         if p > 0:
                             total += moved[p - 1, mode, i] * work[0, 0, i]
@@ -344,7 +353,9 @@ def series_of(linear, change, forms, used, series, work):
 
 @compiled(**OPTIONS)
 def sample_tangents(linear, hops, series, pieces, times, out, work, c):
-    """Derivatives of a linear form of the state at increasing `times` [s], one polynomial of time for each cell."""
+    """Derivatives of a linear form of the state at increasing `times` (T,) [s], `out` (K, T), one polynomial of time
+    for each cell. `hops` is (M, 1 + K, N, N), `series` of :func:`series_of`, `work` (2, 1 + K, N), `c`
+    (DEGREE + 1, K)."""
     begin, modes, states, begun = pieces
     count, n, last = begun.shape[1], states.shape[1], begin.shape[0] - 1
     both = work[0]
@@ -362,6 +373,7 @@ def sample_tangents(linear, hops, series, pieces, times, out, work, c):
                     both[1 + p, i] = begun[j, p, i]
         mode = modes[j]
         cell = linear.cell[mode]
+        # where nothing turns one cell lasts for ever, and any unit of time serves
         unit = cell if cell < np.inf else 1.0
         time = times[t] - begin[j]
         # Cell: carried through those that are over, and its polynomials.

@@ -150,13 +150,14 @@ def surely_below(s, start, top, sign, level, u):
 
 @compiled(**EXACT)
 def length(s, order, big, tolerance):
-    """Step in units of h at which the last two terms of every entry are its tolerance."""
+    """Step in units of h at which the last two terms of every entry are its tolerance; `s` as in `Step`, `big` (N,)."""
     width = order + 1
     last, before = 0.0, 0.0
     for i in range(len(big)):
         j = i * width
         if not abs(s[j + order - 1]) + abs(s[j + order]) < math.inf:  # no number: a larger one would hide it
             return math.nan
+        # what begins at zero is measured by a thousandth of its first terms, too
         scale = max(big[i], 1e-3 * (abs(s[j + 1]) + abs(s[j + 2])))
         if scale > 0.0:
             inverse = 1.0 / scale
@@ -164,6 +165,7 @@ def length(s, order, big, tolerance):
             before = max(before, abs(s[j + order - 1]) * inverse)
     if not (last + before < math.inf):
         return math.nan
+    # both: one alone may vanish by parity; term n goes with the n-th power of the step
     grow = math.log(GROWTH)
     if last > 0.0:
         grow = min(grow, math.log(tolerance / last) / order)
@@ -248,15 +250,20 @@ def due(sums, exits, mode, h, big, step):
 
 @compiled(**EXACT)
 def rise(sums, exits, e, mode, h, u, big, step):
-    """When an exit ends the mode, in units of h, up to u; infinite where it does not, -1 where nothing is proved."""
+    """When an exit ends the mode, in units of h [s], up to u; infinite where it does not, -1 where nothing is proved.
+
+    `big` (N,) is what each entry of the state is measured by.
+    """
     s, c, noise, order = step.s, step.c, step.noise, step.order
     node, scale, size = exits.node[e], exits.factor[e], len(big)
     row, rates = len(sums.constant) - len(exits.node) + e, mode * size
     j, low = node * (order + 1), 0
     top = order if node < size else order - 1
     floor = _exit_noise(sums, row, rates, 0, h, big, step)
+    # Below: shown by the coefficients alone, at a fraction of the cost.
     if scale * s[j] < -floor and surely_below(s, j, top, scale, 0.0, u):
         return math.inf
+    # Tie: leading coefficients within their noise are zeros; the first that is not decides (rules of roots).
     while abs(scale * s[j + low]) <= floor:
         low += 1
         if low > top:
@@ -264,6 +271,7 @@ def rise(sums, exits, e, mode, h, u, big, step):
         floor = _exit_noise(sums, row, rates, low, h, big, step)
     if scale * s[j + low] > 0.0:
         return math.inf if exits.crossing[e] else 0.0
+    # Root: the first, in units of the step, the zeros at the start divided out.
     power = 1.0
     for k in range(top + 1):
         c[k] = scale * s[j + k] * power
