@@ -187,25 +187,34 @@ def free_decay(
 @compiled(**OPTIONS)
 def _rates(state, p, active, sine, branch, worn, out):
     """Rates of ``state = (u, u', du/dp_j, du'/dp_j, ...)``; `branch` holds A, h and their sensitivities, `worn` the
-    way slid before A and its."""
+    way slid before A and its.
+
+    With k = `active.size` parameters, state, branch and `out` are (2 + 2 k,), worn (1 + k,), `p` (WIDTH,), in s and
+    the record's unit of length.
+    """
     w, u, y = p[FREQUENCY], state[0], -state[1]
     square = w * w
+    # Terms: Stribeck's rise of friction towards rest; none where it has no speed.
     decay = math.exp(-y / p[SPEED]) if p[SPEED] > 0 else 0.0
+    # Masing: at half the way from the turning point; 0^(1 + p) by hand, as its logarithm is no number
     depth = 0.5 * (branch[0] - u)
     log = math.log(depth) if depth > 0 else 0.0
     power = math.exp((1 + p[EXPONENT]) * log) if depth > 0 else 0.0
     slope = p[SLIP] * (1 + p[EXPONENT]) * power / depth if depth > 0 else 0.0
     spring = (math.sin(u) if sine else u) + p[CURVATURE] * u**3 + branch[1] + 2 * p[SLIP] * power
+    # wear: friction goes with the way slid, and never drives
     first, slid = abs(p[AMPLITUDE]), worn[0] + branch[0] - u
     fresh = p[DRY] * (1 + p[RISE] * decay)
     grown = p[WEAR] / first if p[WEAR] != 0 else 0.0
     level = max(0.0, 1 + grown * slid)
     dry = fresh * level
     fade = level * p[DRY] * p[RISE] * decay / p[SPEED] if p[SPEED] > 0 else 0.0
+    # Slopes of u'' by u and by y; y = -u', so that the second counts with the other sign below.
     by_u = -square * ((math.cos(u) if sine else 1.0) + 3 * p[CURVATURE] * u * u - slope + fresh * grown)
     by_y = -square * fade + 2 * p[DAMPING] * w + 2 * p[QUADRATIC] * y
     out[0] = state[1]
     out[1] = square * (dry - spring) + 2 * p[DAMPING] * w * y + p[QUADRATIC] * y * y
+    # Sensitivities: by the parameter itself, then by A, h and the way slid, which the turns before have moved.
     for j in range(active.size):
         name = active[j]
         direct = 0.0
@@ -242,13 +251,16 @@ def _rates(state, p, active, sine, branch, worn, out):
 
 @compiled(**OPTIONS)
 def _advance(state, length, p, active, sine, branch, rates, work, out):
-    """One step of Gragg's rule, extrapolated; `rates` holds the rates at its beginning."""
+    """One step of Gragg's rule of `length` [s], extrapolated; `rates` holds the rates at its beginning, `work` is
+    (14, 2 + 2 k) as :func:`decay` parts it."""
     size = 2 + 2 * active.size
     rows = ROWS
     old, now, slopes = work[rows], work[rows + 1], work[rows + 2]
+    # Midpoint rule of 2, 4, 6, 8 steps: its error has even powers of the step alone.
     for row in range(rows):
         count = 2 * (row + 1)
         short = length / count
+        # the first step is Euler's: the midpoint rule needs two values
         for i in range(size):
             old[i] = state[i]
             now[i] = state[i] + short * rates[i]
@@ -260,6 +272,7 @@ def _advance(state, length, p, active, sine, branch, rates, work, out):
                 now[i] = next_
         for i in range(size):
             work[row, i] = now[i]
+    # Extrapolation (Aitken and Neville) in the step's square: each level gains two orders.
     for level in range(1, rows):
         for row in range(rows - 1, level - 1, -1):
             ratio = ((row + 1) / (row + 1 - level)) ** 2
@@ -307,13 +320,16 @@ def _rest(sample, p, active, side, branch, x, jacobian):
 
 @compiled(**OPTIONS)
 def _first_branch(p, active, side, branch, worn, moved):
-    """The branch from the first turning point, on the virgin backbone, and how its beginning moves."""
+    """The branch from the first turning point, on the virgin backbone, and how its beginning `moved` (k,) by each
+    parameter [s a unit]; the other arrays as in :func:`_rates`."""
     amplitude = abs(p[AMPLITUDE])
     log = math.log(amplitude) if amplitude > 0 else 0.0
     power = math.exp((1 + p[EXPONENT]) * log) if amplitude > 0 else 0.0
+    # virgin backbone x - kappa x^(1 + p): h = -kappa A^(1 + p)
     branch[0], branch[1], worn[0] = amplitude, -p[SLIP] * power, 0.0
     for j in range(active.size):
         name = active[j]
+        # A = side * amplitude, h by amplitude, kappa and p; nothing was slid before
         branch[2 + 2 * j] = side if name == AMPLITUDE else 0.0
         branch[3 + 2 * j] = worn[1 + j] = 0.0
         if name == SLIP:
@@ -327,12 +343,15 @@ def _first_branch(p, active, side, branch, worn, moved):
 
 @compiled(**OPTIONS)
 def _next_branch(p, active, branch, worn, state, rates, moved):
-    """The branch from the turning point that was reached, and how its beginning moves."""
+    """The branch from the turning point that was reached, and how its beginning moves; arrays as in
+    :func:`_first_branch`."""
     depth = 0.5 * (branch[0] - state[0])
     log = math.log(depth) if depth > 0 else 0.0
     power = math.exp((1 + p[EXPONENT]) * log) if depth > 0 else 0.0
     slope = p[SLIP] * (1 + p[EXPONENT]) * power / depth if depth > 0 else 0.0
+    # Sensitivities first: they need A and h of the branch before.
     for j in range(active.size):
+        # u' = 0 at the turn: it comes later by -(du'/dp) / u''; A itself does not change by that, being an extreme
         if rates[1] > 0:
             moved[j] -= state[3 + 2 * j] / rates[1]
         change = slope * (branch[2 + 2 * j] - state[2 + 2 * j])
@@ -343,6 +362,7 @@ def _next_branch(p, active, branch, worn, state, rates, moved):
         branch[3 + 2 * j] = -branch[3 + 2 * j] - change
         worn[1 + j] += branch[2 + 2 * j] - state[2 + 2 * j]
         branch[2 + 2 * j] = -state[2 + 2 * j]
+    # u changes its sign with the direction, and so does h, less what this branch took
     branch[1] = -branch[1] - 2 * p[SLIP] * power
     worn[0] += branch[0] - state[0]
     branch[0] = -state[0]
@@ -401,7 +421,8 @@ def _leaves(p, sine, most, branch, way):
 def decay(times, p, active, sine, most, work, x, jacobian):
     """Fill `x` (n,) and `jacobian` (n, active.size) at rising `times`; return the number of half cycles begun.
 
-    `most` half cycles at the most, -1 for as many as the dry friction lets it make; `work` is (14, 2 + 2 active).
+    `most` half cycles at the most, -1 for as many as the dry friction lets it make; `work` is (14, 2 + 2 active), `p`
+    (WIDTH,), times in s.
     """
     count, size = times.size, 2 + 2 * active.size
     branch, state, rates, end, end_rates, moved = work[7], work[8], work[9], work[10], work[11], work[12]
@@ -409,9 +430,11 @@ def decay(times, p, active, sine, most, work, x, jacobian):
     side = 1.0 if p[AMPLITUDE] >= 0 else -1.0
     start, sample, half_cycles = p[RELEASE], 0, 0
     _first_branch(p, active, side, branch, worn, moved)
+    # Hold: until the release.
     while sample < count and times[sample] <= start:
         _rest(sample, p, active, side, branch, x, jacobian)
         sample += 1
+    # Half cycle: from a turning point that the mass leaves, step by step onto the next.
     while sample < count and half_cycles != most and _leaves(p, sine, most, branch, worn[0]):
         half_cycles += 1
         for i in range(size):
@@ -422,6 +445,7 @@ def decay(times, p, active, sine, most, work, x, jacobian):
         turned = False
         while sample < count and not turned:
             length, turned = _step(p, active, sine, work)
+            # samples of the step, on its quintic
             while sample < count and times[sample] <= start + length:
                 _read(sample, (times[sample] - start) / length, length, p, active, side, work, x, jacobian)
                 sample += 1

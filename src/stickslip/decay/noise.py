@@ -41,7 +41,7 @@ KINDS = ("white", "quantised", "coloured")
 Objective = Callable[[Array], tuple[float, Array, Array]]
 
 CLOSE = 1e-4  # what minus twice the log likelihood may still fall
-STEPS = 60
+STEPS = 60  # at most, of a fit or onto an end
 LEAP = 10.0  # times what lies between best and level: a step that goes so far beyond it is halved
 PATIENCE = 10  # steps after which an end should be near
 
@@ -240,7 +240,8 @@ def add_counts(
 ) -> float:
     """Minus twice the log likelihood of counts; half its slope and curvature (7), the last for the noise's logarithm.
 
-    log(Phi(b) - Phi(a)) is concave in (a, b), so the curvature is positive.
+    log(Phi(b) - Phi(a)) is concave in (a, b), so the curvature is positive. `values` and `counts` are (n,), `jacobian`
+    (6, n), `slope` (7,), `curvature` (7, 7); `step` and `level`, the noise, are in the counts' unit.
     """
     total = 0.0
     for k in range(7):
@@ -251,15 +252,18 @@ def add_counts(
         a, b = (counts[i] - 0.5 * step - values[i]) / level, (counts[i] + 0.5 * step - values[i]) / level
         if a < -SURE and b > SURE:
             continue
+        # Mirror: a + b >= 0, so that a is the nearer end, and the density there the larger one.
         side = 1.0
         if a + b < 0.0:
             a, b, side = -b, -a, -1.0
+        # Probability over the density at a: by Mills's ratio in the tail, where both alone would underflow.
         fade = math.exp(-0.5 * (b - a) * (b + a))
         if a >= 0.0:
             share = mills(a) - fade * mills(b)
         else:
             density = math.exp(-0.5 * a * a) / math.sqrt(2.0 * math.pi)
             share = 0.5 * (math.erf(b / math.sqrt(2.0)) - math.erf(a / math.sqrt(2.0))) / max(density, 1e-300)
+        # Densities at a and b over the probability: slopes of its logarithm; minus its second derivatives.
         low = 1.0 / share
         high = fade * low
         total += a * a + math.log(2.0 * math.pi) - 2.0 * math.log(share)
@@ -289,12 +293,14 @@ def restricted(residual: Array, jacobian: Array, tones: Array, corner: float, wo
 
     Parameters
     ----------
-    left : ndarray (n,)
+    residual : ndarray (n,)
         Cosine transform of the residual.
     jacobian : ndarray (6, n)
         That of the motion's derivatives.
     tones : ndarray (n,)
         Frequencies [Hz].
+    corner : float
+        Frequency [Hz] below which the drift outweighs the white noise.
     work : ndarray (3, 6, 6)
         Scratch.
     """
@@ -304,6 +310,7 @@ def restricted(residual: Array, jacobian: Array, tones: Array, corner: float, wo
         for k in range(6):
             curvature[j, k] = 0.0
     squares, power = 0.0, 0.0
+    # Weigh: at s = 1 the cosines are independent, of power 1 + corner / f.
     for i in range(residual.shape[0]):
         here = 1.0 + corner / tones[i]
         power += math.log(here)
@@ -316,10 +323,12 @@ def restricted(residual: Array, jacobian: Array, tones: Array, corner: float, wo
     for j in range(6):
         for k in range(j):
             curvature[k, j] = curvature[j, k]
+    # Best fit: what Gauss and Newton's step leaves; s^2 is its share of n - 6 degrees of freedom.
     freedom = residual.shape[0] - 6
     if cholesky(curvature, slope, step, factor, 1e-13):
         for j in range(6):
             squares -= slope[j] * step[j]
+    # the profile over s; log det J'J is what REML adds for the six parameters
     squares /= freedom
     return freedom * math.log(squares) + power + log_determinant(curvature, factor), squares
 

@@ -16,7 +16,7 @@ import math
 from stickslip.compiled import FAST, compiled
 from stickslip.decay.waveform import AMPLITUDE, DAMPING, DRY, RATE, RELEASE, normal_equations
 
-STEPS = 60
+STEPS = 60  # at most, of a fit or onto an end
 CLOSE = 1e-5  # of the variance: what the sum of squares may still fall
 STEEPEST = 0.9  # damping ratio
 WORSE = 20.0  # variances by which another number of half cycles may fit worse and still count
@@ -24,8 +24,10 @@ WORSE = 20.0  # variances by which another number of half cycles may fit worse a
 
 @compiled(**FAST)
 def solve(matrix, right, answer, factor, extra):
-    """Solve (matrix + extra diag(matrix)) answer = right by Cholesky of the matrix scaled to a unit diagonal."""
+    """Solve (matrix + extra diag(matrix)) answer = right by Cholesky of the matrix scaled to a unit diagonal; whether
+    it could. `matrix` and `factor` are (n, n), `right` and `answer` (n,)."""
     n = right.shape[0]
+    # Factor L L': scaled, as the parameters have units of their own; a pivot of rounding tells a singular matrix.
     for j in range(n):
         for k in range(j + 1):
             total = matrix[j, k] / math.sqrt(matrix[j, j] * matrix[k, k])
@@ -39,11 +41,13 @@ def solve(matrix, right, answer, factor, extra):
                 factor[j, j] = math.sqrt(total)
             else:
                 factor[j, k] = total / factor[k, k]
+    # Substitute: L y = right, L' x = y, and the scale taken back.
     for j in range(n):
         total = right[j] / math.sqrt(matrix[j, j])
         for i in range(j):
             total -= factor[j, i] * answer[i]
         answer[j] = total / factor[j, j]
+    # back, from the last
     for j in range(n - 1, -1, -1):
         total = answer[j]
         for i in range(j + 1, n):
@@ -95,7 +99,7 @@ def _possible(p, before):
 def minimise(p, n, blocks, hessian, gradient, work):
     """Least squares by Levenberg and Marquardt from `p`, which becomes the answer; the sum of squares, or infinity.
 
-    `hessian` is left as J'J there. `work` is (8, 7, 6).
+    `hessian` (6, 6) is left as J'J there, `gradient` (6,) as J'r; `p` is (6,), `work` (8, 7, 6).
     """
     step, trial, factor = work[3, 0], work[3, 1], work[4]
     other, slope, scratch = work[5, :6], work[6, 0], work[:3]
@@ -103,21 +107,25 @@ def minimise(p, n, blocks, hessian, gradient, work):
     squares = normal_equations(p, n, blocks, hessian, gradient, scratch)
     extra = 0.0
     for _ in range(STEPS):
+        # Step: damped where the normal equations are singular.
         if not solve(hessian, gradient, step, factor, extra):
             extra = max(10.0 * extra, 1e-6)
             if extra > 1e6:
                 return math.inf
             continue
+        # Judge: by what the quadratic foretells that the sum of squares falls.
         fall = 0.0
         for k in range(6):
             fall += step[k] * gradient[k]
         moved(p, step, 1.0, trial)
         if _possible(trial, p):
+            # done: the last step is taken on the word of the quadratic
             if fall <= CLOSE * squares / freedom:
                 for k in range(6):
                     p[k] = trial[k]
                 return squares - fall
             now = normal_equations(trial, n, blocks, other, slope, scratch)
+            # better: taken, with less damping; none where it was small, as Gauss and Newton's step converges fastest
             if now < squares:
                 squares = now
                 for k in range(6):
@@ -126,6 +134,7 @@ def minimise(p, n, blocks, hessian, gradient, work):
                         hessian[k, j] = other[k, j]
                 extra = 0.0 if extra < 1e-3 else 0.1 * extra
                 continue
+        # Worse, or no oscillation: a shorter step, nearer the steepest descent.
         extra = max(4.0 * extra, 1e-3)
         if extra > 1e8:
             return squares
@@ -134,21 +143,28 @@ def minimise(p, n, blocks, hessian, gradient, work):
 
 @compiled(**FAST)
 def extreme(p, n, which, side, level, least, blocks, hessian, gradient, work):
-    """Carry `p` to the extreme (`side` +1, -1) of one parameter where the sum of squares is `level`; whether it did."""
+    """Carry `p` (6,) to the extreme (`side` +1, -1) of one parameter where the sum of squares is `level`; whether it
+    did.
+
+    `least` is the sum of squares at the best fit; `hessian` (6, 6), `gradient` (6,) and `work` (8, 7, 6) are scratch.
+    """
     step, across, factor, aim = work[3, 0], work[3, 1], work[4], work[3, 2]
     for k in range(6):
         aim[k] = 0.0
     aim[which] = 1.0
     for _ in range(STEPS):
+        # Quadratic about p: the step to its minimum, and u = H^-1 e_j.
         squares = normal_equations(p, n, blocks, hessian, gradient, work[:3])
         if not solve(hessian, gradient, step, factor, 0.0) or not solve(hessian, aim, across, factor, 0.0):
             return False
         fall = 0.0
         for k in range(6):
             fall += step[k] * gradient[k]
+        # Reach: what its minimum leaves up to the level, as far as u carries; nothing where it lies above.
         room = max(level - squares + fall, 0.0)
         reach = side * math.sqrt(room / across[which])
         whole = math.sqrt((level - least) * across[which])
+        # Step: two half widths of the interval at the most, as far as a quadratic may be trusted.
         move, share = 0.0, 1.0
         for k in range(6):
             step[k] += reach * across[k]
@@ -167,11 +183,13 @@ def extreme(p, n, which, side, level, least, blocks, hessian, gradient, work):
 def over_half_cycles(start, first, blocks, fits, work):
     """Fit every number of half cycles that may be, from `first` on upwards and downwards; how many were kept.
 
-    A row of `fits` (rows, 9) holds n, the sum of squares, the log determinant of J'J, and the parameters.
+    A row of `fits` (rows, 9) holds n, the sum of squares, the log determinant of J'J, and the parameters. `start` is
+    (6,), `work` (10, 7, 6).
     """
     hessian, gradient, p = work[8, :6], work[9, 0], work[9, 1]
     kept, best, rows = 0, math.inf, fits.shape[0]
     worse = 1.0 + WORSE / max(1.0, blocks.total / blocks.size - 6.0)
+    # Upwards from the start, then downwards from the first fit kept: the answer of one number begins the next.
     for direction in (1, -1):
         for k in range(6):
             p[k] = start[k] if direction == 1 or kept == 0 else fits[0, 3 + k]
@@ -180,8 +198,10 @@ def over_half_cycles(start, first, blocks, fits, work):
         while n >= 1 and kept < rows and bad < 2:
             squares = minimise(p, n, blocks, hessian, gradient, work[:8])
             limit = best * worse
+            # a last swing shorter than nothing is none, nor is any after it
             possible = last_swing(p, n)[0] > 0.0
             if possible and squares < math.inf and squares <= limit:
+                # a new best may put earlier ones out of reach
                 if squares < best:
                     best = squares
                     kept = _keep(fits, kept, best * worse)
@@ -191,7 +211,9 @@ def over_half_cycles(start, first, blocks, fits, work):
                 kept += 1
                 bad = 0
             else:
+                # given up after two misses in a row, once something was kept
                 bad += 2 if direction == 1 and not possible else 1 if kept > 0 else 0
+            # half cycles after the end of the record show in no sample
             half = math.pi / (p[RATE] * math.sqrt(1.0 - p[DAMPING] ** 2))
             if direction == 1 and p[RELEASE] + n * half > blocks.total * blocks.dt:
                 break
@@ -233,7 +255,8 @@ def log_determinant(matrix, factor):
 def intervals(fits, kept, level, blocks, ends, work):
     """Ends (6, 2) of the profile likelihood of each parameter, by the best number of half cycles at each end.
 
-    Returns how many ends were not found; they are left at the edge of the quadratic.
+    Returns how many ends were not found; they are left at the edge of the quadratic. `fits` is (rows, 9) as
+    :func:`over_half_cycles` leaves it, the first `kept` rows; `level` a sum of squares; `work` (10, 7, 6).
     """
     hessian, gradient, p = work[8, :6], work[9, 0], work[9, 1]
     missed = 0
@@ -241,6 +264,7 @@ def intervals(fits, kept, level, blocks, ends, work):
         for e in range(2):
             side = 2.0 * e - 1.0
             ends[which, e] = -side * math.inf
+            # every number of half cycles below the level has ends of its own: the outermost are the answer
             for row in range(kept):
                 if fits[row, 1] >= level:
                     continue

@@ -24,7 +24,7 @@ from stickslip.statistics import student
 
 BLOCKS = 40  # a period; the variance of the answer rises by 0.3 % of itself
 FIRST_SWINGS = 0.25  # of the range: what counts as a swing before the noise is averaged
-LATER_SWINGS = 0.05
+LATER_SWINGS = 0.05  # the same of block means, where it is
 NOISES = 12.0  # standard deviations of the noise that a swing is larger than
 
 NO_TURNS: Rows = np.empty(0, dtype=np.intp)
@@ -123,13 +123,15 @@ def linear_step(p, n, blocks, hessian, gradient, work):
 def guess(blocks, turns, rows, times, p, work):
     """First parameters of the motion in `p`; its number of half cycles, 0 where fewer than two are seen.
 
-    It turns where the block means do, or at the blocks `turns` where noise hides some of these.
+    It turns where the block means do, or at the blocks `turns` where noise hides some of these. `p` is (6,); `rows` and
+    `times` (as many as turns are looked for) and `work` (10, 7, 6) are scratch.
     """
     means, size, _, dt, order = blocks
     low, high = means[0], means[0]
     for j in range(means.shape[0]):
         low, high = min(low, means[j]), max(high, means[j])
     hessian, gradient, trial = work[8, :6], work[9, 0], work[9, 1]
+    # Period: spacing of the passages between turns, whatever the damping.
     count = turning_points(means, max(LATER_SWINGS * (high - low), NOISES * roughness(means)), rows)
     if turns.shape[0] > count:
         count, rows = turns.shape[0], turns
@@ -139,6 +141,7 @@ def guess(blocks, turns, rows, times, p, work):
         return 0
     best, likeliest, step = math.inf, 0, size * dt
     half = spacing * step
+    # Trials: release and damping on a grid; dry friction, rest and amplitude enter linearly and are solved for.
     for shift in range(-4, 5 if order == 0 else 9, 4 if order == 0 else 1):  # quarters of a half period, backwards
         release = (first + 0.5) * step - (0.5 + 0.25 * shift) * half - 0.5 * dt
         for damping in (0.001, 0.01, 0.03, 0.08, 0.2):

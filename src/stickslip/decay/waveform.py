@@ -90,20 +90,24 @@ def fall(p, state, advance):
 def describe(p, n, order, piece, count, dt, state, rows):
     """Rows of the five functions that make the mean over `count` samples, and its derivatives, in a piece.
 
-    Piece -1 is the hold, 0 to n - 1 are the half cycles, n is the rest.
+    Piece -1 is the hold, 0 to n - 1 are the half cycles, n is the rest. `p` is (6,), `state` (4,) as :func:`fall`
+    leaves it, `rows` (7, 5 or more): a parameter each and the value, by 1, Re z, Im z, tau Re z, tau Im z; `dt` in s.
     """
     for k in range(7):
         for j in range(5):
             rows[k, j] = 0.0
+    # in every piece; of a velocity or an acceleration it is the zero of the sensor
     rows[REST, 0] = 1.0
     rows[VALUE, 0] = p[REST]
     side = 1.0 if p[AMPLITUDE] >= 0.0 else -1.0
+    # Hold: at the amplitude, not moving.
     if piece < 0:
         if order == 0:
             rows[AMPLITUDE, 0] = 1.0
             rows[VALUE, 0] += p[AMPLITUDE]
         return
     sign = side if piece % 2 == 0 else -side
+    # Rest: where the last half cycle ended, b + s_n (d_n + x_k).
     if piece >= n:
         if order == 0:
             rows[DAMPING, 0] = sign * state[1]
@@ -111,6 +115,7 @@ def describe(p, n, order, piece, count, dt, state, rows):
             rows[AMPLITUDE, 0] = sign * side * state[3]
             rows[VALUE, 0] += sign * (state[0] + p[DRY])
         return
+    # Half cycle: rate lam by w and zeta, and how much later half cycle i begins.
     w, zeta = p[RATE], p[DAMPING]
     square = 1.0 - zeta * zeta
     root = math.sqrt(square)
@@ -119,6 +124,7 @@ def describe(p, n, order, piece, count, dt, state, rows):
     half = math.pi / (w * root)
     late_zeta, late_w = piece * half * zeta / square, -piece * half / w
     c, c_zeta = complex(1.0, -zeta / root), complex(0.0, -1.0 / (square * root))
+    # block mean sinh(m q / 2) / (m sinh(q / 2)) to fourth order: of a fortieth of a period 5e-11 is left
     q = lam * dt
     first, second = (count * count - 1.0) / 24.0, (count * count - 1.0) * (3.0 * count * count - 7.0) / 5760.0
     mean = 1.0 + q * q * (first + q * q * second)
@@ -129,6 +135,7 @@ def describe(p, n, order, piece, count, dt, state, rows):
         power, power_lam = lam, complex(1.0, 0.0)
     else:
         power, power_lam = lam * lam, 2.0 * lam
+    # Product rule: through d_i, through lam in the factor, through lam in z (tau times it), through the beginning.
     a = c * power * mean
     a_lam = c * (power_lam * mean + power * mean_lam)
     d = sign * state[0]
@@ -180,6 +187,7 @@ def normal_equations(p, n, blocks, hessian, gradient, work):
     """Sum of squares of data minus model over the blocks, J'J in `hessian` (6, 6) and J'r in `gradient` (6).
 
     An acceleration jumps at every turning point. The blocks that hold one are left out, and the others count for them.
+    Residual and J are in the data's unit over those of the parameters.
 
     Parameters
     ----------
@@ -204,10 +212,12 @@ def normal_equations(p, n, blocks, hessian, gradient, work):
     fall(p, state, False)
     i = 0
     for piece in range(-1, n + 1):
+        # Piece: d_i is carried on from the one before; it ends where the next one's first sample is.
         if piece > 0:
             fall(p, state, True)
         stop = total if piece == n else first_sample(p[RELEASE] + (piece + 1) * half, dt, total)
         begin = p[RELEASE] + piece * half
+        # acceleration: from behind the block of this turn to before that of the next
         if order == 2:
             i = min(total, max(i, (block_of(begin, dt, size) + 1) * size)) if piece >= 0 else 0
             stop = stop if piece == n else min(total, block_of(begin + half, dt, size) * size)
@@ -232,6 +242,7 @@ def normal_equations(p, n, blocks, hessian, gradient, work):
             if i % size == 0 or i == total:
                 squares += _add_block(means[(i - 1) // size], mean, counted / size, pending, hessian, gradient)
                 mean, counted = 0.0, 0
+    # the blocks left out count as the others do; below the diagonal alone was summed
     share = total / used if order == 2 and used > 0 else 1.0
     for j in range(6):
         gradient[j] *= share
@@ -274,11 +285,18 @@ def _add_block(measured, mean, filled, pending, hessian, gradient):
 
 @compiled(**FAST)
 def _add_blocks(rows, means, z, turn, tau, step, hessian, gradient, mixed):
-    """Add the whole blocks of one piece, by the products of the five functions."""
+    """Add the whole blocks of one piece, by the products of the five functions; their sum of squares.
+
+    `rows` is (7, 5 or more) of :func:`describe`, `means` (b,) the data; z and `tau` [s] are those of the first centre,
+    `turn` and `step` [s] lead from one to the next. `hessian` (6, 6) takes its lower half, `mixed` (6, 5 or more) is
+    scratch.
+    """
+    # the value itself has no part in tau
     v0, v1, v2 = rows[6, 0], rows[6, 1], rows[6, 2]
     squares, r0, r1, r2, r3, r4 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     g01, g02, g03, g04, g11, g12, g13, g14 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     g22, g23, g24, g33, g34, g44 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    # Sums over the blocks, of residual and functions: the parameters come in once, not block by block.
     for j in range(means.shape[0]):
         c, s = z.real, z.imag
         tc, ts = tau * c, tau * s
@@ -303,8 +321,10 @@ def _add_blocks(rows, means, z, turn, tau, step, hessian, gradient, mixed):
         g33 += tc * tc
         g34 += tc * ts
         g44 += ts * ts
+        # a product for a cosine and a sine, at one rounding a block
         z *= turn
         tau += step
+    # Gram matrix G of the five functions.
     gram = (
         (float(means.shape[0]), g01, g02, g03, g04),
         (g01, g11, g12, g13, g14),
@@ -312,6 +332,7 @@ def _add_blocks(rows, means, z, turn, tau, step, hessian, gradient, mixed):
         (g03, g13, g23, g33, g34),
         (g04, g14, g24, g34, g44),
     )
+    # J'r = rows r, and J'J = rows G rows'.
     for k in range(6):
         gradient[k] += rows[k, 0] * r0 + rows[k, 1] * r1 + rows[k, 2] * r2 + rows[k, 3] * r3 + rows[k, 4] * r4
         for j in range(5):
@@ -332,7 +353,8 @@ def _add_blocks(rows, means, z, turn, tau, step, hessian, gradient, mixed):
 
 @compiled(**FAST)
 def sample_motion(p, n, blocks, values, jacobian, work):
-    """The model's block means, `values` (blocks,), and their derivatives, `jacobian` (6, blocks)."""
+    """The model's block means, `values` (blocks,), and their derivatives, `jacobian` (6, blocks); `p` is (6,), `work`
+    (3, 7, 6) scratch."""
     _, size, total, dt, order = blocks
     rows, state = work[0], work[1, 0]
     for j in range(values.shape[0]):
@@ -344,6 +366,7 @@ def sample_motion(p, n, blocks, values, jacobian, work):
     fall(p, state, False)
     i = 0
     for piece in range(-1, n + 1):
+        # Piece: as in the normal equations, but no block is left out.
         if piece > 0:
             fall(p, state, True)
         stop = total if piece == n else first_sample(p[RELEASE] + (piece + 1) * half, dt, total)
@@ -352,6 +375,7 @@ def sample_motion(p, n, blocks, values, jacobian, work):
         while i < stop:
             count = min(stop - i, size - i % size)
             tau = (i + 0.5 * (count - 1)) * dt - begin
+            # z by a product while whole blocks follow one another; anew where a part of a block comes between
             if piece < 0 or piece >= n:
                 z = complex(1.0, 0.0)
             else:
@@ -359,9 +383,11 @@ def sample_motion(p, n, blocks, values, jacobian, work):
             if count != described:
                 describe(p, n, order, piece, count, dt, state, rows)
                 described = count
+            # a block across a turning point is the mean of its parts, by their samples
             block = i // size
             share = count / min(size, total - block * size)
             basis = (1.0, z.real, z.imag, tau * z.real, tau * z.imag)
+            # as in `_add_part`, with a column for each block
             for j in range(5):
                 values[block] += share * rows[VALUE, j] * basis[j]
                 for k in range(6):
