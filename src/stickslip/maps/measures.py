@@ -149,19 +149,23 @@ def own_name(measure: Callable[..., float]) -> str:
 @compiled(**OPTIONS)
 def note(kind, side, begin, length, path, speed, sums):
     """Add one piece: its kind and side, when it begins [s] after the measured time does, how long it lasts, how far
-    the contact slips in it [m], and how fast at its start [m/s]."""
+    the contact slips in it [m], and how fast at its start [m/s]. `sums` is (ENTRIES,)."""
     counted = begin >= 0.0
+    # Slip: it tells what the stop before it was, or goes on, or turns without a stop.
     if kind == SLIP:
         if sums[STOPPED] > 0.0:
+            # normal (thesis): it turns back; abnormal: it goes on the same way; unknown before the first slip
             if counted and sums[SIDE] != 0.0:
                 sums[NORMAL if sums[SIDE] * side < 0.0 else ABNORMAL] += 1.0
             if counted and sums[MICRO] > 0.0:
                 sums[FASTEST] = max(sums[FASTEST], speed)
+        # turned without a stop: a new slip all the same
         elif sums[SIDE] * side < 0.0:
             _end_slip(counted, sums)
         sums[SIDE], sums[STOPPED], sums[MICRO] = side, 0.0, 0.0
         sums[UNDERWAY] += path
         return
+    # Stick: the first piece of a stop ends the slip; a stop may consist of several.
     if sums[STOPPED] == 0.0:
         _end_slip(counted, sums)
     sums[STOPPED], sums[MICRO] = 1.0, 1.0 if kind == MICROSTICK else 0.0

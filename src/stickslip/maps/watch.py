@@ -127,9 +127,11 @@ class Motion(NamedTuple):
 
 @compiled(**OPTIONS)
 def model_of(models, j):
-    """One of many systems, as :func:`stickslip.solve.kernel.march` reads it."""
+    """One of many systems, as :func:`stickslip.solve.kernel.march` reads it; what is shared has no leading axis."""
     linear, fast = models.linear, models.fast
+    # nodes of all systems stand one after another, as many as each needs
     nodes = fast.nodes[fast.span[j, 0] : fast.span[j, 1]]
+    # column by column: compiled code has no loop over the fields of a tuple
     return Model(
         Linear(
             linear.flow[j],
@@ -155,7 +157,11 @@ def past_of(pasts, i):
 
 @compiled(**OPTIONS)
 def watch_one(i, s, given, out, rooms):
-    """March motion i with scratch s, and leave its status, what is counted, and its last states at phase zero."""
+    """March motion i with scratch s, and leave its status, what is counted, and its last states at phase zero.
+
+    Of `out` with a leading axis: `sums` (ENTRIES,), `sections` (rows, physical), `jacobians` (physical, physical); of
+    `rooms`: `works` (17, N or more), `tangents` (physical, N), `marks` (4, MARK + 1 + N or more).
+    """
     n, physical, wants = given.states.shape[1], out.sections.shape[2], given.wants
     room, marks, tangents = rooms.pieces, rooms.marks[s], rooms.tangents[s]
     pieces = Pieces(room.laps[s], room.offsets[s], room.modes[s], room.durations[s], room.states[s], room.exits[s])
@@ -164,11 +170,13 @@ def watch_one(i, s, given, out, rooms):
     settled, total, rows = wants[SETTLE], wants[SETTLE] + wants[CYCLES], out.sections.shape[1]
     growing, driven = wants[GROWTH] == 1, math.isfinite(model.period)
     mode, clock = _begin(motion, given.states[i], given.modes[i], total), Clock(0.0, 0.0, 0.0)
+    # Start: a small difference with a part along each entry, lest it miss the direction that grows.
     tangent = tangents[:1]
     for k in range(n):
         tangent[0, k] = (1.0 - 0.5 * k / max(1, physical - 1)) / given.weights[i, k] if k < physical else 0.0
     out.growths[i] = 0.0
     _unmarked(marks, math.ceil(total / PARTS) if driven and not growing else 0.0)
+    # Laps: at once as far as no state at phase zero is wanted, then one by one; exponents need each.
     lap, last, lasted = 0, 0, 0.0
     while lap < total and mode >= 0:
         until = total - max(0, rows - 1)
@@ -181,6 +189,7 @@ def watch_one(i, s, given, out, rooms):
         if lap > total - rows:
             for k in range(physical):
                 out.sections[i, lap - (total - rows) - 1, k] = state[k]
+    # Rest: held through a whole lap, or without a drive where nothing changes.
     if driven:
         rests = given.look.still[last] and lasted >= (1.0 - 1e-9) * model.period
     else:
@@ -206,8 +215,9 @@ def _begin(motion, opened, mode, total):
 @compiled(**OPTIONS)
 def _to(i, lap, until, motion, mode, clock, given, tangent, sums):
     """March to a lap and count; the mode there (-1: the march failed), that of the last piece, how long it lasted
-    where nothing ended it, and the clock."""
+    where nothing ended it, and the clock. `tangent` is (1, N), `sums` (ENTRIES,)."""
     model, pieces, marks, settled = motion.model, motion.pieces, motion.marks, given.wants[SETTLE]
+    # without a period a lap is a unit of time, and the clock has none
     limit = Clock(float(until), 0.0, 0.0) if math.isfinite(model.period) else Clock(0.0, until * motion.unit, 0.0)
     outcome, events, last, lasted = FULL, 0.0, mode, 0.0
     while outcome == FULL:
@@ -217,10 +227,12 @@ def _to(i, lap, until, motion, mode, clock, given, tangent, sums):
         events += _events(pieces.modes, count, given.look)
         if outcome != FULL and outcome != DONE:
             return -1, last, 0.0, clock
+        # failed: outgrown the numbers, or more events than a motion has (chatter)
         if not math.isfinite(motion.state[0]) or events > BUDGET * (until - lap):
             return -1, last, 0.0, clock
         if count > 0:
             last, lasted = pieces.modes[count - 1], pieces.durations[count - 1] if pieces.exits[count - 1] < 0 else 0.0
+        # count, then use the room again: what is asked must be had from the pieces now
         _count(i, count, motion, clock, settled, given, sums)
         if marks[0, SPAN] > 0.0 and outcome == FULL:
             clock = _skip(clock, marks, settled, until, sums)
@@ -338,7 +350,8 @@ def _read(row, state, tones, time):
 
 @compiled(**OPTIONS)
 def _count(i, count, motion, clock, settled, given, sums):
-    """Count the pieces just written."""
+    """Count the pieces just written, `count` of them, into `sums` (ENTRIES,); rows 6 to 11 of the march's work are free
+    between two calls."""
     linear, period, state = motion.model.linear, motion.model.period, motion.state
     unit, pieces = motion.unit, motion.pieces
     look, paths, one = given.look, given.wants[PATHS] == 1, given.wants[ONE]
@@ -349,16 +362,20 @@ def _count(i, count, motion, clock, settled, given, sums):
     place, after, speed = _read(look.gap[i], pieces.states[0], tones, pieces.offsets[0]) if paths else 0.0, 0.0, 0.0
     for p in range(count):
         m, length, lap, offset = pieces.modes[p], pieces.durations[p], pieces.laps[p], pieces.offsets[p]
+        # Mark: at the first event of the lap that is due.
         if lap >= motion.marks[0, NEXT]:
             _mark(lap, offset / period, m, pieces.states[p], tones, settled, sums, motion.marks)
         begun = (lap - settled) * period + offset if math.isfinite(period) else offset - settled * unit
+        # Path: from where this piece begins to where the next one does, measured from the counter-face.
         last = p == count - 1
         x = state[0] if last else pieces.states[p + 1, 0]
         if paths:
             follows, then = (state, clock.time) if last else (pieces.states[p + 1], pieces.offsets[p + 1])
             after = _read(look.gap[i], follows, tones, then)
             speed = abs(_read(look.slip[i], pieces.states[p], tones, offset)) if look.kinds[m] == SLIP else 0.0
+        # Note: events and durations.
         note(look.kinds[m], look.sides[m], begun, length, abs(after - place), speed, sums)
+        # Measured time: a piece that began before it counts from its beginning on.
         if begun + length > 0.0:
             first, span = begun >= 0.0, min(length, begun + length)
             varies = look.works[m] == VARIES
@@ -370,6 +387,7 @@ def _count(i, count, motion, clock, settled, given, sums):
                     follow(linear, m, moving, -begun, motion.work[7:10, :n])
                     place = _read(look.gap[i], moving, tones, offset - begun)
             sums[REACH] = max(sums[REACH], abs(x), abs(pieces.states[p, 0] if first else moving[0]))
+            # a constant friction works by the path alone; no quadrature is needed
             if look.works[m] == CONSTANT:
                 sums[WORK] += look.friction[i, m, one] * (after - place)
             if look.inner[m] or varies:
@@ -388,23 +406,30 @@ def _unmarked(marks, step):
 
 @compiled(**OPTIONS)
 def _mark(lap, place, mode, state, tones, settled, sums, marks):
-    """Tell at the first event of a lap whether the motion is where the mark is; after some steps, make another."""
+    """Tell at the first event of a lap whether the motion is where the mark is; after some steps, make another.
+
+    `marks` is (4, ...): the mark, the largest size of each entry, the sums at the mark, and what a step adds to them.
+    """
     here, size, before, gains = marks[0], marks[1], marks[2], marks[3]
+    # a mark of before the measured time would count what is not measured
     fresh = here[BEGUN] < 0.0 or here[BEGUN] < settled <= lap
     again = not fresh and mode == here[MARK] and abs(place - here[PLACE]) <= STILL
     fresh = fresh or lap >= here[BEGUN] + STEPS * here[STEP]
     for k in range(state.shape[0]):
+        # the phase of the drive is in `place` already
         turns = tones.shape[0] == 1 and (k == int(tones[0, 0]) or k == int(tones[0, 1]))
         size[k] = max(size[k], abs(state[k]))
         if not turns:
             again = again and abs(state[k] - here[MARK + 1 + k]) <= STILL * size[k]
             if fresh:
                 here[MARK + 1 + k] = state[k]
+    # Repeats: nothing more is looked for, and each such step adds the same to the sums.
     here[NEXT] = lap + here[STEP]
     if again:
         here[SPAN], here[NEXT] = lap - here[BEGUN], math.inf
         for k in range(ENTRIES):
             gains[k] = sums[k] - before[k]
+    # Mark: where the motion is now, and what was counted up to here.
     elif fresh:
         here[PLACE], here[MARK], here[BEGUN] = place, mode, lap
         for k in range(ENTRIES):
@@ -427,13 +452,19 @@ def _skip(clock, marks, settled, until, sums):
 
 @compiled(**OPTIONS)
 def _inside(linear, mode, moving, span, turns, varies, friction, slip, sums, work):
-    """The farthest turn within a piece, and the work of a friction that changes in it, cell by cell."""
+    """The farthest turn within a piece, and the work of a friction that changes in it, cell by cell.
+
+    `moving` (N,) is the state at its beginning, carried to its end; `span` is in s, `friction` [N] and `slip` [m/s] are
+    forms (N,) of the state.
+    """
     flow, n = linear.flow[mode], moving.shape[0]
     scratch, here, tail = work[7:9, :n], work[9, :n], work[10, :n]
+    # half a cell, half a radian of the fastest motion: a turn shows as a change of sign, and the power is smooth
     steps = 1 + int(2.0 * span / linear.cell[mode])
     step = span / steps
     for _ in range(steps):
         before, reached = moving[1], 0.0
+        # Work: the power by the quadrature of Gauss and Legendre.
         if varies:
             for j in range(len(POINTS)):
                 for k in range(n):
@@ -447,6 +478,7 @@ def _inside(linear, mode, moving, span, turns, varies, friction, slip, sums, wor
         for k in range(n):
             here[k], tail[k] = moving[k], 0.0
         advance(flow, here, tail, step, scratch)
+        # Turn: the chord of the velocity, then Newton on it; the displacement is extreme there.
         if turns and before * here[1] < 0.0:
             near = step * before / (before - here[1])
             after, tip = here[1], work[11, :n]
@@ -461,6 +493,7 @@ def _inside(linear, mode, moving, span, turns, varies, friction, slip, sums, wor
                     near = min(step, max(0.0, near - tip[1] / rate))
                 reached = max(reached, abs(tip[0]))
             here[1] = after
+        # the seam too: a turn that falls on it changes no sign on either side
         sums[REACH] = max(sums[REACH], reached, abs(here[0]) if turns else 0.0)
         for k in range(n):
             moving[k] = here[k]
