@@ -203,9 +203,10 @@ def _forward(motion, seen, unknown, kept, work):
 
 @compiled(**FAST, forceinline=True)
 def _update(t, k, motion, seen, kept, work):
-    """Take reading k of sample t: its log likelihood."""
+    """Take reading k of sample t: its log likelihood. State a (n,) and covariance P (n, n) are `work`'s."""
     a, p, line, form = work.vector, work.matrix, work.line, motion.readings[k]
     n, surprise, width = a.shape[0], seen.readings[t, k], motion.noise[k]
+    # Surprise v = y - h a, and its variance F = h P h' + noise; line = P h'.
     for i in range(n):
         surprise -= form[i] * a[i]
         total = 0.0
@@ -215,6 +216,7 @@ def _update(t, k, motion, seen, kept, work):
     for i in range(n):
         width += form[i] * line[i]
     kept.surprises[t, k], kept.variances[t, k] = surprise, width
+    # Gain K = P h' / F; P - K h P by one triangle, so that it stays symmetric.
     for i in range(n):
         gain = line[i] / width
         kept.gains[t, k, i] = gain
@@ -227,15 +229,17 @@ def _update(t, k, motion, seen, kept, work):
 
 @compiled(**FAST, forceinline=True)
 def _predict(t, motion, seen, unknown, work):
-    """Step to the next sample."""
+    """Step to the next sample: a (n,) and P (n, n) of `work`."""
     a, p, line, square = work
     transition, spread = motion.transition[seen.regime[t]], motion.spread[seen.regime[t]]
     n = a.shape[0]
+    # State: T a + u.
     for i in range(n):
         total = seen.inputs[t, i]
         for j in range(n):
             total += transition[i, j] * a[j]
         line[i] = total
+    # T P
     for i in range(n):
         a[i] = line[i]
         for j in range(n):
@@ -243,6 +247,7 @@ def _predict(t, motion, seen, unknown, work):
             for k in range(n):
                 total += transition[i, k] * p[k, j]
             square[i, j] = total
+    # Covariance: (T P) T' + q r r' + drift, by one triangle; q is the unknown's variance.
     for i in range(n):
         for j in range(i + 1):
             total = spread[i] * unknown[t] * spread[j]
@@ -281,9 +286,10 @@ def _score(t, motion, seen, smoothed, work):
 
 @compiled(**FAST, forceinline=True)
 def _step_back(transition, work):
-    """Slope and curvature by the state after a sample's readings."""
+    """Slope r (n,) and curvature m (n, n) by the state after a sample's readings: r = T' r, m = T' m T."""
     r, m, line, square = work
     n = r.shape[0]
+    # T' r, and m T: r is still needed whole
     for i in range(n):
         total = 0.0
         for j in range(n):
@@ -294,6 +300,7 @@ def _step_back(transition, work):
             for k in range(n):
                 total += m[i, k] * transition[k, j]
             square[i, j] = total
+    # T' (m T), by one triangle
     for i in range(n):
         r[i] = line[i]
         for j in range(i + 1):
@@ -306,9 +313,13 @@ def _step_back(transition, work):
 
 @compiled(**FAST, forceinline=True)
 def _give_back(t, k, motion, kept, work):
-    """Slope and curvature by the state before reading k of sample t."""
+    """Slope r (n,) and curvature m (n, n) by the state before reading k of sample t.
+
+    With L = I - K h: r = h' v / F + L' r, m = h' h / F + L' m L, multiplied out as h is one row.
+    """
     r, m, line, form, gains = work.vector, work.matrix, work.line, motion.readings[k], kept.gains[t, k]
     n, width = r.shape[0], kept.variances[t, k]
+    # r changes along h' alone, by v / F - K' r; m by h' h (1 / F + K' m K) and what is mixed, with line = m K
     along, across = kept.surprises[t, k] / width, 1.0 / width
     for i in range(n):
         along -= gains[i] * r[i]
@@ -317,6 +328,7 @@ def _give_back(t, k, motion, kept, work):
             total += m[i, j] * gains[j]
         line[i] = total
         across += gains[i] * total
+    # no inverse of P: a state that is known exactly does no harm
     for i in range(n):
         r[i] += form[i] * along
         for j in range(n):
@@ -325,17 +337,19 @@ def _give_back(t, k, motion, kept, work):
 
 @compiled(**FAST, forceinline=True)
 def _tell(t, kept, forms, smoothed, work):
-    """The linear forms that are wanted, at a sample."""
+    """The linear forms (p, n) that are wanted, at a sample: z (a + P r), of variance z (P - P m P) z'."""
     r, m, line, n = work.vector, work.matrix, work.line, work.vector.shape[0]
     for o in range(forms.shape[0]):
         value, doubt = 0.0, 0.0
         for i in range(n):
+            # line = P z', from before the readings of the sample, as r and m are
             total = 0.0
             for j in range(n):
                 total += kept.doubt[t, i, j] * forms[o, j]
             line[i] = total
             value += forms[o, i] * kept.ahead[t, i] + total * r[i]
             doubt += forms[o, i] * total
+        # the difference of nearly equal variances may round below zero
         least = ROUNDING * doubt
         for i in range(n):
             for j in range(n):

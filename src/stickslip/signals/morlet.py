@@ -111,9 +111,14 @@ def _few_of(phases: int) -> Any:
 
     @compiled(**FAST)
     def few(around, weights, turn, room, out):
-        """Phase by phase over a tile. Real and imaginary parts stand side by side; the taps are a multiple of four."""
+        """Phase by phase over a tile. Real and imaginary parts stand side by side; the taps are a multiple of four.
+
+        `around` (2 s,) and `out` (2 n,) are views of complex arrays; `weights` is (phases, taps), `turn` and `room`
+        (phases, 2 TILE).
+        """
         taps, tile = weights.shape[1], room.shape[1]
         for first in range(0, out.size // phases + 1, tile):
+            # Weigh: four taps at a time, so that a sum is read and written once for four products.
             for phase in range(1, phases):
                 sums = room[phase]
                 for j in range(0, taps, 4):
@@ -128,6 +133,7 @@ def _few_of(phases: int) -> Any:
             window = around[first + taps - 2 : first + taps - 2 + tile]
             for i in range(tile):  # the samples themselves
                 room[0, i] = window[i]
+            # Turn: up to the band's own frequency, as the values are written; the last tile may be cut short.
             row = out[first * phases : (first + tile) * phases]
             if row.size == tile * phases:
                 for k in range(tile // 2):
@@ -189,19 +195,26 @@ def _many_of(lanes: int) -> Any:
 
     @compiled(**FAST)
     def many(around, halves, span, swing, turn, room, spare, out):
-        """All phases of some samples, half of them by the mirrored weights; the pairs are a multiple of four."""
+        """All phases of some samples, half of them by the mirrored weights; the pairs are a multiple of four.
+
+        `around` (s,) and `out` (n,) are complex, `halves` is (2, pairs, lanes), `swing` (TILE,), `turn` (2, 2 lanes),
+        `room` (8, pairs or lanes), `spare` (2 lanes,).
+        """
         (first, together), pairs = span, halves.shape[1]
         plus, plus_i, minus, minus_i = room[0, :pairs], room[1, :pairs], room[2, :pairs], room[3, :pairs]
         er, ei, dr, di, cosine, sine = room[4], room[5], room[6], room[7], turn[0], turn[1]
         for number in range(-(-out.size // (2 * lanes))):
             begin = number * together
             to, last = swing[begin % swing.size], begin + 2 * first + together
+            # Fold: sums and differences of samples as far before the middle as behind it.
             for j in range(pairs):
                 one, other = to * around[begin + j], to * around[last - j]
                 plus[j], plus_i[j] = one.real + other.real, one.imag + other.imag
                 minus[j], minus_i[j] = one.real - other.real, one.imag - other.imag
+            # Weigh: even weights see the sums, odd ones the differences: half the products.
             _sums(halves[0], plus, plus_i, er, ei, lanes)
             _sums(halves[1], minus, minus_i, dr, di, lanes)
+            # Unfold: even + odd is a value, even - odd its mirror image; turned up to the band's own frequency.
             row = out[2 * number * lanes : 2 * (number + 1) * lanes]
             made = row if row.size == 2 * lanes else spare
             made[0] = to * around[begin + first]

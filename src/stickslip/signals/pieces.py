@@ -17,12 +17,12 @@ import numpy as np
 from stickslip.arrays import Array, Rows
 from stickslip.compiled import FAST, OPTIONS, compiled
 
-TOLD = 1e-13  # variance of the squared time within a stretch, below which a line explains it
+STRAIGHT = 1e-13  # variance of the squared time within a stretch, below which a line explains it
 
 GLIDE, RING = 0, 1
 SHORTEST = 4  # samples of a glide: a parabola has three coefficients
 
-SHARES = (0.25, 0.5, 0.75)
+SHARES = (0.25, 0.5, 0.75)  # of a swing's way: a cosine takes a third of its half period from the first to the last
 EQUAL = 1e-12  # of a swing: running means that differ by less are alike
 
 
@@ -112,7 +112,7 @@ def _glide_costs(values: Array) -> Array:
     tt = np.maximum(m[1] - m[0] ** 2, 1e-15)
     tq, qq = m[2] - m[0] * m[1], m[3] - m[1] ** 2
     rest = qq - tq**2 / tt
-    resting = rest > TOLD
+    resting = rest > STRAIGHT
     extra = np.where(resting, (tty - tq * ty / tt) ** 2 / np.where(resting, rest, 1.0), 0.0)
     return np.asarray(np.maximum(_between(values**2) - n * (y**2 + ty**2 / tt + extra), 0.0))
 
@@ -188,12 +188,14 @@ def _ring(sums, k, first, last):
 def turning_points(values, least, rows):
     """Rows where `values` turn back by `least` or more, alternately up and down, with the first and last extreme.
 
-    They are written to `rows`, as many as it holds; returns how many there are.
+    They are written to `rows` (m,), as many as it holds; returns how many there are. `least` is in the unit of `values`
+    (n,).
     """
     count, low, high, direction = 0, 0, 0, 0
     for row in range(values.shape[0]):
         if count == rows.shape[0]:
             return count
+        # Up, or not known yet: the highest is a turn once the values have come down from it.
         if direction >= 0:
             if values[row] >= values[high]:
                 high = row
@@ -202,6 +204,7 @@ def turning_points(values, least, rows):
                 count += 1
                 direction, low = -1, row
                 continue
+        # Down, or not known yet.
         if direction <= 0:
             if values[row] <= values[low]:
                 low = row
@@ -209,6 +212,7 @@ def turning_points(values, least, rows):
                 rows[count] = low
                 count += 1
                 direction, high = 1, row
+    # the extreme since the last turn, which nothing comes back from
     if 0 < count < rows.shape[0]:
         rows[count] = high if direction > 0 else low
         count += 1
@@ -219,11 +223,12 @@ def turning_points(values, least, rows):
 def crossings(values, turns, places):
     """Rows, with fractions, where each swing passes `SHARES` of its way; the last time before it is through.
 
-    `turns` are the k + 1 turning points, `places` is (k, 3).
+    `values` is (n,), `turns` are the k + 1 turning points, `places` is (k, 3).
     """
     for k in range(turns.shape[0] - 1):
         first, last = turns[k], turns[k + 1]
         begin, length = values[first], values[last] - values[first]
+        # the first time it is through, then backwards: noise may pass a share to and fro
         through = first
         while (values[through] - begin) / length < SHARES[2]:
             through += 1
@@ -231,6 +236,7 @@ def crossings(values, turns, places):
             row = through
             while row > first and (values[row] - begin) / length >= SHARES[j]:
                 row -= 1
+            # straight between two samples
             rise = (values[min(row + 1, last)] - values[row]) / length
             places[k, j] = row + ((SHARES[j] - (values[row] - begin) / length) / rise if rise > 0.0 else 0.0)
 

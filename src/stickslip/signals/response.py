@@ -151,7 +151,7 @@ def follow(filter_: Any, edges: Array, ends: Any, forced: Array, rule: Any, fact
 
     `filter_` holds poles, residues, and the poles' states at the first edge, which become those at the last end;
     `forced` (K, n) the input in each interval between edges, at the nodes of the `rule`: shares of its length, and
-    weights. `factors` (n,) is scratch.
+    weights. `factors` (n,) is scratch. Edges are in s, poles in rad/s.
     """
     poles, residues, states = filter_
     nodes, weights = rule
@@ -163,6 +163,7 @@ def follow(filter_: Any, edges: Array, ends: Any, forced: Array, rule: Any, fact
             residue *= 2.0
         known, decay, k = -1.0, state, 0
         for e in range(len(ends)):
+            # s' = pole s + u, exactly over an interval: what was decays, what came in decays from its node on
             while k < ends[e]:
                 length = edges[k + 1] - edges[k]
                 if abs(length - known) > ALIKE * known:
