@@ -50,6 +50,29 @@ def test_lines_of_a_serial_port(tmp_path: Path) -> None:
 
 
 @pytest.mark.skipif(not hasattr(os, "openpty"), reason="no pseudo terminals here")
+def test_lines_that_come_one_by_one_are_handed_on_together() -> None:
+    """Of a board that sends 500 a second the live view drew 500 frames a second, of which each told of one sample."""
+    pytest.importorskip("serial")
+    board, port = os.openpty()
+    table = {"kind": "serial", "port": os.ttyname(port), "fs": 500, "channels": {"x": "#1 [mm]"}}
+
+    def sends() -> None:
+        for k in range(11):  # the first one began before we listened
+            os.write(board, b"%d\n" % k)
+            threading.Event().wait(0.002)
+
+    with find_device("board", {"board": table}).open() as stream:
+        thread = threading.Thread(target=sends)
+        thread.start()
+        block = stream.read(60.0)
+        thread.join()
+    assert block is not None
+    assert (block.first, block.after) == (0, 10)
+    os.close(board)
+    os.close(port)
+
+
+@pytest.mark.skipif(not hasattr(os, "openpty"), reason="no pseudo terminals here")
 def test_lines_with_too_few_columns_are_told(tmp_path: Path) -> None:
     pytest.importorskip("serial")
     board, port = os.openpty()

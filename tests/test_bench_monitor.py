@@ -169,6 +169,16 @@ def test_a_microphone_that_is_pulled_is_flat(left: str) -> None:
     assert [[flaw.kind for flaw in cycle.flaws] for cycle in cycles] == [[]] * 6 + [["flat"]] * 5
 
 
+@pytest.mark.parametrize("fs", [100.0, 1000.0, 8000.0])
+@pytest.mark.parametrize("count", [0.0, 4e-6], ids=["noise", "in counts"])
+def test_noise_is_no_motion(fs: float, count: float) -> None:
+    """A rig that stood still moved by noise alone: four times a second every sensor of it was said to be flat."""
+    noise = np.random.default_rng(5).standard_normal((2, int(40 * fs))) * 1e-6
+    noise = np.round(noise / count) * count if count else noise
+    _, cycles = watched(Replay(ss.Record.of({"x": noise[0], "a": 1e4 * noise[1]}, fs=fs), fast=True), 40.0)
+    assert not cycles
+
+
 def test_a_loop_is_that_of_the_motion() -> None:
     _, cycles = watched(Sim(rig=ss.Rig.perfect(), fast=True), 3.0)
     last = cycles[-1]

@@ -9,12 +9,14 @@ from multiprocessing import active_children
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from starlette.testclient import TestClient
 from starlette.websockets import WebSocketDisconnect
 
 import stickslip as ss
-from stickslip.lab.live import Place
+from stickslip.bench import Block, Monitor, Sim
+from stickslip.lab.live import Place, Session
 from stickslip.lab.server import lab_app
 from stickslip.lab.workers import unframed
 
@@ -125,3 +127,14 @@ def test_what_a_page_may_not_ask_is_told_to_it(client: TestClient) -> None:
         assert until(page, "state", open="sim")[0]["fs"] == 4000
         send(page, "drive", output="base", amplitude="much", frequency=2.5)
         assert "amplitude = 'much'" in until(page, "error")[0]["error"]
+
+
+def test_a_block_is_shown_before_what_ends_in_it_is_judged(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A cycle at 20 kHz took 85 ms of processor to judge, and the samples that had come with its end waited so long."""
+    shown: list[bytes] = []
+    session = Session("rig", Sim(fast=True), Place(), shown.append, lambda: None)
+    monkeypatch.setattr(Monitor, "feed", lambda monitor, block: [shown.append(b"judged")][1:])
+    session._look(Block(0, 0.0, np.zeros((4, 80))))
+    session.processes.shutdown()
+    assert unframed(shown[0])[0]["kind"] == "block"
+    assert shown[1:] == [b"judged"]

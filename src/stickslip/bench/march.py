@@ -33,11 +33,15 @@ KEPT = 1.0  # s of legs that are kept behind: more than any sensor lags
 
 
 class Leg(NamedTuple):
-    """A part of the motion: its start and end [s], and the run in it, whose time 0 is the start."""
+    """A part of the motion: its start and end [s], and the run in it, whose time 0 is the start.
+
+    What of it can be sensed stands by name: the run's output, which row of that, and the unit.
+    """
 
     begin: float
     end: float
     run: Trajectory
+    sensed: Mapping[str, tuple[str, int, str]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -187,7 +191,7 @@ class March:
             rows = slice(first, len(times) if last else int(np.searchsorted(times, leg.end)))
             if rows.start >= rows.stop:
                 continue
-            labelled = self.labels(leg.run).get(label)
+            labelled = leg.sensed.get(label)
             if labelled is not None:  # a base that stands still is at 0
                 local = np.clip(times[rows] - leg.begin, 0.0, leg.run.duration)
                 out[rows] = leg.run.sample(local, (labelled[0],))[0][labelled[1]]
@@ -198,17 +202,6 @@ class March:
         starts = [leg.begin + leg.run.starts for leg in self.legs if leg.begin < last and leg.end > first]
         instants = np.concatenate(starts) if starts else np.empty(0)
         return instants[(instants > first) & (instants < last)]
-
-    @staticmethod
-    def labels(run: Trajectory) -> dict[str, tuple[str, int, str]]:
-        """What of a run can be sensed: its output, which row of it, and the unit."""
-        moved = {"z": bool(run.table.motion.base), "force": bool(run.table.motion.force)}
-        return {
-            label: (name, row, unit)
-            for name in ("x", "v", "a", "friction", "z", "force")
-            if moved.get(name, True)
-            for row, (label, unit) in enumerate(zip(run.labels(name), run.units(name), strict=True))
-        }
 
     def _begin(self, system: System, at: float) -> None:
         """A drive begins; everything is counted from here."""
@@ -231,9 +224,9 @@ class March:
             end = begin + span[1]
             if (motion.tones or motion.knots is not None) and passed > 0:
                 self.table = _tables(replace(self.system, drive=Later(self.system.drive, passed)))
-        leg = Leg(begin, end, self._run(span))
-        self.legs.append(leg)
-        self.state, self.mode = leg.run.end()
+        known = self._run(span)
+        self.legs.append(Leg(begin, end, known, _sensed(known)))
+        self.state, self.mode = known.end()
         if not math.isfinite(period):
             self._set_signals(_values(motion, end - self.origin))
         if self.plan and self.plan[0][0] < end:
@@ -270,3 +263,13 @@ def _tables(system: System) -> Any:
     if isinstance(system, Oscillator) and isinstance(system.law, CurvedLaw):
         return tape(system)
     return table_of(system)
+
+
+def _sensed(run: Trajectory) -> dict[str, tuple[str, int, str]]:
+    moved = {"z": bool(run.table.motion.base), "force": bool(run.table.motion.force)}
+    return {
+        label: (name, row, unit)
+        for name in ("x", "v", "a", "friction", "z", "force")
+        if moved.get(name, True)
+        for row, (label, unit) in enumerate(zip(run.labels(name), run.units(name), strict=True))
+    }

@@ -31,11 +31,14 @@ HEIGHTS = "▁▂▃▄▅▆▇█"
 
 NONE: Array = np.empty(0)
 SHORTEST = 16  # samples of a cycle
-MOVES = 8.0  # times its noise is the least span of what tells cycles
+# Times its noise is the least span of what tells cycles: the largest of 300,000 samples of noise, which `SLOWEST` holds
+# at 20 kHz, and the least lie 9.3 deviations apart, and `RECENT` samples tell a sixth too little of it at times.
+MOVES, RECENT = 12.0, 1024
 
 POINTS = 240  # of a loop: more is not seen
 KEPT = 20.0  # s of samples that are looked back to, at the most
 CYCLES = 2  # that a check of the sensors looks at
+AROUND = slice(CYCLES - 1, CYCLES + 4)  # lines of their spectrum: the motion's, one below, and three above
 TOLD = 8  # that the numbers are of, where there are so many; three at the least
 SOUNDS = ("sound", "ay")  # that squeak: of the microphone, of an accelerometer across
 LISTENED = 0.5  # s that are looked at in place of a cycle where a sound alone is measured
@@ -187,7 +190,7 @@ class Monitor:
 
     def _afresh(self) -> None:
         """Nothing is known yet of the motion that tells cycles."""
-        self.low, self.top = math.inf, -math.inf
+        self.low, self.top, self.recent = math.inf, -math.inf, NONE
         self.above: bool | None = None
 
     def _stalled(self) -> bool:
@@ -224,7 +227,8 @@ class Monitor:
         self.low = min(self.low + share * (middle - self.low) if self.low < self.top else math.inf, float(row.min()))
         self.top = max(self.top + share * (middle - self.top) if self.top > self.low else -math.inf, float(row.max()))
         span, middle = self.top - self.low, (self.low + self.top) / 2
-        if span < MOVES * noise_of(row):
+        self.recent = np.append(self.recent, row)[-RECENT:]  # a block may hold two samples
+        if not span > MOVES * max(noise_of(self.recent), _count(self.recent) / math.sqrt(12)):
             return []
         marks = (row > middle + HIGH * span).astype(np.int8) - (row < middle - HIGH * span)
         known = np.flatnonzero(marks)
@@ -334,28 +338,44 @@ def _late(
     if not {"x", "a"} <= set(channels) or len(channels["x"]) < LEAST_CYCLES * period * fs:
         return [], math.inf
     expected = {one.name: _expected(one) for one in inputs}
-    lines = _Lines(channels, 2 * math.pi / period, fs)
+    count = len(channels["a"])
+    known = channels["x"][np.isfinite(channels["x"])]
+    # less a straight line, which has no acceleration, its ends meet: under a delay the window reaches over them
+    ends = {"x": channels["x"] - np.linspace(0.0, known[-1] - known[0], count)}
+    spectra = {name: _spectrum(values) for name, values in {**channels, **ends}.items() if name in ("x", "a", "load")}
+    frequency = np.asarray(np.fft.rfftfreq(count, 1 / fs), dtype=np.float64)
+    lines = _Lines({name: spectrum[AROUND] for name, spectrum in spectra.items()}, math.tau * frequency[AROUND])
     lag, error = lines.lag(lambda late: lines.of("x", 2, expected["x"] + late), lines.of("a", 0, expected["a"]))
-    error = math.hypot(error, lines.doubt("x", 2), lines.doubt("a"))
+    doubts = [lines.doubt(name, math.sqrt(count) * noise_of(channels[name]), n) for name, n in (("x", 2), ("a", 0))]
+    error = math.hypot(error, *doubts)
     flaws, least = _judged("x", lag, error, fs) or _judged("a", -lag, error, fs), _least_late(error, fs)
     if not ("load" in channels and {"mass", "stiffness"} <= set(constants)):
         return flaws, least
     natural = math.sqrt(constants["stiffness"] / constants["mass"]) / math.tau
-    frequency = np.asarray(np.fft.rfftfreq(len(channels["a"]), 1 / fs), dtype=np.float64)
-    felt = {one.name: _felt(channels[one.name], one, frequency) for one in inputs if one.name in ("load", "a")}
-    after, error = _apart(felt["load"], felt["a"], frequency, max(BEYOND / period, 2 * natural))
+    felt = {one.name: _felt(spectra[one.name], one, frequency) for one in inputs if one.name in ("load", "a")}
+    after, error = _apart(felt["load"], felt["a"], frequency[1:-1], max(BEYOND / period, 2 * natural))
     if any(flaw.channel == "a" for flaw in flaws):
         return [*flaws, *_judged("load", after - lag, error, fs)], least
     return [*flaws, *_judged("a", -after, error, fs), *_judged("load", after, error, fs)], least
 
 
-def _felt(values: Array, one: Input, frequency: Array) -> NDArray[np.complex128]:
-    """Spectrum of a channel under Hann's window, its stated delay and mount taken out."""
+def _spectrum(values: Array) -> NDArray[np.complex128]:
+    """Of a channel about its mean, which what is not known is taken for."""
     known = np.isfinite(values)
-    spectrum = np.fft.rfft(np.hanning(len(values)) * np.where(known, values - np.mean(values[known]), 0.0))
-    mount = one.details.get("mount")
-    held = resonance(*mount).at(frequency) if mount else 1.0
-    return np.asarray(spectrum * np.exp(2j * np.pi * frequency * one.details.get("delay", 0.0)) / held)
+    return np.asarray(np.fft.rfft(np.where(known, values - np.mean(values[known]), 0.0)))
+
+
+def _windowed(spectrum: NDArray[Any]) -> NDArray[Any]:
+    """The same under Hann's window, which mixes each line with its neighbours; the first and the last have but one."""
+    return np.asarray(0.5 * spectrum[1:-1] - 0.25 * (spectrum[:-2] + spectrum[2:]))
+
+
+def _felt(spectrum: NDArray[np.complex128], one: Input, frequency: Array) -> NDArray[np.complex128]:
+    """Spectrum of a channel under Hann's window, its stated delay and mount taken out."""
+    inner, mount = frequency[1:-1], one.details.get("mount")
+    held = resonance(*mount).at(inner) if mount else 1.0
+    turned = np.exp(2j * np.pi * inner * one.details.get("delay", 0.0)) / held
+    return np.asarray(_windowed(spectrum) * turned)
 
 
 def _apart(
@@ -381,29 +401,27 @@ def _apart(
 
 
 class _Lines(NamedTuple):
-    """Channels at a frequency [rad/s] and its next two, under a window that vanishes with its slope at both ends.
+    """Channels at the motion's frequency and the next two, under a window that vanishes with its slope at both ends.
 
-    Hann's window mixes each line with its neighbours. Two cycles turn twice in it, so that the line below, of one turn,
-    would take in that of none, which is the offset of the sensor: it is left out.
+    That is Hann's, which mixes each line with its neighbours. Two cycles turn twice in it, so that the line below, of
+    one turn, would take in that of none, which is the offset of the sensor: it is left out.
 
     By parts, the integral of a derivative times the window is that of the samples times the window's derivative; the
-    motion need not repeat.
+    motion need not repeat. Of each line a derivative, and a delay, is a factor: the samples are gone through but once,
+    as the device waits meanwhile to be read.
     """
 
-    channels: Mapping[str, Array]
-    omega: float
-    fs: float
+    turns: Mapping[str, NDArray[np.complex128]]  # five lines of each channel's spectrum
+    omega: Array  # rad/s
 
     def of(self, name: str, order: int = 0, delay: float = 0.0) -> NDArray[np.complex128]:
         """Three lines of a channel's derivative, whose samples come so late [s]."""
-        values = self.channels[name]
-        known = np.isfinite(values)
-        return self._kernels(order, delay)[:, known] @ (values[known] - np.mean(values[known]))
+        return _windowed((1j * self.omega) ** order * np.exp(1j * self.omega * delay) * self.turns[name])
 
-    def doubt(self, name: str, order: int = 0) -> float:
-        """Standard deviation [s] of a channel's phase by its noise."""
-        noise = noise_of(self.channels[name]) * float(np.linalg.norm(self._kernels(order, 0.0)[0]))
-        return noise / max(float(np.linalg.norm(self.of(name, order))), 1e-300) / self.omega
+    def doubt(self, name: str, noise: float, order: int = 0) -> float:
+        """Standard deviation [s] of a channel's phase by its noise, which is so large in each line."""
+        share = float(np.linalg.norm(self.omega[:3] ** order * (0.25, 0.5, 0.25)))
+        return noise * share / max(float(np.linalg.norm(self.of(name, order))), 1e-300) / float(self.omega[1])
 
     def lag(self, late: Callable[[float], NDArray[Any]], early: NDArray[Any]) -> tuple[float, float]:
         """By how much [s] what is late has to be taken forward; its deviation by what is unlike the other even then.
@@ -412,20 +430,10 @@ class _Lines(NamedTuple):
         """
         lag = 0.0
         for _ in range(3):  # it is off by a hundredth of itself after one, by the window that moves too
-            lag -= float(np.angle(np.vdot(early, late(lag)))) / self.omega
+            lag -= float(np.angle(np.vdot(early, late(lag)))) / float(self.omega[1])
         after = late(lag)
         unlike = after - early * np.vdot(early, after) / max(np.vdot(early, early).real, 1e-300)
-        return lag, float(np.linalg.norm(unlike) / max(float(np.linalg.norm(after)), 1e-300)) / 2 / self.omega
-
-    def _kernels(self, order: int, delay: float) -> NDArray[np.complex128]:
-        """(3, n): Hann's window as three turns, each times exp(-i omega t), with the signs that parts bring."""
-        count = len(next(iter(self.channels.values())))
-        rate = math.tau * self.fs / count
-        time = np.arange(count) / self.fs - delay
-        turns = -1j * (self.omega + rate * np.arange(-1, 4))
-        waves = (-turns[:, None]) ** order * np.exp(turns[:, None] * time)
-        kernels = 0.5 * waves[1:-1] - 0.25 * (waves[:-2] + waves[2:])
-        return np.asarray(np.where((time >= 0) & (time * self.fs < count), kernels, 0.0))
+        return lag, float(np.linalg.norm(unlike) / max(float(np.linalg.norm(after)), 1e-300)) / 2 / float(self.omega[1])
 
 
 def _least_late(error: float, fs: float) -> float:

@@ -18,6 +18,7 @@ from stickslip.printing import printable
 from stickslip.settings import SHOWN, STRICT, checked, quantity
 
 NAME, NEEDS = "serial", "serial"
+BLOCK = 0.02  # s of lines that are handed on together, as by the other drivers: one alone costs a watcher as much
 SEPARATOR = re.compile(rb"[,;\s]+")
 LONGEST = 4096  # bytes of a line; what is longer is none
 # Lines in a row of which none can be read, and s of them, after which a port is given up; and s after which it is with
@@ -103,8 +104,8 @@ class OpenPort(Listening):
 
     def read(self, timeout: float = 1.0) -> Block | None:
         """The lines that have come, up to the first gap among them; see :class:`Stream`."""
-        until = time.monotonic() + timeout
-        while not self.waiting and time.monotonic() < until:
+        until, few = time.monotonic() + timeout, BLOCK * self.device.fs
+        while len(self.waiting) < max(1, few) and time.monotonic() < until:
             data = self.rest + self.port.read(max(1, self.port.in_waiting))
             *lines, self.rest = data.split(b"\n")
             if len(self.rest) > LONGEST:

@@ -173,7 +173,7 @@ class Sim:
         """One for each sensor of what the system has."""
         march = March(self.system, self.start)
         march.ahead(0.0)
-        units = {label: unit for label, (_, _, unit) in March.labels(march.legs[0].run).items()}
+        units = {label: unit for label, (_, _, unit) in march.legs[0].sensed.items()}
         units = {"z": "m", "force": "N"} | units
         sensors = [sensor for sensor in self.rig.sensors if sensor.source in units]
         if not sensors:

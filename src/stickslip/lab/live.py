@@ -230,11 +230,11 @@ class Session:
             self.said = str(error)
 
     def _look(self, block: bench.Block) -> None:
-        """Keep a block, show it, and what ended in it."""
+        """Keep a block, show it, and then judge what ended in it, which takes longer than the next one to come."""
         if self.tape is not None:
             self.tape.write(block)
-        cycles = self.monitor.feed(block)
         self.tell(self._frame(block))
+        cycles = self.monitor.feed(block)
         for cycle in cycles:
             self.tell(_cycle(cycle, self.device.fs))
         if cycles and time.monotonic() > self.due and (self.numbers is None or self.numbers.done()):
@@ -253,7 +253,7 @@ class Session:
         arrays: dict[str, NDArray[Any]] = {}
         for one, rows in zip(self.device.inputs, bins, strict=True):
             arrays[f"low {one.name}"], arrays[f"high {one.name}"] = rows.min(axis=1), rows.max(axis=1)
-        oldest = time.time() - (time.monotonic() - block.clock) - block.samples.shape[1] / fs
+        oldest = time.time() - (time.monotonic() - block.clock) - values.shape[1] / fs
         recorded = time.monotonic() - self.began if self.tape is not None else None
         header = {"kind": "block", "first": first, "step": size / fs, "start": first / fs, "oldest": oldest}
         header |= {"recorded": recorded, "said": self.said, "lost": self.monitor.lost}
