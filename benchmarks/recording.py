@@ -15,6 +15,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -99,10 +100,12 @@ def killed(kills: int) -> None:
                 run.kill()
                 firsts += run.stdout.readlines()
             files += path.exists()
-            record = ss.read_record(path if path.exists() else f"{path}.journal")
-            rows = counts(0, len(record), CHANNELS) * 1e-6
-            right &= all(np.array_equal(record[f"c{j}"], row) for j, row in enumerate(rows))
-            lost.append(int(firsts[-1]) + SIZE - len(record))
+            length = 0
+            with suppress(ss.errors.FormatError):  # killed before the first block was written: the journal is empty
+                record = ss.read_record(path if path.exists() else f"{path}.journal")
+                rows, length = counts(0, len(record), CHANNELS) * 1e-6, len(record)
+                right &= all(np.array_equal(record[f"c{j}"], row) for j, row in enumerate(rows))
+            lost.append(int(firsts[-1]) + SIZE - length)
     print(f"{kills} recordings killed, {files} of them whole by then; every sample that is there is", end=" ")
     print(f"{'right' if right else 'WRONG'}; lost of what had come: {max(lost)} at the most, blocks of {SIZE}")
 

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 import stickslip as ss
@@ -19,6 +20,7 @@ from stickslip.answers.questions import analyze
 from stickslip.cycle.sticks import StickEvent
 from stickslip.figures.contact import plot_sticks, plot_velocity_loop
 from stickslip.figures.friction import plot_load_dependence
+from stickslip.figures.squeak import plot_squeaks
 from stickslip.figures.style import COLUMNS, STYLE, Plate, envelope, prefixed, thinned
 from stickslip.figures.traces import close_up, force_balance, plot_force_balance, plot_traces
 from stickslip.story.story import summary
@@ -295,3 +297,14 @@ def test_no_label_of_how_often_it_stuck_is_cut(count: int) -> None:
         for place, label in zip(axes.get_xticks(), axes.get_xticklabels(), strict=True):
             if low <= place <= high:
                 assert label.get_window_extent().x1 <= figure.bbox.x1
+
+
+def test_the_label_of_a_colour_bar_stands_beside_its_ticks() -> None:
+    time = np.arange(10_000) / 10_000
+    tone = np.sin(2 * np.pi * 500 * time) * (np.abs(time - 0.5) < 0.2)
+    squeaks = ss.find_squeaks(ss.Record.of({"sound": tone}, fs=10_000))
+    figure = Plate("spectrogram", lambda: plot_squeaks(squeaks), "", "").figure
+    FigureCanvasAgg(figure).draw()
+    bar = figure.axes[-1].yaxis
+    ticks = max(tick.label2.get_window_extent().x1 for tick in bar.get_major_ticks())
+    assert ticks < bar.label.get_window_extent().x0 < ticks + 30

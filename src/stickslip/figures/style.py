@@ -291,6 +291,7 @@ def _axes_of(figure: Figure) -> list[Axis]:
 
 def _keep_label(axis: Axis) -> None:
     """The label stays where the layout put it: for its place each drawing would measure all labels of ticks again."""
+    axis.axes.apply_aspect()  # the layout gives a colour bar more room than it takes
     place = axis.label.get_transform().transform(axis.label.get_position())
     axis.set_label_coords(*axis.axes.transAxes.inverted().transform(place))
 
