@@ -3,8 +3,10 @@
 Joints of a third integrator: Runge and Kutta's fourth order at 20 kHz, at rest as long as friction bears the torque.
 A PD controller at 1 kHz reads counts of 10 to 16 bit, computes for none to three of its periods, and holds its
 output; logged are counts and reference at its own instants, at 100 Hz to 1 kHz. Its kp is stated, and its kd or not;
-"speed": it damps the measured speed in place of the error's; "torque": what it sets is logged, with noise. Counted
-are the numbers that stand without a grave doubt.
+"speed": it damps the measured speed in place of the error's; "torque": what it sets is logged, with noise, as where
+it also integrates its error ("torque of a PID"), is limited ("saturated"), or the motor cogs ("cogging"); "PID": it
+integrates its error and logs no torque, "PI of the speed": it integrates that of a speed in proportion to the error, as
+drives do. Counted are the numbers that stand without a grave doubt.
 
     python benchmarks/joint_loops.py --draws 40 --first 70000
 """
@@ -21,41 +23,50 @@ import stickslip as ss
 
 FINE, CONTROL = 20_000, 1_000  # steps and periods of the controller in a second
 SECONDS = 30
-KINDS = ("kd unknown", "kd stated", "speed", "torque")
+KINDS = (
+    "kd unknown", "kd stated", "speed", "torque", "speed with kd stated", "torque of a PID", "saturated", "cogging",
+    "PID", "PI of the speed",
+)  # fmt: skip
+LOGGED = ("torque", "torque of a PID", "saturated", "cogging")  # kinds whose torque is
+OF_SPEED = ("speed", "speed with kd stated", "PI of the speed")
+STATED = ("kd stated", "speed with kd stated", "PID")
 TOLD = ("level", "forward", "back", "load", "viscous", "inertia", "sine", "cosine", "damping", "delay")
 
 
 @numba.njit(cache=True)
 def accelerated(p, q, v, side, torque):  # type: ignore[no-untyped-def]
     """Acceleration while it slides to a side."""
-    inertia, forward, back, share, viscous, sine, cosine = p
+    inertia, forward, back, share, viscous, sine, cosine, cogs, poles = p
     weight = sine * np.sin(q) + cosine * np.cos(q)
     level = (forward if side > 0 else back) + share * abs(weight)
-    return (torque - weight - viscous * v - side * level) / inertia
+    return (torque - weight - cogs * np.sin(poles * q) - viscous * v - side * level) / inertia
 
 
 @numba.njit(cache=True)
 def march(p, gains, loop, reference, slope, steps):  # type: ignore[no-untyped-def]
-    """Angles at every `steps` instants; `loop` is periods of delay, whether kd is of the speed, and a count."""
-    kp, kd = gains
-    late, of_speed, count = int(loop[0]), loop[1] > 0, loop[2]
+    """Angles at every `steps` instants; `loop`: periods of delay, whether kd is of the speed, a count, a limit."""
+    kp, kd, ki = gains
+    late, of_speed, count, most = int(loop[0]), loop[1] > 0, loop[2], loop[3]
     dt, held = 1.0 / FINE, FINE // CONTROL
     angle = np.zeros((len(reference) - 1) // steps)
     taken = np.zeros(len(angle))
     waiting = np.zeros(late + 1)
-    q, v, torque, rests = reference[0], 0.0, 0.0, True
+    q, v, torque, rests, wound = reference[0], 0.0, 0.0, True, 0.0
     for i in range(len(angle) * steps):
         if i % held == 0:
             waiting[:-1] = waiting[1:]
             read = np.round(q / count) * count
-            waiting[-1] = kp * (reference[i] - read) + kd * ((0.0 if of_speed else slope[i]) - v)
+            asked = kp * (reference[i] - read) + kd * ((0.0 if of_speed else slope[i]) - v)
+            if abs(asked + wound) < most:
+                wound += ki * (asked if of_speed else reference[i] - read) / CONTROL
+            waiting[-1] = min(max(asked + wound, -most), most)
             torque = waiting[0]
         if i % steps == 0:
             angle[i // steps], taken[i // steps] = q, torque
         if rests:
-            free = accelerated(p[:], q, 0.0, 0.0, torque)
+            free = accelerated(p, q, 0.0, 0.0, torque)
             side = 1.0 if free > 0 else -1.0
-            if accelerated(p[:], q, 0.0, side, torque) * side <= 0:
+            if accelerated(p, q, 0.0, side, torque) * side <= 0:
                 continue
         else:
             side = 1.0 if v > 0 else -1.0
@@ -110,15 +121,25 @@ def drawn(seed: int, kind: str) -> tuple[ss.Record, dict[str, float]]:
     fs, count = int(chance.choice([100, 125, 200, 250, 500, 1000])), 2 * np.pi / 2 ** int(chance.integers(10, 17))
     fine = np.arange(SECONDS * FINE + 1) / FINE
     told = reference(fine, chance)
-    p = np.array([inertia, forward, back, share, viscous, weight * np.cos(tilt), weight * np.sin(tilt)])
-    loop = np.array([late, kind == "speed", count], dtype=float)
-    angle, taken = march(p, (kp, kd), loop, told, np.gradient(told, fine), FINE // fs)
+    slope, pulls = np.gradient(told, fine), (weight * np.cos(tilt), weight * np.sin(tilt))
+    cogs = (level * chance.uniform(0.1, 0.5), float(chance.integers(7, 60))) if kind == "cogging" else (0.0, 0.0)
+    ki = 0.0
+    if kind in ("PID", "torque of a PID"):
+        ki = kp * swing * ratio * chance.uniform(0.1, 0.4)
+    elif kind == "PI of the speed":
+        ki = swing * chance.uniform(0.05, 0.3)
+    p = np.array([inertia, forward, back, share, viscous, *pulls, *cogs])
+    loop = np.array([late, kind in OF_SPEED, count, np.inf], dtype=float)
+    angle, taken = march(p, (kp, kd, ki), loop, told, slope, FINE // fs)
+    if kind == "saturated":
+        loop[3] = chance.uniform(0.6, 0.95) * np.abs(taken).max()
+        angle, taken = march(p, (kp, kd, ki), loop, told, slope, FINE // fs)
     delay = (late + 0.5) / CONTROL  # of what is held, half of its time
     names = ("inertia", "forward", "back", "load", "viscous", "sine", "cosine")
-    truth = {**dict(zip(names, p.tolist(), strict=True)), "kp": kp, "kd": kd, "delay": delay}
-    truth["damping"] = -kp * delay + (kd if kind != "speed" else 0.0)
+    truth = {**dict(zip(names, p.tolist(), strict=False)), "kp": kp, "kd": kd, "delay": delay}
+    truth["damping"] = -kp * delay + (kd if kind not in OF_SPEED else 0.0)
     logged = {"theta": np.round(angle / count) * count, "reference": told[: -1 : FINE // fs]}
-    if kind == "torque":
+    if kind in LOGGED:
         logged["force"] = taken + 0.01 * np.abs(taken).max() * chance.standard_normal(len(taken))
         truth["delay"] = -0.5 / CONTROL  # what is set at an instant acts half of a period later, on average
         return ss.Record.of(logged, fs=fs, units={"reference": "rad", "force": "N m"}), truth
@@ -137,8 +158,8 @@ def main() -> None:
         for seed in range(options.first, options.first + options.draws):
             record, truth = drawn(seed, kind)
             try:
-                kd = {"kd": truth["kd"]} if kind == "kd stated" else {}
-                given = {} if kind == "torque" else {"kp": truth["kp"], **kd}
+                kd = {"kd": truth["kd"]} if kind in STATED else {}
+                given = {} if kind in LOGGED else {"kp": truth["kp"], **kd}
                 joint = ss.cycle.regress_joint(record, **given)
             except ss.StickslipError:
                 refused += 1

@@ -13,11 +13,11 @@ INERTIA, KP, KD, LEVEL, VISCOUS = 0.02, 18.0, 0.6, 0.06, 0.03
 FS, FINER = 500, 20
 
 
-def moved(late: float, *, of_speed: bool = False) -> ss.Record:
+def moved(late: float, *, of_speed: bool = False, ki: float = 0.0) -> ss.Record:
     """A joint that moves by sines, and the reference from which a controller that is late makes just its torque.
 
-    Its error e solves ``kp e + kd e' = torque(t + d)`` (of a controller that damps the speed, without its kd), by the
-    exact response of that equation to a torque which is a straight line from instant to instant.
+    Its error e solves ``ki int e + kp e + kd e' = torque(t + d)`` (of a controller that damps the speed, without its
+    kd), by the exact response of that equation to a torque which is a straight line from instant to instant.
     """
     time = np.arange(30 * FS * FINER) / (FS * FINER)
     sines = [(0.8, 0.21, 0.3), (0.3, 0.83, 1.1), (0.1, 2.3, 0.2)]
@@ -32,7 +32,7 @@ def moved(late: float, *, of_speed: bool = False) -> ss.Record:
     if of_speed:
         error = (torque + KD * motion(time, 1)) / KP
     else:
-        system = cont2discrete(([1.0], [KD, KP]), 1 / (FS * FINER), method="foh")
+        system = cont2discrete(([1.0, 0.0], [KD, KP, ki]) if ki else ([1.0], [KD, KP]), 1 / (FS * FINER), method="foh")
         error = lfilter(system[0].ravel(), system[1], torque)
     rows = slice(2 * FS * FINER, None, FINER)  # without what was before the first instant
     counted = np.round(motion(time, 0) / 1e-4) * 1e-4
@@ -63,6 +63,28 @@ def test_damping_of_the_speed_is_doubted_to_be_viscous_friction() -> None:
     assert not stands(joint.viscous.status)
     assert not stands(joint.inertia.status)
     assert stands(joint.level.status)
-    joint = ss.cycle.regress_joint(moved(0.5e-3), kp=KP, gravity=False)
-    assert stands(joint.viscous.status)
-    assert stands(joint.inertia.status)
+    sound = ss.cycle.regress_joint(moved(0.5e-3), kp=KP, gravity=False)
+    assert stands(sound.viscous.status)
+    assert stands(sound.inertia.status)
+    stated = ss.cycle.regress_joint(moved(0.5e-3, of_speed=True), kp=KP, kd=KD, gravity=False)
+    assert "damp the speed" in stated.inertia.status  # by a delay as long as kd over kp it looked as sound
+    assert not stands(stated.level.status)
+
+
+def test_a_controller_that_integrates_its_error_is_doubted() -> None:
+    for given in ({"kd": KD}, {}):
+        joint = ss.cycle.regress_joint(moved(0.5e-3, ki=40.0), kp=KP, gravity=False, **given)
+        assert "integrate its error" in joint.level.status
+        assert not stands(joint.inertia.status)
+
+
+def test_a_torque_that_is_set_acts_half_a_period_later() -> None:
+    """A computer at 1 kHz logs it at the beginning of a period: of gravity that makes viscous friction, here 0.01."""
+    time = np.arange(6000) / 200
+    q, v, a = (sum(s * (6.283 * f) ** k * np.sin(6.283 * f * time + k * np.pi / 2) for s, f in ((1.2, 0.2), (0.4, 0.7)))
+               for k in range(3))  # fmt: skip
+    torque = 0.02 * a + 0.01 * v + 8.0 * np.sin(q) + 0.06 * np.sign(v)
+    ahead = torque + 0.5e-3 * np.gradient(torque, time)
+    noise = np.random.default_rng(0).normal(0, 0.02, time.size)
+    log = ss.Record.of({"theta": q, "force": ahead + noise}, fs=200, units={"force": "N m"})
+    assert ss.cycle.regress_joint(log).viscous.includes(0.01)

@@ -38,6 +38,8 @@ from stickslip.statistics import FEW_INDEPENDENT, LeastSquares, mixture
 DROWNED = 0.5
 LATEST = 0.1  # s that a torque may be late
 OFTEN, USUAL = 0.25, 0.02  # odds that a torque is late, chosen, and s by which it then usually is, chosen
+# s, and how that varies, chosen: of a torque in time. What a computer at 1 kHz sets acts half a period late on average.
+HELD = (0.0, 5e-4)
 LOOP = (1e-3, 2e-3)  # s, delay of a controller, and how that varies, chosen: it holds its output for 0.2 to 10 ms
 # Times the power of noise in the torque's rate: noise alone had 0.9 to 1.2 on 10 logs, 41 others 1.4 at least.
 HEARD = 1.5
@@ -251,7 +253,7 @@ def regress_joint(
     bent = fall is None and bends(slow, fit, terms, pull)
     if fall is not None:
         fit, terms, pull = fall.fits[fall.best], fall.terms, fall.pull
-    beside = misfits(data, fit, terms, bent, delay, turning(record))
+    beside = misfits(data, fit, terms, bent, turning(record))
     if delay is not None and data.source == "reference":
         delay = delay.within(0.0)
     return replace(_answer(record, data, fit, terms, pull, left_out, fall, beside), delay=delay)
@@ -299,7 +301,9 @@ def delay_of(data: JointData) -> Estimate | None:
     sd = (1.0 if loop else STRAYS) * Telling(data, fit, terms, True, "ok", ()).sum({"late": 1.0}, name).sd
     sd = math.hypot(sd, NEAR / fs)
     late, sd = (late, sd) if abs(late) <= LATEST else (0.0, LATEST)  # beyond that it is some other fault's
-    if loop and (sd > LOOP[1] or not damps_error(data, fit, terms, None)):  # as much is known of any controller
+    if loop and (
+        sd > LOOP[1] or not damps_error(punctual(data, None), fit, terms)
+    ):  # as much is known of any controller
         return None
     return Estimate.normal(name, late, sd=sd, unit="s", method="the balance of torque, read later")
 
@@ -328,30 +332,30 @@ def _heard(data: JointData, fit: LeastSquares, terms: tuple[str, ...]) -> bool:
 def punctual(data: JointData, delay: Estimate | None) -> JointData:
     """The data with a torque read as much later as it surely is late, and unsure by how unsure that is."""
     if data.source == "reference":
-        late, unsure = _lag(delay)
+        late, unsure = _lag(delay, LOOP)
         data = damped(data.earlier(late), late)
-    elif delay is None:
-        return data
+    elif delay is not None and is_late(delay):
+        data, unsure = data.earlier(delay.value), delay.sd
     else:
-        data, unsure = (data.earlier(delay.value), delay.sd) if is_late(delay) else (data, _unseen(delay))
+        unsure = math.hypot(*_lag(delay, HELD), 0.0 if delay is None else _unseen(delay))
     return replace(data, unsure=(*data.unsure, unsure * data.columns(("late",), 0.0, (0.0, 0.0))[:, 0]))
 
 
-def _lag(delay: Estimate | None) -> tuple[float, float]:
-    """Delay of a controller [s] and its deviation, by what the log tells of it and by what controllers usually have."""
-    usual, spread = LOOP
+def _lag(delay: Estimate | None, usual: tuple[float, float]) -> tuple[float, float]:
+    """A delay [s] and its deviation, by what the log tells of it and by what it usually is."""
+    about, spread = usual
     if delay is None:
-        return usual, spread
+        return usual
     share = spread**2 / (spread**2 + delay.sd**2)
-    return usual + share * (delay.value - usual), math.sqrt(share) * delay.sd
+    return about + share * (delay.value - about), math.sqrt(share) * delay.sd
 
 
 def _unseen(delay: Estimate) -> float:
-    """Deviation [s] of a delay that is not surely there: most logs have none, which one that is seen badly may be."""
-    among = delay.sd**2 + USUAL**2  # the variance of what is seen of delays, where there is one
+    """Deviation [s] by a delay that is not surely there: most torques are in time, which one seen badly may not be."""
+    among, few = (delay.sd**2 + spread**2 for spread in (USUAL, HELD[1]))  # variances of what is seen of either
     share = USUAL**2 / among
-    seen = min((delay.value / delay.sd) ** 2, SURELY**2)
-    odds = OFTEN * delay.sd / math.sqrt(among) * math.exp(seen / 2 * share)
+    seen = min(delay.value**2 / few, SURELY**2)
+    odds = OFTEN * math.sqrt(few / among) * math.exp(seen / 2 * (1 - few / among))
     size = math.hypot(share * delay.value, math.sqrt(share) * delay.sd)
     return math.sqrt(odds / (1 + odds)) * size
 

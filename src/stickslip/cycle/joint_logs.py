@@ -492,7 +492,7 @@ def regress_joint_logs(
     delay = delay_of(pooled(data))
     data, slow = [punctual(one, delay) for one in data], [punctual(one, delay) for one in slow]
     fit, terms, pull, left_out = fitted(pooled(data))
-    beside = misfits(pooled(data), fit, terms, bends(pooled(slow), fit, terms, pull), delay, turning(records[0]))
+    beside = misfits(pooled(data), fit, terms, bends(pooled(slow), fit, terms, pull), turning(records[0]))
     tell = Telling(pooled(data), fit, terms, turning(records[0]), "ok", beside)
     known = {term: tell.one(term) for term in terms if term != "uneven"}
     predictions = [

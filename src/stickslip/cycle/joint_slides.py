@@ -289,7 +289,8 @@ class Log:
         terms : tuple of str
             Of inertia, viscous, uneven, forward, back, coulomb (both alike), sine,
             cosine, load, damping, warming and thinning (Coulomb and viscous friction per kelvin), late (by how much
-            the torque is), and borne (friction per torque of the bodies).
+            the torque is), borne (friction per torque of the bodies), and wound (torque per sum of a controller's
+            error).
         load : float
             The load part about which gravity's columns are linear.
         pull : (float, float)
@@ -318,6 +319,7 @@ class Log:
             "warming": lambda: at(side * warmer),
             "thinning": lambda: at(five_point_difference(turned, 1) * fs * warmer),
             "late": lambda: self._torque_rate(steered),
+            "wound": lambda: at(np.cumsum(np.zeros_like(turned) if self.error is None else self.error) / fs),
             "borne": lambda: at(side * np.abs(np.zeros_like(position) if self.bodies is None else self.bodies)),
         }
         for term in terms:
