@@ -185,6 +185,10 @@ def test_a_law_alone_needs_the_mass() -> None:
     refused = predict("law.toml", "a.csv")
     assert refused.exit_code == 2
     assert "holds a law alone" in refused.stderr
+    Path("elbow-joint", "joint").mkdir(parents=True)
+    Path("elbow-joint", "joint", "law.toml").write_text(LAW)
+    for folder in ("elbow-joint", "elbow-joint/joint"):  # as `stickslip joint` writes it
+        assert "holds a law alone" in predict(folder, "a.csv").stderr
     rig = ("--mass", "2.42 kg", "--stiffness", "2.31 N/mm", "--damping", "0.12")
     result = predict("law.toml", "a.csv", *rig, "--no-plain", "--json")
     assert json.loads(result.stdout)["follows"]["x"] > 99

@@ -290,7 +290,7 @@ def read_fitted(path: str | Path, *, rig: RigSettings | None = None) -> Oscillat
     Parameters
     ----------
     path : path
-        The folder of a fit's results, its ``law/law.toml``, or any file of a system.
+        The folder of a fit's or a joint's results, its ``law.toml``, or any file of a system.
     rig : RigSettings, optional
         Mass, spring, damper and contact, for a file that holds a law alone.
 
@@ -312,7 +312,9 @@ def read_fitted(path: str | Path, *, rig: RigSettings | None = None) -> Oscillat
     Coulomb(kinetic=1.1, static=None)
     """
     path = Path(path)
-    path = path / LAW if path.is_dir() else path
+    if path.is_dir():  # of a joint's results, or where the law itself lies, no less than of a fit's
+        files = (path / LAW, path / "joint" / LAW.name, path / LAW.name)
+        path = next((file for file in files if file.is_file()), files[0])
     if rig is not None and rig.mass is not None and rig.stiffness is not None:
         values, _ = read_toml(path, what="a fitted law is")
         if "system" not in values:
