@@ -89,6 +89,20 @@ def test_sensitivities_are_differences(name: str) -> None:
         assert np.abs(jacobian[:, column] - slope).max() < 3e-5 * np.abs(slope).max()
 
 
+@pytest.mark.parametrize("wear", [-0.1, -0.3])
+def test_sensitivities_are_differences_where_friction_is_worn_away(wear: float) -> None:
+    given = parameters(damping_ratio=0.01, dry_displacement=0.05, wear=wear)
+    free = (*ALWAYS, "damping_ratio", "dry_displacement", "wear")
+    times = np.linspace(0.0, 3.0, 400)
+    _, jacobian, _ = free_decay(times, given, free=free)
+    for column, parameter in enumerate(free):
+        step = 1e-6 * np.eye(len(PARAMETERS))[PARAMETERS.index(parameter)]
+        slope = (free_decay(times, given + step)[0] - free_decay(times, given - step)[0]) / 2e-6
+        assert (
+            np.abs(jacobian[:, column] - slope).max() < 3e-4 * np.abs(slope).max()
+        )  # a step goes over the bend where it ends
+
+
 def test_the_closed_form_of_viscous_and_dry() -> None:
     """Reference FD-1: thirteen half cycles, then rest at +0.017450259726877213."""
     x, _, begun = free_decay([0.0, 20.0], [np.sqrt(10), 0.1 / np.sqrt(10), 0.02, 0, 1, 0, 0, 0, 0, 0, 0.5, 0])

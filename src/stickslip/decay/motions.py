@@ -207,6 +207,7 @@ def _rates(state, p, active, sine, branch, worn, out):
     fresh = p[DRY] * (1 + p[RISE] * decay)
     grown = p[WEAR] / first if p[WEAR] != 0 else 0.0
     level = max(0.0, 1 + grown * slid)
+    grown = grown if level > 0 else 0.0  # what is worn away changes no more
     dry = fresh * level
     fade = level * p[DRY] * p[RISE] * decay / p[SPEED] if p[SPEED] > 0 else 0.0
     # Slopes of u'' by u and by y; y = -u', so that the second counts with the other sign below.
@@ -237,7 +238,7 @@ def _rates(state, p, active, sine, branch, worn, out):
         elif name == CURVATURE:
             direct = -square * u**3
         elif name == WEAR:
-            direct = square * fresh * slid / first
+            direct = square * fresh * slid / first if level > 0 else 0.0
         elif name == AMPLITUDE and grown != 0:
             direct = -square * fresh * grown * slid / p[AMPLITUDE]
         if grown != 0:
