@@ -23,6 +23,18 @@ def rise(roots: list[float], *, lead: float = 1.0, low: int = 0, limit: float = 
     return float(first_rise(c, noises, 21, low, 1.0, 0.0, limit))
 
 
+def test_no_rise_below_zero_is_left_unproved() -> None:
+    """On -1 to 1, without noise, the march came to stand where the numbers are finer: 6 of these cubics were unsure."""
+    rng, noise = np.random.default_rng(1), np.zeros(21)
+    for _ in range(20_000):
+        c = np.zeros(21)
+        c[:4] = rng.standard_normal(4)
+        if np.polyval(c[3::-1], -1.0) < 0 < np.polyval(c[3::-1], 1.0):
+            root = first_rise(c, noise, 21, 0, 1.0, -1.0, 1.0)
+            assert -1 < root <= 1, c[:4].tolist()
+            assert abs(np.polyval(c[3::-1], root)) < 1e-12
+
+
 @pytest.mark.parametrize(
     ("roots", "lead", "found", "tolerance"),
     [

@@ -16,7 +16,7 @@ from numpy.polynomial import Legendre
 
 from stickslip.arrays import Array
 from stickslip.compiled import compiled
-from stickslip.solve.roots import NOISE, NONE, first_rise
+from stickslip.solve.roots import NOISE, NONE, UNSURE, first_rise
 from stickslip.solve.taylor import (
     EXACT,
     Exits,
@@ -310,7 +310,7 @@ def _fitted_node(node, size, fit, work):
 @compiled(**EXACT)
 def landing(implicit, mode, big, work):
     """Where a leap ends, as w from -1 to 1, and by which exit (-1 where by none): an exit, or a sleeping function that
-    wakes. `big` is (N,)."""
+    wakes; from -1 to -1 where that is not proved. `big` is (N,)."""
     model, fit, step = implicit.model, implicit.scheme.fit, work.step
     exits, guards = model.exits, model.guards
     c, noise, size, asleep = step.c, step.noise, len(big), 4.0 - math.log(model.tolerance)
@@ -326,6 +326,8 @@ def landing(implicit, mode, big, work):
             c[0] += level
             noise[0] = 0.0
             w = first_rise(c, noise, WIDTH, 0, 1.0, -1.0, 1.0)
+            if w == UNSURE:
+                return -1.0, -1
             end = end if w == NONE else min(end, w)
     # Exit: the first rise of any, no later than the end so far.
     for e in range(exits.first[mode], exits.first[mode + 1]):
@@ -340,6 +342,8 @@ def landing(implicit, mode, big, work):
         if at(c, -1.0) >= -noise[0]:  # too near for a leap
             return -1.0, -1
         w = first_rise(c, noise, WIDTH, 0, 1.0, -1.0, end)
+        if w == UNSURE:
+            return -1.0, -1
         if w != NONE and (w < end or leaving < 0):
             end, leaving = w, e
     return end, leaving

@@ -114,7 +114,7 @@ def first_rise(c, noise, count, low, sign, start, limit):
             end = sign * _curve(c, low, count, limit)[0]
             return limit if end >= 0.0 else NONE
         # steps below rounding end at the root
-        if step <= 4e-16 * max(u, 1e-3):
+        if step <= 4e-16 * max(abs(u), 1e-3):
             return u if d > 0.0 else NONE
         u += step
     return UNSURE
