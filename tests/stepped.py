@@ -25,7 +25,7 @@ class Rig:
     a memory.
 
     A contact that gives way has a damping `loss` [N s/m]; in slip its spring relaxes as that lets it. LuGre's bristles
-    have the stiffness `contact` and fall along the same curve; the state variable's force follows Coulomb's at the
+    have that stiffness and damping and fall along the same curve; the state variable's force follows Coulomb's at the
     `rate` [1/s]. The forces of a rigid contact stray by a share `rough` along the surface.
     """
 
@@ -160,10 +160,10 @@ def _compliant(p, samples, settle, h, steps):  # type: ignore[no-untyped-def]
 def _remembering(p, samples, settle, h, steps):  # type: ignore[no-untyped-def]
     """The same of a friction that remembers: its own equation solved exactly in each step, at the step's velocity."""
     m, k, c, amplitude, w, kinetic, static, _, speed, stiffness, rate, exponent = p[:12]
-    out = np.zeros((3, samples))
-    x, v, t, f = 0.0, 0.0, 0.0, 0.0
+    out, loss = np.zeros((3, samples)), p[13]
+    x, v, t, f, friction = 0.0, 0.0, 0.0, 0.0, 0.0
     for number in range((settle + samples - 1) * steps + 1):
-        a = (k * (amplitude * np.sin(w * t) - x) - c * v - f) / m
+        a = (k * (amplitude * np.sin(w * t) - x) - c * v - friction) / m
         row = number // steps - settle
         if number % steps == 0 and row >= 0:
             out[0, row], out[1, row], out[2, row] = x, v, a
@@ -175,8 +175,9 @@ def _remembering(p, samples, settle, h, steps):  # type: ignore[no-untyped-def]
             towards, quick = level * np.sign(half_v), stiffness * abs(half_v) / level
         else:
             towards, quick = kinetic * np.tanh(half_v / (STILL * amplitude * w)), rate
-        f = towards + (f - towards) * np.exp(-quick * h)
-        v = (half_v + h / 2 * (k * (amplitude * np.sin(w * t) - x) - f) / m) / (1 + h / 2 * c / m)
+        before, f = f, towards + (f - towards) * np.exp(-quick * h)
+        friction = f + (loss * (f - before) / (h * stiffness) if loss else 0.0)  # the bristles' own damper
+        v = (half_v + h / 2 * (k * (amplitude * np.sin(w * t) - x) - friction) / m) / (1 + h / 2 * c / m)
     return out, 0.0, 0
 
 

@@ -122,14 +122,14 @@ class Belief:
         if RATE in values and kinetic > 0:
             steepness = 1 / (STEEP * _sizes(self.record).fastest)
             return StateVariable(kinetic, rate=math.exp(values[RATE]) / kinetic, steepness=steepness)
+        loss = values.get(LOSS, 0.0) * math.sqrt(self.contact * self.stated.mass) if LOSS in values else 0.0
         if GIVE in values and HELD in values:
             if static is None:
                 return Dahl(kinetic, stiffness=self.contact)
             fall = math.exp(values.get(SPEED, self.ends(SPEED)[0]))
-            return LuGre(kinetic, static, speed=fall, stiffness=self.contact, damping=0.0)
+            return LuGre(kinetic, static, speed=fall, stiffness=self.contact, damping=loss)
         if GIVE in values:
-            loss = values.get(LOSS, 0.0) * math.sqrt(math.exp(values[GIVE]) * self.stated.mass)
-            return CompliantContact(kinetic, stiffness=math.exp(values[GIVE]), damping=loss, static=static)
+            return CompliantContact(kinetic, stiffness=self.contact, damping=loss, static=static)
         if SPEED in values:
             speed, exponent = math.exp(values[SPEED]), math.exp(values[POWER])
             return Stribeck(kinetic, static or kinetic, speed=speed, exponent=exponent)
@@ -308,12 +308,6 @@ class Belief:
         """The same without a part."""
         return replace(self, values={name: value for name, value in self.values.items() if name != part})
 
-    def drawn(self, rng: np.random.Generator) -> Belief:
-        """A rig that the record leaves possible as well, by chance."""
-        if self.fit is None:
-            return self
-        return self.by(self.fit.names, self.fit.root @ rng.standard_normal(len(self.fit.names)))
-
     def size(self, name: str) -> float:
         """About how large a value is."""
         if name in ("x", "v"):
@@ -370,12 +364,6 @@ class Belief:
                 measured = MeasuredNoise(sensor.noise.white, density=density, spacing=spacing)
                 rig = rig.having(sensor.channel, noise=measured)
         return replace(self, rig=rig)
-
-    def fitted_to(self, x: Array) -> Belief:
-        """The rig that a twin would have been believed to be by its displacement, by the same linear fit."""
-        if self.fit is None:
-            return self
-        return self.by(self.fit.names, self.fit.gain @ levelled(x - self.moved))
 
     @cached_property
     def moved(self) -> Array:
