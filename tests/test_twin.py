@@ -18,13 +18,13 @@ from scipy.signal import lfilter
 
 import stepped
 import stickslip as ss
-from stickslip.answers.on_twins import _yields
+from stickslip.answers.on_twins import _slip, _yields
 from stickslip.cli.program import main
 from stickslip.estimate import UNTRIED, kinds, stands
 from stickslip.law.driven import Sampled, Tones
-from stickslip.twin.belief import GAIN, LATE, SPRING
+from stickslip.twin.belief import EXCESS, GAIN, LATE, SPRING
 from stickslip.twin.search import believe
-from stickslip.twin.trial import ASTRAY, _Misfit, try_on_twins
+from stickslip.twin.trial import ASTRAY, _Misfit, _within_ends, try_on_twins
 
 RATIO = "static over sliding friction"
 PULL = 800 * 4e-3  # N: what shakes these rigs
@@ -434,6 +434,33 @@ def test_a_constant_that_is_off_is_told_where_no_law_explains_x() -> None:
     tried = ss.tried(ss.analyze(record, **{**STOPS.stated, "mass": 1.02 * STOPS.mass}), twins=8)
     assert "a mass 2 % smaller" in tried.trial.doubt.words
     assert not stands(tried.loops.level.status)
+
+
+def test_a_constant_whose_force_is_little_of_the_friction_leaves_the_numbers() -> None:
+    """Nobody knows a spring to 0.01 %: 0.9997 N for 1 N was "not to be trusted", mended by the same command."""
+    record = stepped.record(STOPS, np.random.default_rng(11), noise=1e-4)
+    tried = ss.tried(ss.analyze(record, **{**STOPS.stated, "stiffness": 1.0005 * STOPS.stiffness}), twins=8)
+    level = tried.loops.level
+    assert ASTRAY in kinds(level.status)
+    assert stands(level.status)
+    assert level.includes(STOPS.kinetic)
+    assert not tried.trial.unlike
+    assert not ss.summary(tried).remedies
+
+
+def test_a_mended_constant_has_the_digits_that_mend_it() -> None:
+    belief = asked(STOPS)[1].trial.belief
+    assert _slip(belief.at(**{SPRING: 1.1e-4}), SPRING, belief.record).constants == {"stiffness": 1.00011}
+
+
+def test_what_would_leave_its_end_is_made_up_for_by_the_others() -> None:
+    belief = asked(BEARS)[1].trial.belief
+    fit = belief.fit
+    assert fit is not None
+    far = -2 * belief.values[EXCESS] / fit.sd(EXCESS) ** 2 * fit.root @ fit.root[fit.names.index(EXCESS)]
+    cut = _within_ends(belief, fit, far)
+    assert cut.values[EXCESS] == pytest.approx(0.0, abs=1e-12)
+    assert cut.kinetic == pytest.approx(belief.by(fit.names, far / 2).kinetic), "half the way, along the valley"
 
 
 def test_a_force_that_drives_the_mass_is_written_by_its_twins_too() -> None:

@@ -99,7 +99,7 @@ def _as_tried(findings: Findings, trial: Trial) -> dict[str, Any]:
         "presliding": findings.presliding if findings.stiffness is not None else _yields(findings.presliding, trial),
     }
     results["slipped"] = tuple(_slip(rig, name, findings.record) for name, rig in trial.slips.items())
-    if trial.doubt is not None:  # what was not tried rests on the same constants and channels
+    if trial.doubt is not None and trial.unlike:  # what was not tried rests on the same constants and channels
         results |= {key: flagged(results.get(key, findings.results.get(key)), trial.doubt) for key in BY_FORCE}
     return results
 
@@ -107,16 +107,16 @@ def _as_tried(findings: Findings, trial: Trial) -> dict[str, Any]:
 def _slip(rig: Belief, name: str, record: Record) -> Slip:
     """What of a record's channels and constants is to be read otherwise, were it what this rig has off."""
     if name == LATE:
-        return Slip(rig.slip, delays={"x": _rounded(record.channels["x"].delay + rig.late)})
-    factor = math.exp(rig.values[name])
+        return Slip(rig.slip, delays={"x": record.channels["x"].delay + _rounded(rig.late)})
+    off = rig.values[name]
     if name == GAIN:
-        return Slip(rig.slip, {"x": ("x", _rounded(1 / factor))})
-    return Slip(rig.slip, constants={{MASS: "mass", SPRING: "stiffness"}[name]: _rounded(factor)})
+        return Slip(rig.slip, {"x": ("x", 1 + _rounded(math.expm1(-off)))})
+    return Slip(rig.slip, constants={{MASS: "mass", SPRING: "stiffness"}[name]: 1 + _rounded(math.expm1(off))})
 
 
 def _rounded(value: float) -> float:
     """To what of it may be told: it is written into a command."""
-    return float(f"{value:.4g}")
+    return float(f"{value:.3g}")
 
 
 def _note(trial: Trial) -> str:
@@ -130,7 +130,7 @@ def _note(trial: Trial) -> str:
 def _yields(quick: Presliding | None, trial: Trial) -> Presliding | None:
     """What a contact does before it slips, by the fit to x where it tells; not what rigid twins show too."""
     stiffness, power = trial.estimates.get(GIVES), trial.felt.get(COMPLIANCE)
-    if trial.doubt is not None:
+    if trial.doubt is not None and trial.unlike:
         return None if quick is None else _telling("can not be told", trial.doubt.words)
     if stiffness is not None and stiffness.value > 0:
         why, low, high = f"a contact of {stiffness} leaves less of x than a rigid one", *stiffness.interval

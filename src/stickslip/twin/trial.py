@@ -18,7 +18,22 @@ from stickslip.estimate import FEW, NORMAL_95, UNSTATED, Doubt, Estimate, Status
 from stickslip.record.record import Record
 from stickslip.statistics import BINS, repeating, student
 from stickslip.twin import descent
-from stickslip.twin.belief import EXCESS, GIVE, KINETIC, RATE, SLOPE, Belief, Fit, levelled
+from stickslip.twin.belief import (
+    DAMPER,
+    DRIVE,
+    EXCESS,
+    GAIN,
+    GIVE,
+    KINETIC,
+    LATE,
+    MASS,
+    RATE,
+    SLOPE,
+    SPRING,
+    Belief,
+    Fit,
+    levelled,
+)
 from stickslip.twin.search import CHANCE, CLOSE
 from stickslip.workers import Map
 
@@ -61,6 +76,9 @@ STRAINED = 4.0  # standard deviations by which a constant may be off before that
 LOST = 0.3  # of x, that the nearest rig may leave: beyond, twins scatter so far that none strays from another
 SAME = 0.95  # of x, that is the same in every cycle, where noise is told from a misfit by that: a bin of 16 holds 0.99
 UNLIKE = 1.15  # times what noise explains, by which x may stray from its twin before that is said
+# Of the sliding friction, the force that a constant amounts to which is off by more than was stated, below which the
+# numbers stand: nobody knows a spring to a ten thousandth, and of a quiet record x asks for less.
+SLIGHT = 0.01
 ASTRAY, UNFELT, RIVALS = "unlike its twins", "not felt", "another law as likely"  # kinds of doubt
 
 
@@ -124,12 +142,13 @@ class Trial:
     @property
     def unlike(self) -> bool:
         """Whether the record is not of the kind of its twins."""
-        return self.doubt is not None
+        return self.doubt is not None and not self.doubt.lesser
 
     @property
     def slips(self) -> Mapping[str, Belief]:
-        """By what is off, the nearest rig that has it off; none where that does not explain the record."""
-        return {} if self.belief.left > LOST or self.strays > UNLIKE else self.belief.slips
+        """By what is off, the nearest rig that has it off; none where that is slight, or does not explain x."""
+        explained = self.belief.left <= LOST and self.strays <= UNLIKE
+        return self.belief.slips if explained and self.unlike else {}
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON: how many, the law believed in, what would be felt, and how far x strays."""
@@ -236,11 +255,18 @@ class _Misfit:
     strain: float
     left: float
     slip: str
+    slight: bool
 
     @classmethod
     def of(cls, belief: Belief, strays: float, repeats: float) -> _Misfit:
         """That of a belief's record, with what else as well as its slip would be one."""
-        return cls(strays, repeats, belief.strain, belief.left, " or ".join(r.slip for r in belief.slips.values()))
+        slip, slight = " or ".join(r.slip for r in belief.slips.values()), _feigned(belief) < SLIGHT * belief.kinetic
+        return cls(strays, repeats, belief.strain, belief.left, slip, slight)
+
+    @property
+    def unlike(self) -> bool:
+        """Whether the record is not of its twins' kind."""
+        return self.doubt is not None and not self.doubt.lesser
 
     @property
     def doubt(self) -> Doubt | None:
@@ -258,24 +284,37 @@ class _Misfit:
                 else ", in each cycle another way, as slow noise of a sensor does, which the intervals do not count"
             )
             return Doubt(f"x strays {self.strays:.2g} times as far from its twins as noise explains{why}", ASTRAY)
-        if self.slip:
-            return Doubt(
-                f"its nearest twin has {self.slip}: correct that, or the contact is of no kind that was tried",
-                ASTRAY,
-            )
-        if self.strain > STRAINED:
-            return Doubt(
-                f"its nearest twin has a constant {self.strain:.0f} standard deviations off: the contact is of no kind "
-                "that was tried, or that constant is less sure than stated",
-                ASTRAY,
-            )
-        return None
+        off = f"a constant {self.strain:.0f} standard deviations off" if self.strain > STRAINED else ""
+        if not (off := self.slip or off):
+            return None
+        if self.slight:
+            words = f"its nearest twin has {off}, as a force less than {100 * SLIGHT:g} % of the friction"
+            return Doubt(f"{words}, which the intervals count", ASTRAY, lesser=True)
+        mend = "correct that, or the contact is of no kind that was tried"
+        if not self.slip:
+            mend = "the contact is of no kind that was tried, or that constant is less sure than stated"
+        return Doubt(f"its nearest twin has {off}: {mend}", ASTRAY)
+
+
+def _feigned(belief: Belief) -> float:
+    """Root mean square of the force [N] that constants, or the clock of x, amount to by as much as they are off."""
+    record, stated = belief.record, belief.stated
+    z, driven = (record[name] if name in record else np.zeros(len(record)) for name in ("z", "force"))
+    spring = stated.stiffness * (record["x"] - z)
+    inertia = driven - record["friction"] - spring
+    by_x = inertia + stated.stiffness * record["x"]
+    forces = {SPRING: spring, MASS: inertia, GAIN: by_x, LATE: np.gradient(by_x) * record.fs, DAMPER: record["v"]}
+    forces |= dict.fromkeys(DRIVE, stated.stiffness * z + driven)
+    off = {name for name, sd in belief.unsure.items() if abs(belief.values[name]) > STRAINED * sd}
+    off |= {belief.slipped} - {""}
+    return math.hypot(*(belief.values[name] * float(np.sqrt(np.mean(forces[name] ** 2))) for name in off))
 
 
 @dataclass(frozen=True, eq=False)
 class _Twin:
     values: Mapping[str, float]  # of its rig
     x: Array
+    noise: Array
     answers: Answers
     truth: Mapping[str, float]
 
@@ -286,10 +325,14 @@ def _ask_twin(
     """A twin, with its answers and its truth; None of one that can not be followed: it tells nothing."""
     chance = np.random.default_rng(seed)
     # the linear fit of a rig that is nowhere near draws others that can not be followed
-    for drawn in (belief.drawn(chance), belief) if belief.left > LOST else (belief.drawn(chance),):
+    drawn = belief
+    if (fit := belief.fit) is not None:
+        drawn = _within_ends(belief, fit, fit.root @ chance.standard_normal(len(fit.names)))
+    for rig in (drawn, belief) if belief.left > LOST else (drawn,):
         try:
-            record = drawn.twin(chance)
-            return _Twin(drawn.values, record["x"], ask(record), _truth(drawn, record, frequency))
+            record = rig.twin(chance)
+            x = record["x"]
+            return _Twin(rig.values, x, x - rig.moved, ask(record), _truth(rig, record, frequency))
         except StickslipError:
             continue
     return None
@@ -362,23 +405,49 @@ def _fitted(
     quick: Estimate, value: Callable[[Belief], float], belief: Belief, twins: list[_Twin], misfit: _Misfit
 ) -> Estimate:
     """What the displacement tells through the equation of motion; a bound where the part is not believed in."""
-    if misfit.doubt and not quick.known:  # of a contact of another kind the fit tells no more
+    if misfit.unlike and not quick.known:  # of a contact of another kind the fit tells no more
         return quick
     part = {LEVEL: KINETIC, FALL: SLOPE, GIVES: GIVE}.get(quick.name, EXCESS)
     reach = 0.0
     if part not in belief.values:
-        if misfit.doubt:  # of a contact of another kind nothing is bounded
+        if misfit.unlike:  # of a contact of another kind nothing is bounded
             return _estimate(quick, quick.value, quick.interval, quick.method, [quick.status], misfit)
         reach = _detectable(belief, part, value)
     if not math.isfinite(value(belief) + reach):
         words = Doubt("the motion does not depend on it, so that the record tells nothing of it", UNFELT)
         return replace(quick.unknown(Status(words)), method=f"fit to x, {len(twins)} twins")
-    errors = np.array([value(belief.fitted_to(twin.x)) - value(belief.at(**twin.values)) for twin in twins])
+    errors = np.array([value(_refitted(belief, twin.x)) - value(belief.at(**twin.values)) for twin in twins])
     least, (low, high) = _less_bias(value(belief), errors, misfit.strays)
     interval = (low - reach if part == SLOPE else low, high + reach)
-    if quick.known and (misfit.doubt or belief.falls):  # a line, where a real one is a curve
+    if quick.known and (misfit.unlike or belief.falls):  # a line, where a real one is a curve
         interval = _hull(least, interval, quick)
     return _estimate(quick, least, interval, f"fit to x, {len(twins)} twins", [], misfit)
+
+
+def _refitted(belief: Belief, x: Array) -> Belief:
+    """The rig that a twin would have been believed to be by its displacement, by the same linear fit."""
+    fit = belief.fit
+    return belief if fit is None else _within_ends(belief, fit, fit.gain @ levelled(x - belief.moved))
+
+
+def _within_ends(belief: Belief, fit: Fit, step: Array) -> Belief:
+    """The rig a step of its fit away; of what would leave its end, others make up as much as x lets them.
+
+    Cut to its end alone, a static friction that the sliding one makes up for left twins with half as much of both.
+    """
+    low, high = np.array([belief.ends(name) for name in fit.names]).T - [belief.values[name] for name in fit.names]
+    covariance = fit.root @ fit.root.T
+    for _ in fit.names:
+        sd = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+        beyond = np.divide(step - np.clip(step, low, high), sd, out=np.zeros(len(sd)), where=sd > 0)
+        furthest = int(np.argmax(np.abs(beyond)))
+        if not beyond[furthest]:
+            break
+        others = covariance[furthest] / covariance[furthest, furthest]
+        step = step - beyond[furthest] * sd[furthest] * others
+        covariance = covariance - np.outer(covariance[furthest], others)
+        covariance[furthest] = covariance[:, furthest] = 0.0
+    return belief.by(fit.names, step)
 
 
 def _detectable(belief: Belief, part: str, value: Callable[[Belief], float]) -> float:
@@ -513,7 +582,7 @@ def _strays(belief: Belief, twins: list[_Twin], frequency: float) -> tuple[float
     """
     if belief.fit is None:
         return math.inf, math.inf
-    apart = levelled(np.array([twin.x - belief.moved for twin in twins]).T)
+    apart = levelled(np.array([twin.noise for twin in twins]).T)
     apart -= belief.fit.jacobian @ (belief.fit.gain @ apart)
     explained = math.sqrt(float(np.mean(apart**2)))
     strays = float(np.std(belief.residual))
