@@ -12,7 +12,7 @@ from stickslip.record.clock import fit_clock
 
 
 @pytest.mark.parametrize("digits", [6, 7])
-@pytest.mark.parametrize("fs", [22_050.0, 4000.0, 150.0])
+@pytest.mark.parametrize("fs", [22_050.0, 4000.0, 229.0, 161.0, 150.0])
 def test_stamps_of_so_many_significant_digits_follow_one_rate(tmp_path: Path, fs: float, digits: int) -> None:
     rows = np.arange(int(2.1 * fs))
     lines = [f"{row / fs:.{digits}g},{np.sin(row / 50):.6g}" for row in rows]  # as "%g" writes them

@@ -50,16 +50,21 @@ def resolution(stamps: Array) -> float:
     """
     largest = float(np.max(np.abs(stamps), initial=0.0))
     floor = 4 * np.finfo(float).eps * max(largest, np.finfo(float).tiny)
+    some = stamps[stamps != 0]
+    places = np.floor(np.log10(np.abs(some)))
+    steps = []
     for digits in range(10):
         scaled = stamps * 10.0**digits
         if np.max(np.abs(scaled - np.rint(scaled)), initial=0.0) <= floor * 10.0**digits:
-            return float(10.0**-digits)
-    some = stamps[stamps != 0]
-    places = np.floor(np.log10(np.abs(some)))
+            steps.append(10.0**-digits)
+            break
     for digits in SIGNIFICANT if len(some) and math.isfinite(largest) else ():
         scaled = some * 10.0 ** (digits - 1 - places)
         if np.max(np.abs(scaled - np.rint(scaled))) <= 4 * np.finfo(float).eps * 10.0**digits:
-            return float(10.0 ** (places.max() - digits + 1))
+            steps.append(10.0 ** (places.max() - digits + 1))
+            break
+    if steps:  # the first thousandths of a second have all the decimals of seven digits
+        return float(max(steps))
     single = stamps.astype(np.float32)
     return float(np.spacing(np.float32(largest))) if np.array_equal(single.astype(float), stamps) else floor
 
