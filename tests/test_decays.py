@@ -322,6 +322,23 @@ def test_the_headline_names_the_motion_that_the_record_leaves():
     assert ss.summary(findings).plates
 
 
+def test_a_motion_that_has_dry_friction_claims_none_that_is_not_there():
+    """A softening spring without dry friction died away "by viscous damping and dry friction", of 0 nm."""
+    from stickslip.decay.motions import free_decay as any_decay
+
+    t = np.arange(4000) / 500
+    x = any_decay(t, [20.0, 0.005, 0, 0, 0.03, 0, 0, 0, 0, 0, 0.5, -200.0])[0]
+    findings = ss.analyze_decay(
+        ss.Record.of({"x": x + 1e-6 * np.random.default_rng(7).standard_normal(t.size)}, fs=500)
+    )
+    assert findings.decay.best is findings.decay.motion
+    assert not findings.decay.rubs
+    told = " ".join(ss.summary(findings).headline)
+    assert "dies away as it would by" in told
+    assert "and a curvature of the spring" in told
+    assert "That there is dry friction too can not be told: less than" in told
+
+
 def test_a_pendulum_read_with_a_straight_spring_is_told_so():
     from stickslip.decay.motions import free_decay as any_decay
 

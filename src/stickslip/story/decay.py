@@ -220,7 +220,10 @@ def _dying(decay: Decay) -> str:
     curved = decay.best is decay.thesis and not decay.releases.ring_downs[0].isochronous
     if decay.motion is not None and decay.best is decay.motion:
         forces = decay.motion.choice.chosen.fitted.motion.words
-        return f"The motion dies away by {forces}: {_listed([_with_interval(term) for term in decay.motion.terms])}."
+        terms = [term for term in decay.motion.terms if rubs or term.name != dry.name]
+        told = f"by {forces}: {_listed([_with_interval(term) for term in terms])}."
+        hidden = "" if len(terms) == len(decay.motion.terms) else f" {_hidden(dry, 'dry friction')}"
+        return f"The motion dies away {'as it would ' if hidden else ''}{told}{hidden}"
     if decay.undecided:
         ratio, dry = decay.whichever
         return (

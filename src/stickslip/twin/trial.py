@@ -152,9 +152,11 @@ class Trial:
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON: how many, the law believed in, what would be felt, and how far x strays."""
+        law = self.belief.law
+        numbers = {name: float(value) for name, value in vars(law).items() if isinstance(value, (int, float))}
         return {
             "count": self.count,
-            "law": {"name": type(self.belief.law).__name__, **_numbers(self.belief)},
+            "law": {"name": type(law).__name__, **numbers},
             "felt": {name: None if power is None else vars(power) for name, power in self.felt.items()},
             "strays": self.strays,
             "repeats": self.repeats,
@@ -227,7 +229,7 @@ def try_on_twins(
         if name in answers and answers[name].known:
             pairs = [(twin.answers.get(name), twin.truth[name]) for twin in twins]
             both = belief.falls or UNSTATED in kinds(answers[name].status)
-            tried[name] = _widened(_tried(answers[name], pairs, misfit, both=both), others[name])
+            tried[name] = _widened(_tried(answers[name], pairs, misfit, both=both), others.get(name, []))
     if GIVE in belief.values:
         answers = {**answers, GIVES: Estimate(GIVES, belief.contact, (0.0, math.inf), math.inf, "N/m", "fit to x")}
     for name, value in FITTED.items():
@@ -235,7 +237,7 @@ def try_on_twins(
             tried[name] = _widened(_fitted(answers[name], value, belief, twins, misfit), _rival_offsets(belief, value))
     apart = tried[OFFSET].value if OFFSET in tried else 0.0
     tried |= {name: _widened(tried[name], [times * apart]) for name, times in ZERO.items() if name in tried}
-    if ENERGY in tried:
+    if ENERGY in tried and frequency > 0:
         tried[ENERGY] = _widened(tried[ENERGY], [-_work_of_drift(belief, frequency), _work_of_drift(belief, frequency)])
     if LEVEL in tried and tried[LEVEL].known:
         tried |= {name: _holding(tried[name], tried[LEVEL].interval) for name in DIRECTIONS if name in tried}
@@ -260,7 +262,8 @@ class _Misfit:
     @classmethod
     def of(cls, belief: Belief, strays: float, repeats: float) -> _Misfit:
         """That of a belief's record, with what else as well as its slip would be one."""
-        slip, slight = " or ".join(r.slip for r in belief.slips.values()), _feigned(belief) < SLIGHT * belief.kinetic
+        slip = " or ".join(r.slip for r in belief.slips.values())
+        slight = _feigned(belief, strays) < SLIGHT * belief.kinetic
         return cls(strays, repeats, belief.strain, belief.left, slip, slight)
 
     @property
@@ -271,43 +274,44 @@ class _Misfit:
     @property
     def doubt(self) -> Doubt | None:
         """What is said of it, where it is too far."""
+        slight = self.slight
         if self.left > LOST:
-            return Doubt(
-                f"its nearest twin leaves {100 * self.left:.0f} % of x: a constant, a unit or a channel is not as "
-                "stated, or the contact is of no kind that was tried",
-                ASTRAY,
-            )
-        if self.strays > UNLIKE:
-            why = (
-                ": the contact is of no kind that was tried, or a constant is not as stated"
-                if self.repeats
-                else ", in each cycle another way, as slow noise of a sensor does, which the intervals do not count"
-            )
-            return Doubt(f"x strays {self.strays:.2g} times as far from its twins as noise explains{why}", ASTRAY)
-        off = f"a constant {self.strain:.0f} standard deviations off" if self.strain > STRAINED else ""
-        if not (off := self.slip or off):
+            what, slight = f"its nearest twin leaves {100 * self.left:.0f} % of x", False
+            why = ": a constant, a unit or a channel is not as stated, or the contact is of no kind that was tried"
+        elif self.strays > UNLIKE:
+            what = f"x strays {self.strays:.2g} times as far from its twins as noise explains"
+            why = ": the contact is of no kind that was tried, or a constant is not as stated"
+            if not self.repeats:
+                slight = False
+                why = ", in each cycle another way, as slow noise of a sensor does, which the intervals do not count"
+        elif self.slip:
+            what = f"its nearest twin has {self.slip}"
+            why = ": correct that, or the contact is of no kind that was tried"
+        elif self.strain > STRAINED:
+            what = f"its nearest twin has a constant {self.strain:.0f} standard deviations off"
+            why = ": the contact is of no kind that was tried, or that constant is less sure than stated"
+        else:
             return None
-        if self.slight:
-            words = f"its nearest twin has {off}, as a force less than {100 * SLIGHT:g} % of the friction"
-            return Doubt(f"{words}, which the intervals count", ASTRAY, lesser=True)
-        mend = "correct that, or the contact is of no kind that was tried"
-        if not self.slip:
-            mend = "the contact is of no kind that was tried, or that constant is less sure than stated"
-        return Doubt(f"its nearest twin has {off}: {mend}", ASTRAY)
+        if slight:
+            why = f", as a force less than {100 * SLIGHT:g} % of the friction, which the intervals count"
+        return Doubt(what + why, ASTRAY, lesser=slight)
 
 
-def _feigned(belief: Belief) -> float:
-    """Root mean square of the force [N] that constants, or the clock of x, amount to by as much as they are off."""
-    record, stated = belief.record, belief.stated
+def _feigned(belief: Belief, strays: float) -> float:
+    """Root mean square of the force [N] that what strays of x, and constants that are off, amount to."""
+    record, stated, x = belief.record, belief.stated, belief.record["x"]
     z, driven = (record[name] if name in record else np.zeros(len(record)) for name in ("z", "force"))
-    spring = stated.stiffness * (record["x"] - z)
+    spring = stated.stiffness * (x - z)
     inertia = driven - record["friction"] - spring
-    by_x = inertia + stated.stiffness * record["x"]
+    by_x = inertia + stated.stiffness * x
     forces = {SPRING: spring, MASS: inertia, GAIN: by_x, LATE: np.gradient(by_x) * record.fs, DAMPER: record["v"]}
     forces |= dict.fromkeys(DRIVE, stated.stiffness * z + driven)
-    off = {name for name, sd in belief.unsure.items() if abs(belief.values[name]) > STRAINED * sd}
-    off |= {belief.slipped} - {""}
-    return math.hypot(*(belief.values[name] * float(np.sqrt(np.mean(forces[name] ** 2))) for name in off))
+    strained = {name for name, sd in belief.unsure.items() if abs(belief.values[name]) > STRAINED * sd}
+    off = [belief.values[name] * float(np.std(forces[name])) for name in strained | {belief.slipped} - {""}]
+    if strays > UNLIKE:  # beside the noise; what a force moves at the motion's own pace is no stiffer than either
+        stiff = max(stated.stiffness, stated.mass * float(np.var(record["v"]) / np.var(x)))
+        off.append(stiff * float(np.std(belief.residual)) * math.sqrt(1 - 1 / strays**2))
+    return math.hypot(*off)
 
 
 @dataclass(frozen=True, eq=False)
@@ -325,9 +329,8 @@ def _ask_twin(
     """A twin, with its answers and its truth; None of one that can not be followed: it tells nothing."""
     chance = np.random.default_rng(seed)
     # the linear fit of a rig that is nowhere near draws others that can not be followed
-    drawn = belief
-    if (fit := belief.fit) is not None:
-        drawn = _within_ends(belief, fit, fit.root @ chance.standard_normal(len(fit.names)))
+    fit = belief.fit
+    drawn = belief if fit is None else _within_ends(belief, fit, fit.root @ chance.standard_normal(len(fit.names)))
     for rig in (drawn, belief) if belief.left > LOST else (drawn,):
         try:
             record = rig.twin(chance)
@@ -414,8 +417,8 @@ def _fitted(
             return _estimate(quick, quick.value, quick.interval, quick.method, [quick.status], misfit)
         reach = _detectable(belief, part, value)
     if not math.isfinite(value(belief) + reach):
-        words = Doubt("the motion does not depend on it, so that the record tells nothing of it", UNFELT)
-        return replace(quick.unknown(Status(words)), method=f"fit to x, {len(twins)} twins")
+        unfelt = Doubt("the motion does not depend on it, so that the record tells nothing of it", UNFELT)
+        return replace(quick.unknown(Status(unfelt)), method=f"fit to x, {len(twins)} twins")
     errors = np.array([value(_refitted(belief, twin.x)) - value(belief.at(**twin.values)) for twin in twins])
     least, (low, high) = _less_bias(value(belief), errors, misfit.strays)
     interval = (low - reach if part == SLOPE else low, high + reach)
@@ -514,12 +517,12 @@ def _displaced(belief: Belief, fit: Fit, way: Array, deviations: float) -> Belie
 
 def _counted_offsets(belief: Belief, frequency: float) -> dict[str, list[float]]:
     """The same of what is counted in a simulated motion."""
-    chance = np.random.default_rng(0)  # the noise that it draws is not looked at
     rigid = [not {GIVE, RATE} & rig.values.keys() for rig in belief.rivals]
-    true, *others = (_truth(rig, rig.twin(chance), frequency) for rig in (belief, *belief.rivals))
-    # a contact that gives way holds at each reversal: that is no stop of one that does not
+    true, *others = (_truth(r, r.twin(np.random.default_rng(0)), frequency) for r in (belief, *belief.rivals))
+    # a contact that gives way holds at each reversal, which is no stop of one that does not
     alike = [other for other, stops in zip(others, rigid, strict=True) if stops or {GIVE, RATE} & belief.values.keys()]
-    return {name: [one[name] - true[name] for one in (alike if name in (SHARE, STOPS) else others)] for name in ASKED}
+    told = [name for name in ASKED if math.isfinite(true[name])]  # without a cycle there is none of its stops and work
+    return {name: [one[name] - true[name] for one in (alike if name in (SHARE, STOPS) else others)] for name in told}
 
 
 def _work_of_drift(belief: Belief, frequency: float) -> float:
@@ -539,8 +542,9 @@ def _widened(answer: Estimate, apart: list[float]) -> Estimate:
     if not answer.known or not apart:
         return answer
     if not np.isfinite(apart).all():
-        words = Doubt("laws without it explain x as well", RIVALS)
-        return replace(answer, status=Status(*doubts_of(answer.status), words))
+        return replace(
+            answer, status=Status(*doubts_of(answer.status), Doubt("laws without it explain x as well", RIVALS))
+        )
     low, high = answer.interval
     interval = (low + min(0.0, *apart), high + max(0.0, *apart))
     return replace(answer, interval=interval, sd=(interval[1] - interval[0]) / (2 * NORMAL_95))
@@ -593,8 +597,3 @@ def _strays(belief: Belief, twins: list[_Twin], frequency: float) -> tuple[float
     moved, left = (repeating(number, values)[number] for values in (levelled(belief.record["x"]), belief.residual))
     same = float(np.std(moved)) > SAME * float(np.std(belief.record["x"]))
     return strays / explained, (float(np.std(left)) if same else strays) / explained
-
-
-def _numbers(belief: Belief) -> dict[str, float]:
-    """The law's parameters that are numbers, by name."""
-    return {name: float(value) for name, value in vars(belief.law).items() if isinstance(value, (int, float))}
