@@ -23,8 +23,9 @@ from stickslip.cli.program import main
 from stickslip.estimate import UNTRIED, kinds, stands
 from stickslip.law.driven import Sampled, Tones
 from stickslip.twin.belief import EXCESS, GAIN, LATE, SPRING
+from stickslip.twin.descent import within_ends
 from stickslip.twin.search import believe
-from stickslip.twin.trial import ASTRAY, _Misfit, _within_ends, try_on_twins
+from stickslip.twin.trial import ASTRAY, _Misfit, try_on_twins
 
 RATIO = "static over sliding friction"
 PULL = 800 * 4e-3  # N: what shakes these rigs
@@ -458,7 +459,7 @@ def test_what_would_leave_its_end_is_made_up_for_by_the_others() -> None:
     fit = belief.fit
     assert fit is not None
     far = -2 * belief.values[EXCESS] / fit.sd(EXCESS) ** 2 * fit.root @ fit.root[fit.names.index(EXCESS)]
-    cut = _within_ends(belief, fit, far)
+    cut = within_ends(belief, fit, far)
     assert cut.values[EXCESS] == pytest.approx(0.0, abs=1e-12)
     assert cut.kinetic == pytest.approx(belief.by(fit.names, far / 2).kinetic), "half the way, along the valley"
 

@@ -1,8 +1,9 @@
-"""The rig nearest to a record, of one law: Levenberg's and Marquardt's descent."""
+"""The rig nearest to a record, of one law, by Levenberg's and Marquardt's descent; and those that its fit leaves."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -26,6 +27,7 @@ LEARNS = 0.5  # of what was left, that a step leaves at most where its slopes ar
 # Chi-squared below which a pass gains nothing. As a share of what is left, 1e-4 stopped in the valley of a damped
 # contact's stiffness, 13 above its floor; 1e-3, in bristles' (seed 911).
 SETTLED = 0.1
+LITTLE = 0.01  # of a standard deviation: a step so small that a value is linear in it
 
 
 def misfit(belief: Belief) -> float:
@@ -166,3 +168,57 @@ def slope_of(belief: Belief, name: str) -> Array:
         step /= 3
         moved = belief.at(**{name: belief.values[name] + step}).moved
     return np.asarray((moved - belief.moved) / step)
+
+
+def within_ends(belief: Belief, fit: Fit, step: Array) -> Belief:
+    """The rig a step of its fit away; of what would leave its end, others make up as much as x lets them.
+
+    Cut to its end alone, a static friction that the sliding one makes up for left twins with half as much of both.
+    """
+    low, high = np.array([belief.ends(name) for name in fit.names]).T - [belief.values[name] for name in fit.names]
+    covariance = fit.root @ fit.root.T
+    for _ in fit.names:
+        sd = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+        beyond = np.divide(step - np.clip(step, low, high), sd, out=np.zeros(len(sd)), where=sd > 0)
+        furthest = int(np.argmax(np.abs(beyond)))
+        if not beyond[furthest]:
+            break
+        others = covariance[furthest] / covariance[furthest, furthest]
+        step = step - beyond[furthest] * sd[furthest] * others
+        covariance = covariance - np.outer(covariance[furthest], others)
+        covariance[furthest] = covariance[:, furthest] = 0.0
+    return belief.by(fit.names, step)
+
+
+def linear_ends(belief: Belief, value: Callable[[Belief], float], deviations: float) -> tuple[float, float]:
+    """The ends of a value of rigs so many standard deviations of the linear fit away, the way that tells the most."""
+    middle, fit = value(belief), belief.fit
+    if fit is None or not math.isfinite(middle) or not deviations:
+        return middle, middle
+    slopes = np.array([value(belief.by(fit.names, LITTLE * step)) - middle for step in fit.root.T])
+    if not (norm := float(np.linalg.norm(slopes))) > 0:  # what is not moved at all, or undefined nearby
+        return middle, middle
+    ends = sorted(value(_displaced(belief, fit, side * slopes / norm, deviations)) for side in (-1, 1))
+    return ends[0], ends[1]
+
+
+def _displaced(belief: Belief, fit: Fit, way: Array, deviations: float) -> Belief:
+    """The rig so many standard deviations away; where a value comes to its end, the others go on without it.
+
+    A contact's stiffness went on as if its damping became less than none.
+    """
+    step, root, free = np.zeros(len(fit.names)), fit.root, np.ones(len(fit.names), dtype=bool)
+    ends = [belief.ends(name) for name in fit.names]
+    values = np.array([belief.values[name] for name in fit.names])
+    while True:
+        ahead = deviations * root @ way
+        room = np.array([high if go > 0 else low for (low, high), go in zip(ends, ahead, strict=True)]) - values - step
+        shares = np.divide(room, ahead, out=np.full(len(ahead), math.inf), where=free & (ahead != 0))
+        share, first = max(0.0, float(shares.min())), int(shares.argmin())
+        step = step + min(1.0, share) * ahead
+        if share >= 1:
+            return belief.by(fit.names, step)
+        held, free[first] = root[first] / float(np.linalg.norm(root[first])), False
+        deviations *= math.sqrt(1 - share**2)
+        root, way = root - np.outer(root @ held, held), way - held * float(way @ held)
+        way = way / (float(np.linalg.norm(way)) or 1.0)

@@ -31,7 +31,6 @@ from stickslip.twin.belief import (
     SLOPE,
     SPRING,
     Belief,
-    Fit,
     levelled,
 )
 from stickslip.twin.search import CHANCE, CLOSE
@@ -69,7 +68,6 @@ ASKED = (*DIRECTIONS, OFFSET, ENERGY, SHARE, STOPS)
 # What moves an answer where the zero of a sensor, and no friction, sets the directions apart: so many times the offset.
 ZERO = {OFFSET: -1.0, STATIC[0]: 1.0, STATIC[1]: -1.0}  # of sliding, it is the level then
 SIZES = tuple(1e-4 * 1.4**step for step in range(30))  # of friction, or of the motion: parts looked for, to two fifths
-LITTLE = 0.01  # of a standard deviation: a step so small that a value is linear in it
 STICKS = ("stick", "microstick")  # kinds of event
 ANSWERED = 0.5  # of the twins, that must answer a question for the record's answer to be tried on them
 STRAINED = 4.0  # standard deviations by which a constant may be off before that is said
@@ -239,6 +237,8 @@ def try_on_twins(
     tried |= {name: _widened(tried[name], [times * apart]) for name, times in ZERO.items() if name in tried}
     if ENERGY in tried and frequency > 0:
         tried[ENERGY] = _widened(tried[ENERGY], [-_work_of_drift(belief, frequency), _work_of_drift(belief, frequency)])
+    if misfit.doubt and not misfit.unlike:
+        tried = {name: _widened(tried[name], _feigned_offsets(tried[name], belief, misfit.feigned)) for name in tried}
     if LEVEL in tried and tried[LEVEL].known:
         tried |= {name: _holding(tried[name], tried[LEVEL].interval) for name in DIRECTIONS if name in tried}
     bounded = {name: answer.within(*BOUNDS.get(name, (0.0, math.inf))) for name, answer in tried.items()}
@@ -257,14 +257,14 @@ class _Misfit:
     strain: float
     left: float
     slip: str
+    feigned: float  # N, as friction
     slight: bool
 
     @classmethod
     def of(cls, belief: Belief, strays: float, repeats: float) -> _Misfit:
         """That of a belief's record, with what else as well as its slip would be one."""
-        slip = " or ".join(r.slip for r in belief.slips.values())
-        slight = _feigned(belief, strays) < SLIGHT * belief.kinetic
-        return cls(strays, repeats, belief.strain, belief.left, slip, slight)
+        slip, feigned = " or ".join(r.slip for r in belief.slips.values()), _feigned(belief, strays)
+        return cls(strays, repeats, belief.strain, belief.left, slip, feigned, bool(feigned < SLIGHT * belief.kinetic))
 
     @property
     def unlike(self) -> bool:
@@ -330,7 +330,9 @@ def _ask_twin(
     chance = np.random.default_rng(seed)
     # the linear fit of a rig that is nowhere near draws others that can not be followed
     fit = belief.fit
-    drawn = belief if fit is None else _within_ends(belief, fit, fit.root @ chance.standard_normal(len(fit.names)))
+    drawn = (
+        belief if fit is None else descent.within_ends(belief, fit, fit.root @ chance.standard_normal(len(fit.names)))
+    )
     for rig in (drawn, belief) if belief.left > LOST else (drawn,):
         try:
             record = rig.twin(chance)
@@ -430,27 +432,7 @@ def _fitted(
 def _refitted(belief: Belief, x: Array) -> Belief:
     """The rig that a twin would have been believed to be by its displacement, by the same linear fit."""
     fit = belief.fit
-    return belief if fit is None else _within_ends(belief, fit, fit.gain @ levelled(x - belief.moved))
-
-
-def _within_ends(belief: Belief, fit: Fit, step: Array) -> Belief:
-    """The rig a step of its fit away; of what would leave its end, others make up as much as x lets them.
-
-    Cut to its end alone, a static friction that the sliding one makes up for left twins with half as much of both.
-    """
-    low, high = np.array([belief.ends(name) for name in fit.names]).T - [belief.values[name] for name in fit.names]
-    covariance = fit.root @ fit.root.T
-    for _ in fit.names:
-        sd = np.sqrt(np.maximum(np.diag(covariance), 0.0))
-        beyond = np.divide(step - np.clip(step, low, high), sd, out=np.zeros(len(sd)), where=sd > 0)
-        furthest = int(np.argmax(np.abs(beyond)))
-        if not beyond[furthest]:
-            break
-        others = covariance[furthest] / covariance[furthest, furthest]
-        step = step - beyond[furthest] * sd[furthest] * others
-        covariance = covariance - np.outer(covariance[furthest], others)
-        covariance[furthest] = covariance[:, furthest] = 0.0
-    return belief.by(fit.names, step)
+    return belief if fit is None else descent.within_ends(belief, fit, fit.gain @ levelled(x - belief.moved))
 
 
 def _detectable(belief: Belief, part: str, value: Callable[[Belief], float]) -> float:
@@ -470,49 +452,15 @@ def _rival_offsets(belief: Belief, value: Callable[[Belief], float]) -> list[flo
     left, ends = {rig: descent.misfit(rig) for rig in (belief, *belief.rivals)}, list[float]()
     # one with a constant off by what nobody stated is nearer by that alone, and makes no other law less likely
     nearest = min(misfit for rig, misfit in left.items() if rig.slipped == belief.slipped)
-    low, high = _linear_ends(belief, value, NORMAL_95)
+    low, high = descent.linear_ends(belief, value, NORMAL_95)
     for rig in belief.rivals:
         further = rig.fit.freedom * math.log(left[rig] / nearest) if rig.fit is not None else math.inf
         if further > CLOSE:  # near the law that is believed in, which is not the nearest
             continue
-        least, most = _linear_ends(rig, value, math.sqrt(min(max(0.0, NORMAL_95**2 - further), NORMAL_95**2)))
+        least, most = descent.linear_ends(rig, value, math.sqrt(min(max(0.0, NORMAL_95**2 - further), NORMAL_95**2)))
         more = value(rig) - value(belief)
         ends += [min(more, least - low), max(more, most - high)]
     return ends
-
-
-def _linear_ends(belief: Belief, value: Callable[[Belief], float], deviations: float) -> tuple[float, float]:
-    """The ends of a value of rigs so many standard deviations of the linear fit away, the way that tells the most."""
-    middle, fit = value(belief), belief.fit
-    if fit is None or not math.isfinite(middle) or not deviations:
-        return middle, middle
-    slopes = np.array([value(belief.by(fit.names, LITTLE * step)) - middle for step in fit.root.T])
-    if not (norm := float(np.linalg.norm(slopes))) > 0:  # what is not moved at all, or undefined nearby
-        return middle, middle
-    ends = sorted(value(_displaced(belief, fit, side * slopes / norm, deviations)) for side in (-1, 1))
-    return ends[0], ends[1]
-
-
-def _displaced(belief: Belief, fit: Fit, way: Array, deviations: float) -> Belief:
-    """The rig so many standard deviations away; where a value comes to its end, the others go on without it.
-
-    A contact's stiffness went on as if its damping became less than none.
-    """
-    step, root, free = np.zeros(len(fit.names)), fit.root, np.ones(len(fit.names), dtype=bool)
-    ends = [belief.ends(name) for name in fit.names]
-    values = np.array([belief.values[name] for name in fit.names])
-    while True:
-        ahead = deviations * root @ way
-        room = np.array([high if go > 0 else low for (low, high), go in zip(ends, ahead, strict=True)]) - values - step
-        shares = np.divide(room, ahead, out=np.full(len(ahead), math.inf), where=free & (ahead != 0))
-        share, first = max(0.0, float(shares.min())), int(shares.argmin())
-        step = step + min(1.0, share) * ahead
-        if share >= 1:
-            return belief.by(fit.names, step)
-        held, free[first] = root[first] / float(np.linalg.norm(root[first])), False
-        deviations *= math.sqrt(1 - share**2)
-        root, way = root - np.outer(root @ held, held), way - held * float(way @ held)
-        way = way / (float(np.linalg.norm(way)) or 1.0)
 
 
 def _counted_offsets(belief: Belief, frequency: float) -> dict[str, list[float]]:
@@ -530,6 +478,13 @@ def _work_of_drift(belief: Belief, frequency: float) -> float:
     x, moved = belief.record["x"], belief.moved
     line = x - moved - belief.residual
     return belief.stated.stiffness * float(np.ptp(line)) / (belief.record.duration * frequency) * float(np.ptp(x)) / 2
+
+
+def _feigned_offsets(answer: Estimate, belief: Belief, feigned: float) -> list[float]:
+    """By how much twice a force that passes for friction would move an answer either way; none of what is counted."""
+    by_unit = {"N": feigned, "N s/m": feigned / belief.sliding_speed}
+    more = 2 * by_unit.get(answer.unit, feigned / belief.kinetic * abs(answer.value))
+    return [] if answer.name in (SHARE, STOPS) else [-more, more]
 
 
 def _holding(answer: Estimate, interval: tuple[float, float]) -> Estimate:
