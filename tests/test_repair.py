@@ -208,6 +208,18 @@ def test_a_clock_with_gaps_is_not_relabelled():
         fill_gaps(held_clock.record)
 
 
+@pytest.mark.parametrize(("lost", "cure"), [(3, "with fill_gaps(record)."), (50, "and fill_missing(record).")])
+def test_a_gap_is_mended_by_what_is_said_of_it(lost: int, cure: str) -> None:
+    """Of a long one half of the cure was said, and what was left had no numbers."""
+    kept = np.delete(np.arange(2000), np.arange(700, 700 + lost))
+    sampled = Record.of({"x": np.sin(0.02 * kept)}, fs=1000.0)
+    record = Record(sampled.samples, sampled.channels, 1000.0, stamps=kept / 1000)
+    (fault,) = record.check()
+    assert str(fault).endswith(cure)
+    filled = fill_gaps(record) if lost < 10 else fill_missing(fill_gaps(record))
+    assert filled.check() == []
+
+
 def test_lost_samples_of_the_seal_rig(dataset):
     record = read_seal(dataset("rubber_seal") / "O-ring_1bar.csv")
     filled = fill_gaps(record)

@@ -9,7 +9,7 @@ import numpy as np
 
 from stickslip.arrays import Array, Mask, Rows
 from stickslip.record import flaws
-from stickslip.record.clock import BRIDGED, fit_line, inspect, is_uniform
+from stickslip.record.clock import BRIDGED, Stamps, fit_line, inspect, is_uniform
 from stickslip.record.flaws import Runs
 
 if TYPE_CHECKING:
@@ -149,7 +149,7 @@ def _cut(record: Record) -> list[Fault]:
 
 def _clock_faults(stamps: Array) -> list[Fault]:
     clock, mended = inspect(stamps), ("clock", "repair_clock(record)")
-    filled = ("gaps", "fill_gaps(record)")
+    filled = ("gaps", _filling(stamps, clock))
     usual = f"{1e3 * clock.step:.4g} ms"
     known = np.flatnonzero(np.isfinite(stamps))
     intervals, rows = np.full(len(stamps), np.nan), np.ones(len(stamps))  # from each stamp to the next that is a number
@@ -303,9 +303,14 @@ def clock_cure(stamps: Array) -> str:
         one_rate = f"record.rows({edges[longest]}, {edges[longest + 1]})"
         return f"keep those of one rate with {one_rate}, or fill in with fill_gaps(record) and fill_missing(record)"
     if len(clock.gaps):
-        long = bool(np.any(np.diff(stamps)[clock.gaps] > BRIDGED * clock.step))
-        return f"fill the gaps with fill_gaps(record){' and fill_missing(record)' * long}"
+        return f"fill the gaps with {_filling(stamps, clock)}"
     return "mend the clock with repair_clock(record)"
+
+
+def _filling(stamps: Array, clock: Stamps) -> str:
+    """How gaps are filled; the stamps leave long ones without numbers."""
+    long = bool(np.any(np.diff(stamps)[clock.gaps] > BRIDGED * clock.step))
+    return f"fill_gaps(record){' and fill_missing(record)' * long}"
 
 
 def _shape_faults(name: str, unit: str, values: Array, *, felt: bool) -> list[Fault]:
