@@ -54,3 +54,13 @@ def test_refusals():
     broken = broken.with_samples({"q": np.where(np.arange(4000) == 7, np.nan, broken["q"])}, broken.history[-1])
     with pytest.raises(RecordError, match="row 7"):
         without_delays(broken)
+
+
+def test_counts_that_are_no_longer_seen_are_in_the_noise() -> None:
+    """A commissioned rig's own record was "not to be trusted": its twins had the noise before the counts alone."""
+    time, step = np.arange(4000) / 1000, 2.5e-6
+    noisy = 1e-3 * np.sin(9 * time) + 1e-6 * np.random.default_rng(1).standard_normal(4000)
+    record = Record.of({"x": np.round(noisy / step) * step}, fs=1000.0).with_details("x", delay=1.25e-3, noise=1e-6)
+    moved = without_delays(record).channels["x"]
+    assert moved.noise == pytest.approx(np.hypot(1e-6, step / 12**0.5), rel=1e-6)
+    assert without_delays(record.with_details("x", noise=None)).channels["x"].noise is None

@@ -10,7 +10,8 @@ import numpy as np
 from stickslip.arrays import Array, Mask
 from stickslip.errors import ABSENT, EstimateError, RecordError
 from stickslip.estimate import Estimate, Status
-from stickslip.record.flaws import runs_of
+from stickslip.record.channels import Channel
+from stickslip.record.flaws import quantum, runs_of
 from stickslip.record.record import Record, Step
 from stickslip.statistics import least_squares, student
 
@@ -195,7 +196,8 @@ def without_delays(record: Record, *channels: str, question: str = "taking delay
     -------
     Record
         The same record where no named channel is delayed; else with the step in its history and delays of zero. A
-        channel's stated noise is kept: white noise loses 2 % at most to the interpolation.
+        channel's stated noise is kept: white noise loses 2 % at most to the interpolation. Its counts, which are no
+        longer seen, are in it.
 
     Raises
     ------
@@ -231,8 +233,14 @@ def without_delays(record: Record, *channels: str, question: str = "taking delay
     outcome = f"delays taken out; {last - first} of {len(record)} rows reached by all"
     step = Step("without_delays", {"delays": delays}, outcome)
     result = record.with_samples(moved, step, start=record.start + first / record.fs)
-    punctual = {name: replace(record.channels[name], delay=0.0) for name in delays}
+    punctual = {name: _counted(record.channels[name], record[name]) for name in delays}
     return replace(result, channels={**record.channels, **punctual})
+
+
+def _counted(channel: Channel, values: Array) -> Channel:
+    """A channel moved in time: what was stated of its noise is before the counts, whose own is in it now."""
+    noise = None if channel.noise is None else math.hypot(channel.noise, quantum(values) / 12**0.5)
+    return replace(channel, delay=0.0, noise=noise)
 
 
 def clock_offset(a: Record, b: Record, *, on: str | tuple[str, str] | None = None) -> Estimate:
