@@ -376,6 +376,16 @@ def test_a_plug_that_is_pulled_is_one_sentence_that_names_what_came(
     assert len(ss.read_record(tmp_path / "run.h5.journal")) == 2000
 
 
+def test_a_device_that_is_not_there_is_one_sentence(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def absent(device: Counter) -> Counting:
+        raise ConnectionRefusedError(111, "Connection refused")
+
+    monkeypatch.setattr(Counter, "open", absent)
+    with pytest.raises(ss.errors.RecordError, match="counter can not be opened.*Connection refused.*check plug"):
+        acquire(Counter(), output=tmp_path / "run.h5")
+    assert not list(tmp_path.iterdir())
+
+
 def test_a_counter_that_runs_back_ends_it_and_keeps_what_was(tmp_path: Path) -> None:
     tape = Tape(Counter(), tmp_path / "run.h5")
     tape.write(Block(0, 0.0, counts(0, 1000, 2)))

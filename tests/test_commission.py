@@ -98,6 +98,18 @@ def test_a_record_without_a_tap_is_refused_by_the_command(tmp_path: Path) -> Non
     assert "Hz" not in text
 
 
+def test_a_file_answers_its_step_without_the_rigs_other_channels(tmp_path: Path) -> None:
+    """A commissioned rig names x, z, a and load; a hammer's file may hold a alone."""
+    tap = BENCH.record("tap")
+    file = ss.write_record(ss.Record.of({"a": tap["a"]}, fs=tap.fs), tmp_path / "tap.csv")
+    rig = tmp_path / "rig.toml"
+    rig.write_text('[channels]\nx = "x [m]"\nz = "z [m]"\na = "a [m/s^2]"\nload = "load [N]"\n')
+    assert "1 step answered." in run("commission", f"tap={file}", "--config", rig)
+    refused = CliRunner().invoke(main, ["commission", f"free={file}", "--config", str(rig)])
+    assert refused.exit_code == 2
+    assert "there is no column 'x'" in refused.output
+
+
 def test_the_story_says_the_constants_first_and_the_truth_beside(done: bench.Commissioned) -> None:
     story = ss.summary(done)
     assert story.headline[0].startswith("The rig is a mass of 2.4")

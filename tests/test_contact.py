@@ -39,6 +39,16 @@ def test_its_interval_is_neither_too_narrow_nor_too_wide() -> None:
     assert 0.3 < strayed < 2.7  # chi square of 10: 3 in 1000 on either side
 
 
+def test_a_mass_that_is_not_exact_is_in_its_interval() -> None:
+    record = told(measured(2.5, 0.0, seconds=3.0)[0])
+    sure = ss.contact_stiffness(ss.friction_force(record, method="fusion", **RIG))
+    heavy = {**RIG, "mass": (1.005 * RIG["mass"], 0.005 * RIG["mass"])}
+    off = ss.contact_stiffness(ss.friction_force(record, method="fusion", **heavy))
+    assert abs(off.value - sure.value) > 5 * sure.sd
+    assert off.includes(STIFFNESS)
+    assert 0.005 < off.sd / off.value < 0.01
+
+
 def test_of_a_long_record_some_stretches_are_looked_at(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("stickslip.balance.likely_contact.MOST", 6000)
     monkeypatch.setattr("stickslip.balance.likely_contact.PIECES", 2)

@@ -29,8 +29,8 @@ from stickslip.units import parse_unit, parse_value
 # the kinds of device, each with its module beside this one
 DRIVERS = {"sim": "sim", "file": "replay", "sound": "sound", "ni": "ni", "ldaq": "ldaq", "serial": "serial"}
 
-# what to install for a package; LDAQ brings a web server and more, and is no part of an extra
-INSTALLED = {"serial": "pyserial", "sounddevice": "sounddevice", "nidaqmx": "nidaqmx", "LDAQ": "LDAQ"}
+# what pip calls a package whose name is another
+INSTALLED = {"serial": "pyserial"}
 
 
 @dataclass(frozen=True)
@@ -278,7 +278,7 @@ class Device(Protocol):
     def outputs(self) -> tuple[Output, ...]: ...
 
     def open(self) -> Stream:
-        """Begin to measure; the counter starts at 0."""
+        """Begin to measure; the counter starts at 0. What is not there raises OSError or a ModelError."""
 
 
 def in_si(device: Device, block: Block) -> Array:
@@ -364,12 +364,18 @@ def vendors(package: str) -> ModuleType:
     try:
         return importlib.import_module(package)
     except (ImportError, OSError) as error:
-        remedy = f"install it with: pip install {INSTALLED[package.partition('.')[0]]}"
+        remedy = f"install it with: pip install {_installed(package)}"
         if isinstance(error, OSError):
             remedy = "the package is there: install the library behind it, of the system or the vendor"
         raise ModelError(
             f"the package {package} can not be imported ({error})", "this device is reached through it", remedy
         ) from error
+
+
+def _installed(package: str) -> str:
+    """What pip calls a package: its own name, where nothing else is listed."""
+    root = package.partition(".")[0]
+    return INSTALLED.get(root, root)
 
 
 def find_device(
@@ -441,7 +447,7 @@ def _driver(kind: str) -> Found:
     module = driver(kind)
     about = str(module.__doc__).partition("\n")[0]
     if module.NEEDS and not _there(module.NEEDS):
-        return Found(kind, about, (), f"{module.NEEDS}: pip install {INSTALLED[module.NEEDS]}")
+        return Found(kind, about, (), f"{module.NEEDS}: pip install {_installed(module.NEEDS)}")
     listed: Callable[[], Sequence[str]] = module.listed
     try:
         return Found(kind, about, tuple(listed()), "")

@@ -201,7 +201,7 @@ class _Run:
     def all(self, heads: Sequence[_Head]) -> str:
         """Record with every head at once; returns why it ended."""
         with ExitStack() as stack:
-            streams = [stack.enter_context(head.device.open()) for head in heads]
+            streams = [stack.enter_context(_open(head.device)) for head in heads]
             for head, stream in zip(heads, streams, strict=True):
                 _move(head.device, stream, self.wanted.drive)
             if len(heads) == 1:
@@ -281,6 +281,17 @@ class _Run:
                 "samples go to the disk as they come",
                 "make room, or name a file on another disk",
             ) from error
+
+
+def _open(device: Device) -> Stream:
+    try:
+        return device.open()
+    except OSError as error:  # nothing is plugged in, or another program has it
+        raise RecordError(
+            f"{device.name} can not be opened ({error})",
+            "a device is there, and no other program has it",
+            "check plug, cable and power",
+        ) from error
 
 
 def _read(device: Device, stream: Stream) -> Block | None:

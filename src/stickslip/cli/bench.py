@@ -19,7 +19,7 @@ import stickslip as ss
 import stickslip.bench as bench
 from stickslip.cli.records import all_option, groups_of, pair, usable
 from stickslip.cli.terminal import aligned, deliver, print_json, progress, redrawn, say, say_json, wrapped
-from stickslip.errors import INTERRUPTED
+from stickslip.errors import ABSENT, INTERRUPTED
 
 if TYPE_CHECKING:
     from stickslip import Record
@@ -131,7 +131,7 @@ def _source(
 
     def source(step: BenchStep) -> Record | None:
         if step.name in given:
-            stated = ss.answers.read_mended([given[step.name]], rig=rig)
+            stated = _of_file(given[step.name], step, rig)
             stated.require(*step.needs, question=f"the step {step.name}")
             return stated
         kept = _kept(folder, step.name) if folder else None
@@ -154,6 +154,22 @@ def _source(
             raise KeyboardInterrupt("; ".join(filter(None, (str(error), stay)))) from error
 
     return source, bench_of.truth if bench_of is not None else {}
+
+
+def _of_file(file: Path, step: BenchStep, rig: RigSettings) -> Record:
+    """A step's record from a file: the rig's channels, without those that neither the step needs nor the file has."""
+
+    def has(channel: str) -> bool:
+        try:
+            ss.read_blocks(file, **{**rig.reading(), "channels": {channel: rig.channels[channel]}})
+        except ss.errors.RecordError as error:
+            if error.kind != ABSENT:
+                raise
+            return False
+        return True
+
+    channels = {name: text for name, text in rig.channels.items() if name in step.needs or has(name)}
+    return ss.answers.read_mended([file], rig=rig.model_copy(update={"channels": channels}))
 
 
 def _kept(folder: Path, name: str) -> Path:

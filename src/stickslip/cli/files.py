@@ -43,7 +43,8 @@ def check(file: str, **options: Any) -> None:
             if len(groups) == 1:
                 require_described(record)
             say(f"{record!r}")
-            say(f"- {spoken(f'read: {record.history[0].outcome}')}")
+            if outcome := record.history[0].outcome:  # what a device wrote was read as it is
+                say(f"- {spoken(f'read: {outcome}')}")
             faults = [str(fault) for fault in record.check()]
             if (wrong := ss.answers.stated_wrongly([record], rig=rig)) is not None:
                 faults.append(ss.summary(wrong).answer)
