@@ -381,7 +381,7 @@ def test_a_device_that_is_not_there_is_one_sentence(tmp_path: Path, monkeypatch:
         raise ConnectionRefusedError(111, "Connection refused")
 
     monkeypatch.setattr(Counter, "open", absent)
-    with pytest.raises(ss.errors.RecordError, match="counter can not be opened.*Connection refused.*check plug"):
+    with pytest.raises(ss.errors.RecordError, match=r"counter can not be opened.*Connection refused.*check plug"):
         acquire(Counter(), output=tmp_path / "run.h5")
     assert not list(tmp_path.iterdir())
 
