@@ -21,8 +21,8 @@ STILL = 1e-4  # of the base's velocity: where the state variable's backbone turn
 
 @dataclass(frozen=True)
 class Rig:
-    """A mass on a spring, shaken at its base: (kinetic + drop exp(-(|v|/speed)^exponent)) sgn v + slope v, a spring, or
-    a memory.
+    """A mass on a spring, its base shaken or `pulled` at a speed, against a friction (kinetic + drop
+    exp(-(|v|/speed)^exponent)) sgn v + slope v, a spring, or a memory.
 
     A contact that gives way has a damping `loss` [N s/m]; in slip its spring relaxes as that lets it. LuGre's bristles
     have that stiffness and damping and fall along the same curve; the state variable's force follows Coulomb's at the
@@ -44,6 +44,7 @@ class Rig:
     rate: float = 0.0
     exponent: float = 1.0
     rough: float = 0.0
+    pulled: float = 0.0
 
     def friction(self, speed: float) -> float:
         """At a steady speed, the slope left out: what "sliding friction" is at the mean speed at which it slides."""
@@ -60,7 +61,7 @@ class Rig:
 @numba.njit(cache=True)
 def along(x, amplitude, rough):  # type: ignore[no-untyped-def]
     """Friction at a place over its mean, which strays by a share: three waves along the surface."""
-    place = x / amplitude
+    place = x / amplitude if rough else x
     return 1 + rough * np.sqrt(2 / 3) * (np.sin(7 * place) + np.sin(17 * place + 1) + np.sin(29 * place + 2))
 
 
@@ -70,11 +71,17 @@ def passed(x: np.ndarray, rig: Rig) -> float:
 
 
 @numba.njit(cache=True)
+def based(t, p):  # type: ignore[no-untyped-def]
+    """Where the base is."""
+    return p[3] * np.sin(p[4] * t) + p[14] * t
+
+
+@numba.njit(cache=True)
 def _accelerated(t, x, v, way, p):  # type: ignore[no-untyped-def]
-    m, k, c, amplitude, w, kinetic, static, slope, speed = p[:9]
+    m, k, c, amplitude, _, kinetic, static, slope, speed = p[:9]
     drop = (static - kinetic) * np.exp(-((abs(v) / speed) ** p[11])) if speed > 0 else 0.0
     dry = (kinetic + drop) * along(x, amplitude, p[12])
-    return (k * (amplitude * np.sin(w * t) - x) - c * v - way * dry - slope * v) / m
+    return (k * (based(t, p) - x) - c * v - way * dry - slope * v) / m
 
 
 @numba.njit(cache=True)
@@ -89,7 +96,7 @@ def _step(t, x, v, way, h, p):  # type: ignore[no-untyped-def]
 @numba.njit(cache=True)
 def _rigid(p, samples, settle, h, steps):  # type: ignore[no-untyped-def]
     """Displacement, velocity and acceleration at each sample; time stuck, and stops."""
-    k, amplitude, w, static = p[1], p[3], p[4], p[6]
+    k, amplitude, static = p[1], p[3], p[6]
     out = np.zeros((3, samples))
     x, v, t, way, stuck, held, stops = 0.0, 0.0, 0.0, 0, True, 0.0, 0
     for number in range((settle + samples - 1) * steps + 1):
@@ -100,7 +107,7 @@ def _rigid(p, samples, settle, h, steps):  # type: ignore[no-untyped-def]
         left = h
         while left > 1e-15 * h:
             if stuck:
-                pull, bears = k * (amplitude * np.sin(w * (t + left)) - x), static * along(x, amplitude, p[12])
+                pull, bears = k * (based(t + left, p) - x), static * along(x, amplitude, p[12])
                 if abs(pull) <= bears:
                     held += left if row >= 0 else 0.0
                     t, left = t + left, 0.0
@@ -108,7 +115,7 @@ def _rigid(p, samples, settle, h, steps):  # type: ignore[no-untyped-def]
                 low, high = 0.0, left  # the instant at which the pull passes what the contact bears
                 for _ in range(60):
                     middle = (low + high) / 2
-                    over = abs(k * (amplitude * np.sin(w * (t + middle)) - x)) > bears
+                    over = abs(k * (based(t + middle, p) - x)) > bears
                     low, high = (low, middle) if over else (middle, high)
                 held += high if row >= 0 else 0.0
                 t, left, stuck, way = t + high, left - high, False, 1 if pull > 0 else -1
@@ -124,7 +131,7 @@ def _rigid(p, samples, settle, h, steps):  # type: ignore[no-untyped-def]
                 low, high = (low, middle) if turned else (middle, high)
             x, v = _step(t, x, v, way, high, p)[0], 0.0
             t, left = t + high, left - high
-            pull = k * (amplitude * np.sin(w * t) - x)
+            pull = k * (based(t, p) - x)
             stuck = abs(pull) <= static * along(x, amplitude, p[12])
             stops += 1 if stuck and row >= 0 else 0
             way = way if stuck else (1 if pull > 0 else -1)
@@ -186,7 +193,7 @@ def marched(rig: Rig, samples: int, settle: int, fs: float, steps: int) -> tuple
     p = np.array([
         rig.mass, rig.stiffness, rig.damping, rig.amplitude, 2 * np.pi * rig.frequency, rig.kinetic,
         max(rig.static, rig.kinetic), rig.slope, rig.speed, rig.contact, rig.rate,
-        rig.exponent, rig.rough, rig.loss,
+        rig.exponent, rig.rough, rig.loss, rig.pulled,
     ])  # fmt: skip
     march = {"compliant": _compliant, "LuGre": _remembering, "state variable": _remembering}.get(rig.kind, _rigid)
     return march(p, samples, settle, 1 / (fs * steps), steps)
@@ -220,9 +227,9 @@ def record(
     samples, settle = round(cycles * cycle), round(30 * cycle)
     (x, v, a), held, stops = marched(rig, samples, settle, fs, 20 * STEPS if rig.kind in SOFT else STEPS)
     time = (settle + np.arange(samples)) / fs
-    z = rig.amplitude * np.sin(2 * np.pi * rig.frequency * time)
+    z = rig.amplitude * np.sin(2 * np.pi * rig.frequency * time) + rig.pulled * time
     true = {"x": x, "z": z}
-    levels = dict.fromkeys("xz", noise * rig.amplitude)
+    levels = dict.fromkeys("xz", noise * (rig.amplitude or rig.pulled / rig.frequency))
     if felt:
         true |= {"a": a, "load": rig.stiffness * (z - x) - rig.damping * v - rig.mass * a}
         levels |= {name: noise * float(np.ptp(true[name])) for name in ("a", "load")}

@@ -10,12 +10,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import stepped
 import stickslip as ss
-from stickslip.answers.findings import BY_FORCE, Comparison, Findings, record_name
+from stickslip.answers.findings import BY_FORCE, Comparison, Findings, Inquiry, record_name
 from stickslip.answers.many import compare
-from stickslip.answers.preparation import mend
+from stickslip.answers.preparation import _seen_from_face, mend
 from stickslip.answers.questions import QUESTIONS, analyze
 from stickslip.errors import EstimateError, ModelError
+from stickslip.estimate import kinds, stands
 from stickslip.rig.settings import RigSettings
 
 FS = 500.0
@@ -38,6 +40,39 @@ def test_the_demonstration_agrees_with_its_truth() -> None:
     known = {e.name: findings.true_value(e) for e in findings.estimates if findings.true_value(e) is not None}
     assert {"sliding friction", "stuck share of the time", "stops per cycle"} <= set(known)
     assert known["sliding friction"] == record.truth["sliding friction"]
+
+
+@pytest.mark.parametrize("belt", [False, True])
+@pytest.mark.parametrize("way", [1, -1])
+def test_a_slider_pulled_steadily_tells_its_friction_by_its_slips(way: int, belt: bool) -> None:
+    """Of another integrator; seen from the spring's end that is a mass on a belt, and its damper drags there, too."""
+    rig = stepped.Rig("static", 1.0, 400.0, 0.4, 0.0, 20 / (2 * np.pi), kinetic=2.0, static=3.0, pulled=0.01)
+    record = stepped.record(rig, np.random.default_rng(5), cycles=40)
+    truth, z = record.truth, way * record["z"]
+    moved = {"x": way * record["x"] - z} if belt else {"x": way * record["x"], "z": z}
+    findings = analyze(ss.Record.of(moved, fs=record.fs), **rig.stated)
+    assert findings.level is not None
+    assert findings.level.includes(2.0 + belt * 0.4 * 0.01)
+    assert stands(findings.level.status)
+    static = findings.breakaway.forward or findings.breakaway.back
+    assert static.name.endswith("forward" if way == 1 else "back")
+    assert static.includes(3.0 + belt * 0.4 * 0.01)
+    assert findings.sticks.share.value == pytest.approx(truth["stuck share of the time"], abs=0.01)
+    assert findings.sticks.per_cycle.value == 1
+    assert not findings.loops.offset.known
+    assert "one way" in kinds(findings.loops.status)
+    assert "more than while it slides" in " ".join(map(str, ss.summary(findings).headline))
+    assert not [note for note in findings.notes if "turns round" in note]
+
+
+def test_no_belt_is_seen_where_a_base_shakes() -> None:
+    """Rigs of another integrator whose base nobody measured: of 240 others none."""
+    for kind in stepped.KINDS:
+        rng = np.random.default_rng([712, stepped.KINDS.index(kind)])
+        rig = stepped.drawn(kind, rng)
+        record = ss.Record.of({"x": stepped.record(rig, rng)["x"]}, fs=1000.0)
+        settings = ss.rig.rig_settings(rig.stated)
+        assert _seen_from_face(record, settings, Inquiry()) is record
 
 
 def test_the_frame_slides_and_sticks_as_published(dataset: Callable[[str], Path]) -> None:

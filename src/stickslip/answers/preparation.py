@@ -10,11 +10,12 @@ from typing import Any
 import numpy as np
 
 from stickslip.answers.findings import Inquiry
+from stickslip.arrays import Array, stretches
 from stickslip.balance.felt_and_computed import ForceComparison, compare_force
 from stickslip.balance.force import friction_force
 from stickslip.balance.lag import HIDDEN, REPEATS, SensorDelay, sensor_delay
 from stickslip.balance.mass import mass_and_stiffness
-from stickslip.balance.motion import is_measured
+from stickslip.balance.motion import CREEP, LEAST, is_measured
 from stickslip.errors import ABSENT
 from stickslip.estimate import UNSTATED, Doubt, Estimate, kinds
 from stickslip.files.read import read_blocks, read_record
@@ -24,6 +25,7 @@ from stickslip.record.channels import Channel
 from stickslip.record.flaws import constant
 from stickslip.record.record import Record, Step
 from stickslip.rig.settings import LOAD, RigSettings, rig_settings
+from stickslip.signals.derivatives import differentiate
 from stickslip.signals.interpolate import without_delays
 from stickslip.signals.repair import fill_gaps, fill_missing, remove_drift, remove_spikes, repair_clock, restore_clipped
 
@@ -33,6 +35,9 @@ SENSED = ("x", "v", "theta", "a", "load")  # what no rig holds still while its m
 CONSTANTS = ("mass", "stiffness", "damping", "damper")  # of the balance of forces
 STRETCH = 1 << 14  # samples from the middle in which a delay is looked for, and the forces are compared
 AT_ONCE = 1 << 18  # samples of which all sensors are put together unasked
+FACE = "a face that moves"  # whose way stands for z: seen from there the spring's other end moves back
+CARRIED = 0.25  # of the time at one speed, chosen: a harmonic motion is within 4 % of one for 0.13
+WHOLE, FEWEST = 0.5, 3  # of all the way, and how often; a mass that sticks on the ground goes nowhere
 FOUND = " (found in this record)"
 SURE = 3.0  # standard deviations from which a delay is taken out
 LONG = 1 << 26  # bytes on the disk of a record that is asked part by part
@@ -245,6 +250,8 @@ def ready(record: Record, rig: RigSettings, method: str, inquiry: Inquiry) -> Re
     else:
         rig = _weighed(whole, rig, inquiry)
         if "x" in whole and _enough(whole, rig):
+            if (seen := _seen_from_face(whole, rig, inquiry)) is not whole:  # there what is at rest moves as z does
+                whole, rig = seen, rig.model_copy(update={"damper": "base"})
             if "load" in whole and ("a" in whole or not _base_seen(whole)):
                 comparison = inquiry.ask(
                     "Force comparison", lambda: compare_force(middle(whole, STRETCH), **_constants(rig)), aside=True
@@ -340,6 +347,37 @@ def _base_moves(record: Record, comparison: ForceComparison | None, inquiry: Inq
     return moves
 
 
+def _seen_from_face(record: Record, rig: RigSettings, inquiry: Inquiry) -> Record:
+    """The record as seen from a face that moves, where x is carried on steadily and slips back, again and again."""
+    if not {"z", "v", "load", "force"}.isdisjoint(record) or rig.contact == "base":
+        return record
+    cut = middle(record, STRETCH)
+    sound = cut.stamps is None and np.isfinite(cut["x"]).all() and len(cut) > LEAST
+    speed = _carried(cut["x"], record.fs) if sound and not constant(cut["x"]) else None
+    if speed is None:
+        return record
+    went = speed * np.arange(len(record)) / record.fs
+    words = f"x and z as seen from a face that moves at {1e3 * speed:.3g} mm/s, with which x sticks"
+    inquiry.notes.append(f"There is no channel z: {words}; the spring's other end is taken to be at rest.")
+    seen = record.with_channel("z", -went, unit="m", source=FACE)
+    return seen.with_samples({**seen.samples, "x": record["x"] - went}, Step("analyze", {"face_speed": speed}, words))
+
+
+def _carried(x: Array, fs: float) -> float | None:
+    """The one speed at which a mass is carried along all its way, again and again, and to one side."""
+    velocity = differentiate(x, fs).values
+    low, high = np.quantile(velocity, [0.005, 0.995])
+    near = CREEP * (high - low)
+    counts, edges = np.histogram(velocity, np.arange(low, high + near, near))
+    speed = float(edges[np.argmax(counts)] + near / 2)
+    for _ in range(2):
+        speed = float(np.median(velocity[np.abs(velocity - speed) < near]))
+    ahead, back = (np.abs(velocity - side * speed) < near for side in (1, -1))
+    begins, ends = stretches(ahead)
+    whole = abs(speed) * (ends - begins) / fs > WHOLE * np.ptp(x)
+    return speed if np.sum(whole) >= FEWEST and ahead.mean() > CARRIED and back.mean() < CARRIED / 2 else None
+
+
 def _constants(rig: RigSettings) -> dict[str, Any]:
     return {"mass": rig.mass, "stiffness": rig.stiffness, "damping": rig.damping or 0.0, "damper": rig.damper}
 
@@ -399,6 +437,8 @@ def _doubt(record: Record, given: Record, rig: RigSettings, *, aligned: bool) ->
     unknown = [f"how {' and '.join(sensors)} {'is' if len(sensors) == 1 else 'are'} mounted"] if sensors else []
     if aligned:
         unknown.append(f"the delay of x{FOUND}")
+    if "z" in record and record.channels["z"].source == FACE:
+        unknown.append(f"the speed of the face it slides on{FOUND}")
     absent = [name for name in ("mass", "stiffness") if getattr(rig, name) is None]
     unknown += [f"the {name}{FOUND}" for name in absent if getattr(record.rig, name, None) is not None]
     if not unknown:

@@ -435,6 +435,7 @@ def lacking(record: Record, question: str) -> StickslipError | None:
         )
     try:
         record.require("x", "v", question=question)
+        motion = contact_motion(record, contact=None, question=question)
     except StickslipError as error:
         return error
     if driving(record) is None:
@@ -442,5 +443,11 @@ def lacking(record: Record, question: str) -> StickslipError | None:
             "neither a motion z of the base nor an applied force",
             f"{question} is moved as the record was",
             "record what moves the mass",
+        )
+    if not len(_onsets(motion, 1.0)) and not len(_onsets(motion, -1.0)):
+        return EstimateError(
+            "a motion that never turns round",
+            f"{question} can not tell its friction from a zero of x that is off",
+            "take the answers as they are",
         )
     return None

@@ -28,6 +28,11 @@ from stickslip.statistics import least_squares, mean_of_cycles, mean_uncertainty
 
 NO_SLOPE = "no slope"  # the kind of doubt where the motion does not tell how friction changes with speed
 LEAST_SPREAD = 0.1  # of the sliding speed about its mean, below which no slope against speed can be told
+ONE_WAY = Doubt(
+    "it slides one way alone: what a zero of x, z or the force is off counts as friction",
+    "one way",
+    lesser=True,
+)
 DRIVES = "friction drives the motion: the sign of the force or of the displacement is wrong, or a drive is not read"
 BRANCHES = ("back, slowing down", "forward, slowing down", "back, speeding up", "forward, speeding up")
 BRANCH_BINS, FEW_BINS = 50, 8  # means of equal count along the speed, in which a branch's line is sought
@@ -208,7 +213,17 @@ def _magnitudes(
         "offset": ("friction offset", (forward - back) / 2),
     }
     how = "speed-weighted median, mean of cycles"
-    magnitudes = {key: mean_of_cycles(name, values, unit=unit, method=how) for key, (name, values) in wanted.items()}
+    slides = {key: bool(np.isfinite(values).any()) for key, (_, values) in wanted.items()}
+    if slides["forward"] != slides["back"]:
+        wanted["level"] = ("sliding friction", forward if slides["forward"] else back)
+    magnitudes = {
+        key: mean_of_cycles(name, values, unit=unit, method=how)
+        if slides[key] or key == "level"
+        else Estimate(name, math.nan, (math.nan, math.nan), math.nan, unit, how, Status(ONE_WAY))
+        for key, (name, values) in wanted.items()
+    }
+    if slides["forward"] != slides["back"]:
+        magnitudes |= {key: replace(told, status=Status(told.status, ONE_WAY)) for key, told in magnitudes.items()}
     return magnitudes | {key: magnitudes[key].within(0.0, otherwise=DRIVES) for key in ("forward", "back", "level")}
 
 
@@ -328,7 +343,7 @@ def _curve(friction: Array, motion: Motion, cycles: Cycles, label: Rows, bins: i
 
 
 def _status(cycles: Cycles, levels: dict[str, Estimate], energy: Estimate) -> str:
-    doubts = [levels["forward"].status] if levels["forward"].known and levels["forward"].status != "ok" else []
+    doubts = [levels["level"].status] if levels["level"].known and levels["level"].status != "ok" else []
     if cycles.status != "ok":
         doubts.append(cycles.status)
     if not (levels["level"].known and energy.known):

@@ -429,10 +429,14 @@ def _ways(velocity: Array, definite: float, slow: float) -> list[tuple[int, int,
     moving = np.flatnonzero(np.abs(velocity) > definite)
     signs = np.sign(velocity[moving])
     turns = np.flatnonzero(signs[1:] != signs[:-1])
+    if not len(turns):  # one that never turns round rests between its slips
+        moves = np.concatenate([[0], np.cumsum(np.abs(velocity) > slow)])
+        turns = np.flatnonzero(moves[moving[1:]] - moves[moving[:-1] + 1] < np.diff(moving) - 1)
     starts = []
     for before, after in zip(moving[turns], moving[turns + 1], strict=True):
         way = int(np.sign(velocity[after]))
-        starts.append((before + int(np.argmax(way * velocity[before : after + 1] > -slow)), way))
+        was = np.sign(velocity[before])
+        starts.append((before + int(np.argmax(was * velocity[before : after + 1] < slow)), way))
     return [(first, last, way) for (first, way), (last, _) in pairwise(starts)]
 
 
