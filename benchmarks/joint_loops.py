@@ -6,9 +6,11 @@ output; logged are counts and reference at its own instants, at 100 Hz to 1 kHz.
 "speed": it damps the measured speed in place of the error's; "torque": what it sets is logged, with noise, as where
 it also integrates its error ("torque of a PID"), is limited ("saturated"), or the motor cogs ("cogging"); "PID": it
 integrates its error and logs no torque, "PI of the speed": it integrates that of a speed in proportion to the error, as
-drives do. Counted are the numbers that stand without a grave doubt.
+drives do. Counted are the numbers that stand without a grave doubt. With --predict the first half of each log tells
+the joint, and moves it along the second: of the kinds without a torque inside its loop, of the others by the torque.
 
     python benchmarks/joint_loops.py --draws 40 --first 70000
+    python benchmarks/joint_loops.py --draws 40 --first 120000 --kinds "kd unknown,kd stated,torque" --predict
 """
 
 from __future__ import annotations
@@ -20,6 +22,7 @@ import numba
 import numpy as np
 
 import stickslip as ss
+from stickslip.answers.arm import Joint
 
 FINE, CONTROL = 20_000, 1_000  # steps and periods of the controller in a second
 SECONDS = 30
@@ -146,20 +149,32 @@ def drawn(seed: int, kind: str) -> tuple[ss.Record, dict[str, float]]:
     return ss.Record.of(logged, fs=fs, units={"reference": "rad"}), truth
 
 
+def missed(record: ss.Record, given: dict[str, float]) -> tuple[float, float]:
+    """What of the place in a log's second half is missed by the joint of its first [%], and by a plain law."""
+    halves = [record.rows(first, first + len(record) // 2) for first in (0, len(record) // 2)]
+    joint = Joint.of(ss.cycle.regress_joint(halves[0], **given), "")
+    (part,) = ss.answers.predict(halves[1], joint).parts
+    return 100 - part.follows["theta"], 100 - part.plain.get("theta", np.nan)
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--draws", type=int, default=40, help="joints of each kind")
     parser.add_argument("--first", type=int, default=70000, help="seed of the first")
     parser.add_argument("--kinds", default=",".join(KINDS), help="which, with commas")
+    parser.add_argument("--predict", action="store_true", help="move the joint of a log's first half along the second")
     options = parser.parse_args()
     for kind in options.kinds.split(","):
         held: dict[str, list[tuple[bool, float]]] = {name: [] for name in TOLD}
-        refused, begun = 0, time.process_time()
+        refused, begun, misses = 0, time.process_time(), []
         for seed in range(options.first, options.first + options.draws):
             record, truth = drawn(seed, kind)
             try:
                 kd = {"kd": truth["kd"]} if kind in STATED else {}
                 given = {} if kind in LOGGED else {"kp": truth["kp"], **kd}
+                if options.predict:
+                    misses.append(missed(record, given))
+                    continue
                 joint = ss.cycle.regress_joint(record, **given)
             except ss.StickslipError:
                 refused += 1
@@ -174,6 +189,9 @@ def main() -> None:
                     held[name].append((estimate.includes(truth[name]), half / abs(truth[name])))
         spent = (time.process_time() - begun) / options.draws
         print(f"{kind}: {options.draws - refused} of {options.draws} answered, {spent:.1f} s each, rig included")
+        for name, share in zip(("the place", "by a plain law"), np.array(misses).T, strict=False):
+            low, high = np.nanquantile(share, (0.5, 0.9))
+            print(f"  missed of {name}: {low:.2f} % median, {high:.2f} % worst tenth")
         for name, told in held.items():
             if told:
                 holds, half = np.array(told).T

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,7 +11,9 @@ import numpy as np
 import pytest
 from click.testing import CliRunner, Result
 
+import joints
 import stickslip as ss
+from stickslip.answers.arm import Joint
 from stickslip.bench import SimulatedBench
 from stickslip.cli.program import main
 
@@ -218,3 +221,88 @@ def test_a_channel_at_the_end_of_its_range_is_named_by_fit_and_prediction(monkey
     for output in (predict("law.toml", "cut.csv").output, CliRunner().invoke(main, ["fit", "cut.csv", *rig]).output):
         assert "samples clipped near" in output, output
     assert "clipped" not in predict("law.toml", "whole.csv").output
+
+
+# ---- a joint
+
+
+def true_joint(joint: joints.Joint) -> Joint:
+    """A joint of the other integrator, whose controller holds its output for a millisecond: late by half of that."""
+    true = {name: joint.truth[name] for name in ("inertia", "forward", "back", "load", "sine", "cosine", "kp")}
+    viscous = {f"viscous_{way}": joint.truth["viscous"] for way in ("forward", "back")}
+    return Joint(**true, **viscous, damping=joint.truth["kd"] - joint.truth["kp"] * joints.PERIOD / 2)
+
+
+@pytest.mark.parametrize(("draws", "most"), [(8, 1.0), pytest.param(100, 3.0, marks=pytest.mark.soak)])
+def test_a_joint_moves_as_another_integrator_moves_it(draws: int, most: float) -> None:
+    """Inside its loop; 0.02 to 1 % of it is the peak of friction at rest, which has no part in these numbers."""
+    for seed in range(100, 100 + draws):
+        joint = joints.drawn(seed, torque=False)
+        (part,) = ss.answers.predict(joint.record, true_joint(joint), plain=False).parts
+        assert 100 - part.follows["theta"] < most, seed
+
+
+def test_a_joint_under_a_steady_torque_falls_as_galileo_says() -> None:
+    """2 N m against 0.5 N m of friction and 0.1 kg m^2, after a second under less than its friction at rest."""
+    time = np.arange(400) / 200
+    falls = np.maximum(time - 1.0, 0.0)
+    log = ss.Record.of(
+        {"theta": falls**2 / 2 * 15, "force": np.where(time < 1, 0.4, 2.0)}, fs=200, units={"force": "N m"}
+    )
+    place, _ = Joint(0.1, 0.5, 0.5, 0.0, 0.0).moved(log, loop=False)
+    assert np.all(np.abs(place[:200] - place[0]) < 1e-12)
+    assert place[-1] - place[0] == pytest.approx(log["theta"][-1], rel=0.02)  # its torque rises within a sample
+
+
+def test_friction_at_rest_holds_a_joint_longer_and_falls_within_its_speed() -> None:
+    time = np.arange(2000) / 1000
+    log = ss.Record.of({"theta": 0.01 * time, "force": 0.5 * time}, fs=1000, units={"force": "N m"})
+    log = log.with_channel("theta", np.zeros(2000) + 1e-9 * time, unit="rad")
+    place, _ = Joint(0.1, 0.4, 0.4, 0.0, 0.0, excess=0.2, speed=1e-3).moved(log, loop=False)
+    assert time[np.argmax(place > 1e-6)] == pytest.approx(1.2, abs=0.02)
+    assert place[-1] == pytest.approx(0.2 / 0.1 * 0.8**2 / 2 + 0.5 / 0.1 * 0.8**3 / 6, rel=0.02)
+
+
+def test_a_joint_is_predicted_from_one_log_in_another(tmp_path: Path) -> None:
+    joint = joints.drawn(102, torque=True)
+    kp, kd = joint.truth["kp"], joint.truth["kd"]
+    names = {"theta": "elbow_position_rad", "reference": "elbow_goal_position_rad", "force": "elbow_effort_Nm"}
+    for name, rows in (("first.csv", slice(0, 9000)), ("second.csv", slice(9000, None))):
+        columns = [joint.record.time[rows], *(joint.record[channel][rows] for channel in names)]
+        header = ",".join(["time [s]", *names.values()])
+        np.savetxt(name, np.column_stack(columns), delimiter=",", header=header, comments="")
+    gains = ("--kp", f"{kp}", "--kd", f"{kd}")
+    told = CliRunner().invoke(main, ["joint", "first.csv", "--axis", "elbow", *gains, "--output", "elbow"])
+    assert told.exit_code == 0, told.output
+    for law in ("elbow", "elbow/joint/law.toml"):
+        result = predict(law, "second.csv", "--json")
+        assert result.exit_code == 0, result.output
+        loop, torque = json.loads(result.stdout)["records"]
+        assert loop["channels"]["theta"]["follows"] > 99.5
+        assert loop["channels"]["force"]["follows"] > 85  # the rest is the noise of its sensor
+        assert torque["channels"]["theta"]["follows"] > 95 > torque["channels"]["theta"]["plain"]
+    assert "2 predictions" in predict("elbow", "second.csv").stdout
+    page = Path("second-predicted/report.html").read_text("utf-8")
+    assert "inside its control loop" in page
+    assert "by its torque from turn to turn" in page
+    law = Path("elbow/joint/law.toml")
+    law.write_text(law.read_text("utf-8").replace("inertia = ", "inertia = -"), "utf-8")
+    assert "its inertia positive" in predict("elbow", "second.csv").stderr
+    law.write_text(law.read_text("utf-8").replace("inertia = ", "weight = "), "utf-8")
+    assert "weight" in predict("elbow", "second.csv").stderr
+
+
+def test_a_log_without_torque_or_gain_moves_no_joint() -> None:
+    log = joints.drawn(100, torque=False).record
+    with pytest.raises(ss.errors.RecordError, match="neither a torque nor a gain"):
+        ss.answers.predict(log, Joint(0.1, 0.5, 0.5, 0.0, 0.0))
+
+
+def test_emps_moves_by_its_force_as_its_other_half_tells(dataset: Callable[[str], Path]) -> None:
+    """Coulomb's friction with a damper, alike both ways and fitted to that very half, misses 6.8 % of it."""
+    channels = {"x": "qm [m]", "force": "vir * 35.1507 [N]"}
+    record = ss.read_record(dataset("emps") / "DATA_EMPS.mat", channels=channels, fs=1000.0)
+    half = len(record) // 2
+    joint = Joint.of(ss.cycle.regress_joint(record.rows(0, half)), "")
+    (part,) = ss.answers.predict(record.rows(half, 2 * half), joint).parts
+    assert 100 - part.follows["x"] < 1.0 < 5.0 < 100 - part.plain["x"]

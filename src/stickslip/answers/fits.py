@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
+from stickslip.answers.arm import Joint, axis_record
 from stickslip.answers.findings import record_name
 from stickslip.answers.preparation import normal_load, with_sensors
 from stickslip.balance.force import friction_force
+from stickslip.cycle.joint import regress_joint
 from stickslip.cycle.sticks import Sticks, find_sticks
 from stickslip.drives.kinds import HarmonicBase, Release
 from stickslip.errors import UNNAMED, EstimateError, ModelError, RecordError, StickslipError
 from stickslip.estimate import Estimate, Result
 from stickslip.law.fit_curve import CurveFit, fit_curve
-from stickslip.law.law import LawFit
+from stickslip.law.law import LawFit, Traces
 from stickslip.law.start import CALIBRATION
 from stickslip.law.verdict import LawComparison
 from stickslip.law.which_law import compare_laws, fit_law
@@ -24,6 +28,8 @@ from stickslip.oscillator import Oscillator
 from stickslip.record.record import RIG_UNITS, Record
 from stickslip.rig.settings import RigSettings
 from stickslip.settings import read_toml
+from stickslip.signals.interpolate import without_delays
+from stickslip.signals.noise import noise_level, quantisation_step
 from stickslip.solve.tables import require_oscillator
 from stickslip.statistics import follows
 from stickslip.systems.file import read_system
@@ -205,6 +211,8 @@ class Prediction(Result):
         where these could not be fitted.
     sticks : tuple of Sticks
         Stops as measured and as predicted, by the same question over the same time; empty where it can not be asked.
+    how : str
+        Of a joint, what moved it.
     """
 
     record: Record
@@ -212,11 +220,12 @@ class Prediction(Result):
     follows: Mapping[str, float]
     plain: Mapping[str, float]
     sticks: tuple[Sticks, ...]
+    how: str = ""
 
     @property
     def name(self) -> str:
         """Of the record."""
-        return record_name(self.record)
+        return record_name(self.record) + self.how
 
     @property
     def estimates(self) -> tuple[Estimate, ...]:
@@ -249,15 +258,15 @@ class Predictions(Result):
 
     Attributes
     ----------
-    oscillator : Oscillator
-        The law on its oscillator, as given.
+    oscillator : Oscillator or Joint
+        The law on its oscillator, as given; or the joint.
     parts : tuple of Prediction
-        One for each record.
+        One for each record; of a joint's one inside its control loop, and one by its torque.
     notes : tuple of str
         What was left out, and why.
     """
 
-    oscillator: Oscillator
+    oscillator: Oscillator | Joint
     parts: tuple[Prediction, ...]
     notes: tuple[str, ...] = ()
 
@@ -284,8 +293,8 @@ class Predictions(Result):
         }
 
 
-def read_fitted(path: str | Path, *, rig: RigSettings | None = None) -> Oscillator:
-    """The oscillator with its law as a fit wrote it.
+def read_fitted(path: str | Path, *, rig: RigSettings | None = None) -> Oscillator | Joint:
+    """The oscillator with its law as a fit wrote it, or the joint as its log told it.
 
     Parameters
     ----------
@@ -296,7 +305,7 @@ def read_fitted(path: str | Path, *, rig: RigSettings | None = None) -> Oscillat
 
     Returns
     -------
-    Oscillator
+    Oscillator or Joint
 
     Raises
     ------
@@ -315,19 +324,21 @@ def read_fitted(path: str | Path, *, rig: RigSettings | None = None) -> Oscillat
     if path.is_dir():  # of a joint's results, or where the law itself lies, no less than of a fit's
         files = (path / LAW, path / "joint" / LAW.name, path / LAW.name)
         path = next((file for file in files if file.is_file()), files[0])
+    values, _ = read_toml(path, what="a fitted law is")
     if rig is not None and rig.mass is not None and rig.stiffness is not None:
-        values, _ = read_toml(path, what="a fitted law is")
         if "system" not in values:
             stated = {name: float(value) for name in RIG_UNITS if (value := getattr(rig, name)) is not None}
             drive = {"name": "HarmonicBase", "amplitude": 0.0, "frequency": 1.0, "contact": rig.contact}
             whole = {"system": {**stated, "damper": rig.damper}, "drive": drive, **values}
             return require_oscillator(read_system(whole).system, "a record is predicted")
+    elif "joint" in values:
+        return Joint.read(values["joint"])
     return require_oscillator(read_system(path).system, "a record is predicted")
 
 
 def predict(
     records: Record | Sequence[Record],
-    oscillator: Oscillator,
+    oscillator: Oscillator | Joint,
     *,
     rig: RigSettings | None = None,
     plain: bool = True,
@@ -347,11 +358,15 @@ def predict(
     100 % is the record itself, 0 % no better than its mean, and below zero worse than that. What noise hides no law
     follows: the residual over the noise, ``fit.misfit``, is 1 where nothing but noise is left.
 
+    A joint, as :func:`read_fitted` reads it from a joint's folder, is moved from the log's first sample on by the
+    reference through its control loop, where its gain was stated, and by the torque that was measured, from each turn
+    of the log on: nothing is fitted to that.
+
     Parameters
     ----------
     records : Record or sequence of Record
         As :func:`fit_law` takes them.
-    oscillator : Oscillator
+    oscillator : Oscillator or Joint
         With its law, as fitted.
     rig : RigSettings, optional
         What is stated of this rig goes before the oscillator's own constants; its sensors are the channels'.
@@ -389,13 +404,17 @@ def predict(
     records = [records] if isinstance(records, Record) else list(records)
     if not records:
         raise EstimateError("no record", "a prediction is held against one record at least", "give one")
-    require_oscillator(oscillator, "a record is predicted")
     if rig is not None:
-        oscillator = with_stated(oscillator, rig)
         records = [with_sensors(record, rig) for record in records]
-    parts = []
+    if not isinstance(oscillator, Joint):
+        require_oscillator(oscillator, "a record is predicted")
+        oscillator = oscillator if rig is None else with_stated(oscillator, rig)
+    parts = list[Prediction]()
     for number, record in enumerate(records):
-        parts.append(_predicted(record, oscillator, plain=plain))
+        if isinstance(oscillator, Joint):
+            parts += _moved(record, oscillator, plain=plain)
+        else:
+            parts.append(_predicted(record, oscillator, plain=plain))
         if progress:
             progress((number + 1) / len(records))
     return Predictions(oscillator, tuple(parts))
@@ -429,17 +448,60 @@ def _follows(fit: LawFit) -> dict[str, float]:
     return {name: follows(measured, traces.fitted[name]) for name, measured in traces.measured.items()}
 
 
-def _stops(record: Record, fit: LawFit, oscillator: Oscillator) -> tuple[Sticks, ...]:
+def _moved(record: Record, joint: Joint, *, plain: bool) -> Iterator[Prediction]:
+    """One log as a joint moves by it: inside its control loop, and by its torque, as far as it has what these take."""
+    log = axis_record(record, axis=None if {"theta", "x"} & set(record) else joint.axis or None)
+    log = without_delays(log, question="a prediction of a joint")
+    if "force" not in log and "current" in log and joint.torque_constant:
+        log = log.with_channel("force", joint.torque_constant * log["current"], unit="N m", source="current")
+    ways = {True: "reference" in log and joint.kp > 0, False: "force" in log}
+    if not any(ways.values()):
+        raise RecordError(
+            f"neither a torque nor a gain for a reference (the log has {', '.join(log)})",
+            "a joint is moved by its torque, or by its reference through a controller whose gain was stated",
+            "name the column of the torque, or give --kp (and --kd, of a log with its torque) to stickslip joint",
+        )
+    simple = _plainly(log, joint) if plain else None
+    for loop in (way for way, there in ways.items() if there):
+        fit = _traced(log, joint, loop=loop)
+        beside = {} if simple is None else _follows(_traced(log, simple, loop=loop))
+        how = ", inside its control loop" if loop else ", by its torque from turn to turn"
+        yield Prediction(log, fit, _follows(fit), beside, _stops(log, fit), how if all(ways.values()) else "")
+
+
+def _plainly(log: Record, joint: Joint) -> Joint | None:
+    """The joint with Coulomb's friction and a damper, both of this very log; None where that tells none."""
+    given = {"kp": joint.kp or None, "torque_constant": joint.torque_constant or None}
+    try:
+        own = regress_joint(log, **given, gravity=bool(joint.sine or joint.cosine))
+    except StickslipError:
+        return None
+    return joint.plainly(own.level.value, own.viscous.value) if own.level.known and own.viscous.known else None
+
+
+def _traced(log: Record, joint: Joint, *, loop: bool) -> LawFit:
+    """What a log measured, and what the joint makes of it."""
+    place = "theta" if "theta" in log else "x"
+    fitted = dict(zip((place, "force"), joint.moved(log, loop=loop), strict=True))
+    names = [place, *(["force"] if loop and "force" in log else [])]
+    traces = Traces(*({name: of[name] for name in names} for of in (dict.fromkeys(names, log.time), log, fitted)))
+    residual = {name: float(np.std(log[name] - fitted[name])) for name in names}
+    noise = {name: max(noise_level(log[name], log.fs), quantisation_step(log[name]) / 12**0.5, 1e-12) for name in names}
+    of: Any = joint  # of which a prediction asks its law alone
+    return LawFit(of, {}, np.eye(0), noise, residual, 0.0, len(log), 0, (traces,), "even")
+
+
+def _stops(record: Record, fit: LawFit, oscillator: Oscillator | None = None) -> tuple[Sticks, ...]:
     """Stops as measured and as predicted, told by the same channels of the motion over the same rows."""
     traces = fit.traces[0]
-    name = next((name for name in ("x", "v") if name in traces.measured), None)
+    name = next((name for name in ("x", "v", "theta") if name in traces.measured), None)
     if name is None:
         return ()
     # by the speed, as the motion alone tells it: a prediction has no noise of other sensors to weigh
     first = round((float(traces.time[name][0]) - record.start) * record.fs)
     rows = slice(first, first + len(traces.time[name]))
     base = {"z": record["z"][rows]} if "z" in record else {}
-    contact = getattr(oscillator.drive, "contact", None) if base else None
+    contact = getattr(oscillator.drive, "contact", None) if base and oscillator else None
     stops = []
     try:
         for values in (traces.measured, traces.fitted):

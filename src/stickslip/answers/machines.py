@@ -111,7 +111,14 @@ def analyze_joint(
     if unstated:
         doubt = f"nobody stated a unit: {' and '.join(unstated)}"
         results = {key: flagged(result, doubt) for key, result in results.items()}
-    return Findings(name, whole, faults, notes=tuple(inquiry.notes), settings=_settings(joint, given), results=results)
+    return Findings(
+        name,
+        whole,
+        faults,
+        notes=tuple(inquiry.notes),
+        settings=_settings(joint, {**given, "axis": axis}),
+        results=results,
+    )
 
 
 def joint_law(joint: JointFriction) -> LinearSlope | Stribeck:

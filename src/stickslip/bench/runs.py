@@ -18,6 +18,7 @@ from stickslip.oscillator import Oscillator
 from stickslip.rig.rig import Shaker
 from stickslip.settings import STRICT, checked, quantity, read_toml
 from stickslip.solve.simulate import simulate
+from stickslip.solve.tables import require_oscillator
 
 SHARES = (1.0, 0.5, 0.25)  # of the largest amplitude that are tried
 FREQUENCIES = 10  # that are tried, evenly on a logarithmic scale
@@ -150,7 +151,7 @@ class Proposal:
 
 
 def next_runs(
-    laws: Mapping[str, Oscillator],
+    laws: Mapping[str, object],
     *,
     shaker: Shaker | None = None,
     noise: float = 1e-6,
@@ -193,7 +194,7 @@ def next_runs(
     Raises
     ------
     ModelError
-        Noise or count without meaning.
+        Noise or count without meaning, or what is no oscillator.
     EstimateError
         Fewer than two laws, or none of the motions can be simulated.
 
@@ -210,14 +211,15 @@ def next_runs(
         raise EstimateError(f"{len(laws)} laws", "a run is chosen to tell two laws apart", "give those that are left")
     if not noise > 0 or count < 1:
         raise ModelError(f"noise = {noise}, count = {count}", "both are positive", "correct them")
+    left = {name: require_oscillator(law, "the next run is planned") for name, law in laws.items()}
     shaker, proposals = shaker or Shaker(), []
-    for frequency in _frequencies(laws, shaker):
-        top = _amplitude(laws, shaker, frequency)
+    for frequency in _frequencies(left, shaker):
+        top = _amplitude(left, shaker, frequency)
         for share in SHARES:
             motion = (frequency, _round(share * top))
             if motion[1] > 0 and all(_apart(motion, other) for other in done):
                 bound = shaker.bound(frequency) if share == 1.0 and top >= 0.99 * shaker.largest(frequency) else ""
-                proposals += _proposals(laws, motion, noise, largest, bound)
+                proposals += _proposals(left, motion, noise, largest, bound)
     if not proposals:
         raise EstimateError(
             "no motion of the base is left to try", "the shaker has to move the mass", "check its limits"

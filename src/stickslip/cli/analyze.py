@@ -356,11 +356,13 @@ def _read(files: Sequence[Path], rig: RigSettings, names: Sequence[str], *, fitt
 def predict(law: Path, files: tuple[str, ...], output: Output, plain: bool, **options: Any) -> None:
     """Simulate a fitted law along other records, and say how much of them it follows.
 
-    LAW is the folder that stickslip fit wrote, its law/law.toml, or a file of a system as stickslip simulate reads it.
+    LAW is the folder that stickslip fit or joint wrote, its law.toml, or a file of a system as stickslip simulate reads
+    it.
     FILES are records that the law was not fitted to. Unless columns are stated they are read by those of the record
     that it was, where a file has them. The base's motion z or the applied force drives the simulation as it was
     recorded, and the sensors read it as --config states them. Nothing is fitted to a record but how its motion begins
-    and each sensor's zero. Several records are a table, one row a file.
+    and each sensor's zero. A joint is moved by its log's reference through its control loop, where the gains were
+    stated, and by its torque from turn to turn. Several records are a table, one row a file.
 
     Told is of each channel 100 (1 - |y - yhat| / |y - mean y|) %, the fit of system identification.
 

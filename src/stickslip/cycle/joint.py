@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -110,6 +111,8 @@ class JointFriction(Result):
     delay : Estimate or None
         By how much the measured torque comes later [s] than the position, or a controller's than the error that it is
         made of; taken out where it is surely there. None where the motion does not tell it.
+    stated : mapping of str to Estimate
+        The constants that were stated, by name.
     """
 
     level: Estimate
@@ -143,6 +146,7 @@ class JointFriction(Result):
     stribeck_speed: Estimate | None = None
     exponent: float | None = None
     delay: Estimate | None = None
+    stated: Mapping[str, Estimate] = field(default_factory=dict)
 
     def weight(self, position: Array) -> Array:
         """Gravity's torque [N m] at positions."""
@@ -416,6 +420,7 @@ def _answer(
         condition=fit.condition,
         left_out=left_out,
         source=data.source,
+        stated=data.stated,
         status=status,
         **_rows(record, data, fit, pull, inertia.value, damped),
         **_stribeck(tell, fall, pull, known.get("load")),

@@ -256,7 +256,8 @@ def of_predictions(predictions: Predictions) -> Story:
     if len(parts) == 1:
         return _noted(parts[0], predictions)
     least = _listed(predictions.least)
-    headline = f"{_law(predictions)}, as it was given, follows at least {least} in each of {len(parts)} records."
+    what = f"{len(parts)} {'predictions' if any(part.how for part in predictions.parts) else 'records'}"
+    headline = f"{_law(predictions)}, as it was given, follows at least {least} in each of {what}."
     first = next(iter(predictions.least))
     compared = any(part.plain for part in predictions.parts)
     rows = [
@@ -271,7 +272,8 @@ def of_predictions(predictions: Predictions) -> Story:
     beside = [f"{first}, Coulomb"] if compared else []
     headings = ("record", *predictions.least, *beside, "stops per cycle", "predicted")
     table = Table("Fit of each channel", headings, rows, f"{DEFINITION} {COMPARED}" if compared else DEFINITION)
-    return _noted(Story(f"{len(parts)} records predicted", [headline], tables=[table], parts=parts), predictions)
+    title = f"{len(parts)} records predicted" if what.endswith("records") else what
+    return _noted(Story(title, [headline], tables=[table], parts=parts), predictions)
 
 
 def _noted(story: Story, predictions: Predictions) -> Story:
@@ -325,7 +327,7 @@ def _headline(part: Prediction, law: str) -> Iterator[str]:
 
 
 def _cautions(part: Prediction) -> Iterator[str]:
-    if {"z", "force"}.isdisjoint(part.record):
+    if {"z", "force", "reference"}.isdisjoint(part.record):
         yield "Neither the base's motion z nor a force was recorded: the motion is driven as the law's file says."
     least = min(part.follows, key=lambda name: part.follows[name])
     if part.follows[least] < 0:
@@ -336,7 +338,8 @@ def _scope_of(part: Prediction, law: str) -> Scope | None:
     """Each channel with what the law's sensor would have read over it, and what is left; none of a broken clock."""
     traces = part.fit.traces[0]
     fitted = {name: (traces.time[name], traces.fitted[name]) for name in part.follows}
-    return of_fit(part.record, fitted, ["analyze"], f"{law}, as it was given", _middle(part.record))
+    question = "joint" if "theta" in part.record else "analyze"
+    return of_fit(part.record, fitted, [question], f"{law}, as it was given", _middle(part.record))
 
 
 def _law(predictions: Predictions) -> str:

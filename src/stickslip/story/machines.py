@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from stickslip.answers.arm import Joint
 from stickslip.answers.findings import Comparison, Findings
 from stickslip.answers.machines import joint_law
 from stickslip.cycle.joint import JointFriction, is_late
@@ -21,12 +22,14 @@ from stickslip.figures.contact import plates_of, plates_together, tribometer_pla
 from stickslip.laws.c_code import compiler
 from stickslip.laws.coulomb import LinearSlope
 from stickslip.laws.export import export_fmu, export_law, urdf_dynamics
+from stickslip.settings import toml_lines
 from stickslip.story.fit import ALONE, FILES
 from stickslip.story.story import Caution, Story, Table, cautions, interval_of, number, value_of
 from stickslip.units import parse_unit
 
 APART = 0.05  # of a level, by which directions or definitions must differ to be worth a sentence
 RARELY = 0.005  # of the time
+TRIED = "# all of the joint: what stickslip predict moves along another log"
 
 
 def of_tribometer(findings: Findings) -> Story:
@@ -107,7 +110,7 @@ def of_joint(findings: Findings) -> Story:
         settings={key: str(value) for key, value in findings.settings.items()},
         draw=lambda: plates_of(joint),
         data=lambda: _joint_data(findings),
-        write=partial(write_joint, joint=joint),
+        write=partial(write_joint, findings=findings),
     )
 
 
@@ -257,8 +260,12 @@ def _joint_data(findings: Findings) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def write_joint(folder: Path, *, joint: JointFriction) -> None:
-    """Its friction under the mean load in every form that another program reads, into the folder joint."""
+def write_joint(folder: Path, *, findings: Findings) -> None:
+    """Its friction under the mean load in every form that another program reads, into the folder joint.
+
+    With the law in TOML stands all of the joint, as a prediction moves it.
+    """
+    joint = findings.joint
     if not (joint.level.known and joint.viscous.known):
         return
     (folder / "joint").mkdir()
@@ -267,6 +274,9 @@ def write_joint(folder: Path, *, joint: JointFriction) -> None:
     rises = f"<!-- its friction rises to {law.breakaway:.4g} {joint.level.unit} at rest, not here -->\n"
     lost = "" if law == line else rises
     (folder / "joint" / "dynamics.urdf").write_text(f"{lost}{urdf_dynamics(line)}\n", encoding="utf-8")
+    moves = joint.inertia.known and joint.inertia.value > 0
+    whole = vars(Joint.of(joint, findings.settings.get("axis", ""))) if moves else {}
+    lines = [] if not moves or "bodies" in findings.record else [TRIED, *toml_lines({"joint": whole})]
     for form, file in FILES.items():
         try:
             if form == "mujoco":  # whose joints take a line alone, as URDF's
@@ -275,8 +285,9 @@ def write_joint(folder: Path, *, joint: JointFriction) -> None:
                 text = export_law(law, format=form, turning=turning)
         except ModelError:  # it has no such form
             continue
-        text = f"{ALONE}\n{text}" if form == "toml" else text
+        if form == "toml":
+            text = "\n".join([ALONE, text, *lines])
         (folder / "joint" / file).write_text(text.rstrip("\n") + "\n", encoding="utf-8")
-    if joint.inertia.known and joint.inertia.value > 0:
+    if moves:
         place, alone = folder / "joint" / "joint.fmu", compiler() is None
         export_fmu(law, place, mass=joint.inertia.value, turning=turning, sources_only=alone)

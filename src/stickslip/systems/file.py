@@ -312,6 +312,7 @@ def _case(name: str, values: dict[str, Any], source: _Source) -> Case:
             "a law is simulated in a system",
             "add [system] with mass = and stiffness =, and a [drive]; a fit that is told the mass writes them itself",
         )
+    values = {key: value for key, value in values.items() if key != "joint"}  # a prediction's, beside a joint's law
     whole = checked(_File, values, source=source.name, lines=source.lines)
     drive = _built("drive", DRIVES, whole.drive, source)
     several = whole.contacts is not None or isinstance(whole.system.get("mass"), list)
