@@ -129,6 +129,20 @@ def test_a_load_cell_stands_in_for_the_friction_and_says_so() -> None:
     assert findings.record.history[-1].arguments == {"friction": "load"}
 
 
+def test_the_interval_holds_how_sure_a_load_cell_is_and_nothing_breaks_away_that_never_stops() -> None:
+    held = 0
+    for seed in range(20):
+        gain = 1 + 0.004 * np.random.default_rng([713, seed]).standard_normal()
+        record = ss.Record.of({"x": sliding()["x"], "load": gain * sliding(seed=seed)["friction"]}, fs=FS)
+        findings = analyze(record.with_details("load", gain_sd=0.004))
+        held += findings.level.includes(1.5) and findings.loops.energy_per_cycle.includes(0.06)
+        assert findings.level.sd == pytest.approx(0.006, rel=0.1)
+        words = " ".join(map(str, ss.summary(findings).headline))
+        assert "As it turns round it bears" in words
+        assert "breakaway" not in words
+    assert held >= 17  # by chance alone fewer in 16 of 1000
+
+
 @pytest.mark.parametrize(
     ("samples", "reason"),
     [

@@ -33,6 +33,12 @@ def example(rows: int = 500, **changes: object) -> ss.Record:
     return replace(record, history=(*record.history, step), rig=rig, **changes)
 
 
+def test_how_sure_a_gain_is_may_be_stated_anew(tmp_path: Path) -> None:
+    path = ss.write_record(example(), tmp_path / "kept.csv")
+    for spec, sd in (("x [m]", 0.01), ("x [m] ± 3 %", 0.03)):
+        assert ss.read_record(path, channels={"x": spec}).channels["x"].gain_sd == sd
+
+
 @pytest.mark.parametrize("suffix", SUFFIXES)
 def test_a_record_comes_back_exactly(tmp_path: Path, suffix: str) -> None:
     record = example()

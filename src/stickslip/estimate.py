@@ -220,6 +220,8 @@ class Estimate(Plain):
         >>> print(Estimate.normal("friction coefficient", 0.3, sd=0.003, unit="1", method="").widened(0.02))
         friction coefficient 0.300 (95 %: 0.287 to 0.313)
         """
+        if not self.known or (share, times) == (0.0, 1.0):
+            return self
         more = share * abs(self.value)
         below, above = (times * math.hypot(end - self.value, NORMAL_95 * more) for end in self.interval)
         floor = 0.0 if self.interval[0] >= 0 else -math.inf  # what can not fall below zero does not by being less sure

@@ -518,7 +518,9 @@ def _by_load(record: Record, rig: RigSettings, inquiry: Inquiry) -> Record:
         )
         step = Step("analyze", {"friction": "load"}, "the load cell's reading taken as the friction force")
         unit = record.channels["load"].unit
-        return record.with_channel("friction", record["load"], unit=unit, source="load", step=step)
+        taken = record.with_channel("friction", record["load"], unit=unit, source="load", step=step)
+        gain = record.channels["load"].gain_sd
+        return taken.with_details("friction", gain_sd=gain) if gain else taken
     if {"x", "a"} <= set(record) and rig.mass is None and rig.stiffness is None and "load" not in record:
         _tell_per_mass(record, rig, inquiry)
     lacking = [key for key in ("mass", "stiffness") if getattr(rig, key) is None]

@@ -225,7 +225,17 @@ def felt(record: Record, rig: StatedRig) -> Record:
     if cell.discharge is not None:
         notes.append(f"its discharge of {cell.discharge:g} s is left in")
     name = ALONE if method == "load" else method  # no balance of forces stands behind it
-    return with_friction(record, force, np.sqrt(variance), replace(rig, method=name), notes)
+    made = with_friction(record, force, np.sqrt(variance), replace(rig, method=name), notes)
+    return made.with_details("friction", gain_sd=cell.gain_sd) if cell.gain_sd else made
+
+
+def gains_unsure(record: Record, moved: str) -> tuple[float, float]:
+    """How unsure the gains of a measured force and of its motion are stated to be; twins count those of a balance."""
+    rig = record.rig
+    balanced = Balance.of(rig) is not None and not is_measured(record, "friction")
+    if balanced and rig is not None and rig.method != "F2":
+        return 0.0, 0.0
+    return record.channels["friction"].gain_sd, record.channels[moved].gain_sd
 
 
 def _unmounted(record: Record, terms: dict[str, dict[int, float]]) -> tuple[dict[str, Filter], list[str]]:

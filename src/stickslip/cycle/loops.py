@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from stickslip.arrays import Array, Mask, Rows
+from stickslip.balance.balance import gains_unsure
 from stickslip.balance.motion import (
     AUDIBLE,
     CREEP,
@@ -174,11 +175,14 @@ def friction_loops(
     sliding = sliding_parts(motion, cycles)
     label = cycles.labels(len(friction))
     magnitudes = _magnitudes(friction, motion, sliding, label, len(cycles.edges) - 1, unit)
-    energy = _energy(friction, motion, cycles)
+    gain, stretched = gains_unsure(record, motion_channels(record, contact)[0])
+    magnitudes = {key: told.widened(gain) for key, told in magnitudes.items()}
+    both = math.hypot(gain, stretched)
+    energy = _energy(friction, motion, cycles).widened(both)
     folded = cycles.folded(friction)
     return Loops(
         **magnitudes,
-        slope=_slope(friction, motion, sliding, label, unit),
+        slope=_slope(friction, motion, sliding, label, unit).widened(both),
         energy_per_cycle=energy,
         frequency=cycles.frequency,
         phase_grid=np.arange(PHASES) / PHASES,

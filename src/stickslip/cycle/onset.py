@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from stickslip.balance.balance import ALONE, Balance
+from stickslip.balance.balance import ALONE, Balance, gains_unsure
 from stickslip.balance.force import FUSIONS
-from stickslip.balance.motion import FORCES, is_measured
+from stickslip.balance.motion import FORCES, is_measured, motion_channels
 from stickslip.cycle.slips import FAST, Stroke, Strokes, find_strokes, ringing_of, sliding_swing
 from stickslip.cycle.static_peak import LEAST, Peak, begun, unseen
 from stickslip.cycle.sticks import find_sticks
@@ -157,8 +157,9 @@ def presliding(record: Record, *, contact: str | None = None) -> Presliding:
     untold = verdict == "can not be told"
     slopes = [slope.unknown(evidence) if untold else slope.within(0.0, otherwise=evidence) for slope in slopes]
     status = evidence if untold else "ok"
-    stiffness = _inverse(_both(slopes), "presliding stiffness") if gives else None
-    (forward, back), backlash = sides, _backlash(strokes) if gives else None
+    unsure = math.hypot(*gains_unsure(record, motion_channels(record, contact)[0]))
+    stiffness = _inverse(_both(slopes), "presliding stiffness").widened(unsure) if gives else None
+    (forward, back), backlash = (side and side.widened(unsure) for side in sides), _backlash(strokes) if gives else None
     return Presliding(stiffness, forward, back, backlash, slopes[0], slopes[1], verdict, evidence, status)
 
 
@@ -352,7 +353,8 @@ def breakaway(record: Record, *, contact: str | None = None) -> Breakaway:
     heard = (None, None, None) if rings is None else (rings.forward, rings.back, rings.difference)
     own = {way: [stroke for stroke in borne.strokes if stroke.way == way] for way, _ in SIDES}
     swings = [sliding_swing(record, own[way], side) for way, side in SIDES]
-    forward, back = (_flagged(level, status) for level in levels)
+    gain, _ = gains_unsure(record, motion_channels(record, contact)[0])
+    forward, back = (_flagged(level and level.widened(gain), status) for level in levels)
     ratio = _flagged(ratio, status) or ratio
     if not _rests(record, contact):
         forward, back = (level and level.unknown(NOT_FELT) for level in (forward, back))

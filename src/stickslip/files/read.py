@@ -457,7 +457,10 @@ def _detailed(wanted: Wanted, channels: Mapping[str, Channel]) -> Channel:
         return wanted.channel
     if wanted.scale * next(iter(wanted.scales.values())) != 1:
         return wanted.channel
-    return replace(wanted.channel, **{name: getattr(known, name) for name in DETAILS})
+    details = {name: getattr(known, name) for name in DETAILS}
+    if wanted.channel.gain_sd:  # stated anew
+        details["gain_sd"] = wanted.channel.gain_sd
+    return replace(wanted.channel, **details)
 
 
 @contextmanager

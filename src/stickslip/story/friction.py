@@ -168,7 +168,8 @@ def _headline(findings: Findings) -> Iterator[str]:
     if findings.sticks is not None and findings.loops is None:
         yield sentence(f"{of_sticks(findings)}.")
     if findings.breakaway is not None:
-        yield from _of_breakaway(findings.breakaway)
+        stops = findings.sticks is None or any(event.kind != "slip" for event in findings.sticks.events)
+        yield from _of_breakaway(findings.breakaway, "At breakaway" if stops else "As it turns round")
     if findings.stiffness is not None:
         yield _of_contact(findings.stiffness, findings.contact_damping)
     if findings.cause is not None:
@@ -258,7 +259,7 @@ def of_sticks(findings: Findings) -> str:
     return f"it {'sticks' if stands(sticks.share.status) else 'seems to stick'} {share} of the time{stops}"
 
 
-def _of_breakaway(breakaway: Breakaway) -> Iterator[str]:
+def _of_breakaway(breakaway: Breakaway, when: str) -> Iterator[str]:
     ratio = breakaway.ratio
     low, high = ratio.interval
     if not math.isfinite(low + high):
@@ -267,17 +268,15 @@ def _of_breakaway(breakaway: Breakaway) -> Iterator[str]:
         return
     if not stands(ratio.status):
         if low < 1 and high > LOOSE:
-            yield f"The record hardly tells what it bears at breakaway: at most {high:.2g} times the sliding friction."
+            yield f"{when} the record hardly tells what it bears: at most {high:.2g} times the sliding friction."
             return
         most = f"at most {high:.3g}" if low < 1 else value_of(ratio)
-        yield f"At breakaway it seems to bear {most} times as much as while it slides."
+        yield f"{when} it seems to bear {most} times as much as while it slides."
         return
     more = "more than" if low > 1 + ALIKE else "less than" if high < 1 - ALIKE else "about as much as"
     both = [estimate for estimate in (breakaway.forward, breakaway.back) if estimate]
     sides = " and ".join(f"{value_of(estimate)} {estimate.name.split()[-1]}" for estimate in both)
-    yield (
-        f"At breakaway it bears {sides}: {more} while it slides ({value_of(ratio)} times, 95 %: {interval_of(ratio)})."
-    )
+    yield (f"{when} it bears {sides}: {more} while it slides ({value_of(ratio)} times, 95 %: {interval_of(ratio)}).")
     rings = [estimate for estimate in (breakaway.ringing_forward, breakaway.ringing_back) if estimate is not None]
     if rings:
         yield f"After slip begins it rings at {' and '.join(f'{value_of(e)} {e.name.split()[-1]}' for e in rings)}."
