@@ -13,6 +13,7 @@ import pyuff
 import scipy.io
 from nptdms import ChannelObject, TdmsFile, TdmsWriter
 
+import stickslip as ss
 from format_files import Formats, X, read, units, whole, write_uff
 from stickslip.errors import FormatError
 
@@ -296,3 +297,36 @@ def test_uff_keeps_time_histories_beside_spectra_and_uneven_time(tmp_path: Path)
     assert "frequency response function" in table.notes[0]
     assert units(table)["7+X"] == "mm"
     assert np.allclose(whole(table)["7+X time"], stamps)
+
+
+# ---- oscilloscopes
+
+
+def test_tektronix_has_its_settings_beside_the_first_rows(tmp_path: Path) -> None:
+    settings = ["Record Length,6.0e+01", "Sample Interval,1e-3", "Trigger Point,3e1", ",", ",", "Source,CH2"]
+    settings += ["Vertical Units,V", "Horizontal Units,s", *[","] * 52]
+    times, volts = np.arange(60) / 1e3 - 0.03, np.round(np.sin(np.arange(60) / 4), 5)
+    lines = [f"{text},,{t:018.12f},  {v:.5f}," for text, t, v in zip(settings, times, volts, strict=True)]
+    path = tmp_path / "F0000CH2.CSV"
+    path.write_text("\r\n".join(lines) + "\r\n")
+    record = ss.read_record(path)
+    assert list(record) == ["CH2"]
+    assert (record.channels["CH2"].unit, record.start) == ("V", pytest.approx(-0.03))
+    assert record.fs == pytest.approx(1000.0, rel=1e-9)
+    assert record["CH2"] == pytest.approx(volts, rel=1e-12)
+    path.write_text("\r\n".join(lines[:50]))
+    assert "it has 50 of 60 rows" in str(ss.read_record(path).check()[0])
+
+
+def test_rigol_states_start_and_increment_above_its_rows(tmp_path: Path) -> None:
+    volts = np.round(np.sin(np.arange(60) / 4), 5)
+    head = "X,CH1,CH2,Start,Increment,\nSequence,Volt,Volt,-6.000000e-03,2.000000e-04\n"
+    path = tmp_path / "NewFile1.csv"
+    path.write_text(head + "".join(f"{row},{v:.5f},{-v:.5f},,\n" for row, v in enumerate(volts)))
+    record = ss.read_record(path, channels={"x": "CH1 [V] @ 2 mm/V", "load": "CH2 [V] @ 10 N/V"})
+    assert (record.fs, record.start) == (pytest.approx(5000.0), pytest.approx(-6e-3))
+    assert record["x"] == pytest.approx(2e-3 * volts, rel=1e-12)
+    assert record["load"] == pytest.approx(-10 * volts, rel=1e-12)
+    path.write_text(head.replace("2.000000e-04", "0") + "0,1,2,,\n")
+    with pytest.raises(FormatError, match="an increment of 0 s"):
+        ss.read_record(path)

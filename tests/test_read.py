@@ -35,6 +35,7 @@ CALLED = {
     "rosbag": "[Bb]ags",
     "mdf": "MDF",
     "json_table": "JSON",
+    "oscilloscope": "oscilloscopes",
     "text": "CSV",
 }
 

@@ -45,9 +45,43 @@ DIALECTS = {
     "trailing delimiter in the rows alone": "t,x [mm],force [N]\n" + rows(tail=","),
     "quoted numbers": "t,x [mm],force [N]\n" + "".join(f'"{t}","{x}","{f}"\n' for t, x, f in zip(T, X, F, strict=True)),
     "quoted names": '"t","x [mm]","force [N]"\n' + rows(),
+    "units after slashes": "t / s,x / mm,force / N\n" + rows(),
+    "units after slashes without blanks": "t/s,x/mm,force/N\n" + rows(),
+    "units in words": "t in s,x in mm,force in N\n" + rows(),
+    "words below the rows": "t,x [mm],force [N]\n" + rows() + "\nEnd of data\nMean,0.1,2.0\n",
     "comments between the rows": "t,x [mm],force [N]\n# start\n" + rows() + "# stop\n",
     "empty lines between the rows": "t,x [mm],force [N]\n" + rows().replace("\n", "\n\n"),
 }
+
+
+def test_what_stands_below_the_rows_is_told(tmp_path: Path) -> None:
+    path = tmp_path / "rig.csv"
+    path.write_text(DIALECTS["words below the rows"])
+    assert "left out what stands below the rows: 'End of data Mean,0.1,2.0'" in ss.read_record(path).history[0].outcome
+    path.write_text("t,x [mm],force [N]\n" + rows() + "nothing,1.0,2.0\n" + rows())
+    with pytest.raises(ss.errors.FormatError, match=r"row 42 of 'rig\.csv' reads 'nothing,1\.0,2\.0'"):
+        ss.read_record(path)
+
+
+@pytest.mark.parametrize("day", ["2024-05-01", "01.05.2024", "5/1/2024"])
+def test_a_date_may_stand_beside_its_clock(tmp_path: Path, day: str) -> None:
+    lines = [f"{day},12:00:{row / 50:06.3f},{x}" for row, x in enumerate(X)]
+    path = tmp_path / "rig.csv"
+    path.write_text("Date,Time,x [mm]\n" + "\n".join(lines))
+    record = ss.read_record(path)
+    assert list(record) == ["x"]
+    assert record.fs == pytest.approx(50.0, rel=1e-12)
+    assert record["x"] == pytest.approx(X / 1e3, rel=1e-12)
+
+
+@pytest.mark.parametrize("decimal", [".", ","])
+def test_thousands_may_be_set_apart(tmp_path: Path, decimal: str) -> None:
+    force = np.round(1e4 * np.sin(9 * T), 2)
+    texts = [f"{t:.4f};{f:,.2f}" for t, f in zip(T, force, strict=True)]
+    swap = str.maketrans(",.", ".,") if decimal == "," else {}
+    path = tmp_path / "rig.csv"
+    path.write_text("t;force [N]\n" + "\n".join(text.translate(swap) for text in texts) + "\n")
+    assert ss.read_record(path)["force"] == pytest.approx(force, rel=1e-12)
 
 
 @pytest.mark.parametrize("ending", ["\n", "\r\n"])
@@ -117,7 +151,7 @@ def test_columns_of_unequal_length_are_refused_with_the_rows_that_all_have(tmp_p
         ("t,x\n0,1\n1,2\n2,three\n3,4\n", 4),
         ("t,x\n0,1\n1,2\n2,3,99\n3,4\n", 4),
         ('t,x\n0,1\n1,2\n2,"3\n3,4\n', 4),
-        ("a title\n\nt,x\n0,1\n1,2\nEnd of run\n", 6),
+        ("a title\n\nt,x\n0,1\n1,2\nEnd of run\n2,3\n", 6),
         ("Dear reader,\nnothing here is measured.\n", 1),
         ("\n\nDear reader\n", 3),
     ],

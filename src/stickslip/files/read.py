@@ -28,7 +28,7 @@ from stickslip.record.record import DETAILS, Record, Step
 # Asked in this order whether a file is theirs; each is a module beside this one, imported when it is its turn.
 FORMATS = (
     "journal", "tdms", "matlab", "hdf5", "parquet", "uff", "audio", "lvm", "mcap", "rosbag", "mdf",
-    "json_table", "text",
+    "json_table", "oscilloscope", "text",
 )  # fmt: skip
 
 HEAD = 1 << 16  # bytes shown to `recognise`
@@ -49,9 +49,9 @@ def read_record(
 ) -> Record:
     """Read a file, or several on one clock, as a Record in SI.
 
-    Formats: CSV and other text, MATLAB v5 to v7.3, TDMS, UFF 58, WAV/FLAC/OGG, HDF5, Parquet, LVM, JSON, MCAP, bags of
-    ROS 1 and 2, MDF, the journal of `stickslip acquire`. A file
-    that write_record wrote, read without arguments, is the same record again, history included.
+    Formats: CSV and other text, what oscilloscopes write, MATLAB v5 to v7.3, TDMS, UFF 58, WAV/FLAC/OGG, HDF5, Parquet,
+    LVM, JSON, MCAP, bags of ROS 1 and 2, MDF, the journal of `stickslip acquire`. A file that write_record wrote, read
+    without arguments, is the same record again, history included.
 
     Parameters
     ----------

@@ -51,15 +51,15 @@ def titled(table: Table) -> Table:
 
 
 def split_name(text: str) -> tuple[str, str | None]:
-    """Part ``"x [mm]"``, ``"x (mm)"`` or ``"x, mm"`` into name and unit."""
+    """Part ``"x [mm]"``, ``"x (mm)"``, ``"x, mm"``, ``"x / mm"`` or ``"x in mm"`` into name and unit."""
     text = text.strip()
     name, bracket, unit = text[:-1].rpartition("[") if text.endswith("]") else ("", "", "")
     if bracket and name.strip() and "]" not in unit:
         return name.strip(), unit.strip()
     # no two parts that fit the same signs: a title of any length is read in one pass
-    match = re.fullmatch(r"(.*?)(?:\(([^()]*(?:\([^()]*\)[^()]*)?)\)|,([^,]+))", text)
+    match = re.fullmatch(r"(.*?)(?:\(([^()]*(?:\([^()]*\)[^()]*)?)\)|,([^,]+)|\s(?:/|in)\s(\S+))", text)
     if match and match[1].strip():
-        unit = (match[2] or match[3] or "").strip()
+        unit = (match[2] or match[3] or match[4] or "").strip()
         if is_unit(unit):
             return match[1].strip(), unit
     return text, None

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import codecs
+import csv
 import io
 import re
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -15,19 +18,12 @@ import numpy as np
 
 from stickslip.arrays import Array
 from stickslip.errors import MISSTATED, FormatError
-from stickslip.files.table import FREE, Block, Column, Options, Table
+from stickslip.files.select import is_unit, split_name
+from stickslip.files.table import FREE, Block, Column, Options, Table, unique
 from stickslip.record.metadata import read_beside
 
 if TYPE_CHECKING:
     import pandas as pd
-
-
-import codecs
-import csv
-from collections import Counter
-
-from stickslip.files.select import is_unit, split_name
-from stickslip.files.table import unique
 
 TAIL = 1 << 16  # bytes at the end that are looked at
 FEWEST = 3  # other rows by which a last one can be judged
@@ -41,12 +37,12 @@ DELIMITERS = {"tab": "\t", "\\t": "\t", "comma": ",", "semicolon": ";", "pipe": 
     ("space", " "), WHITESPACE
 )
 _EMPTY = frozenset(["", "nan", "na", "n/a", "#n/a", "null", "none", "inf", "-inf", "+inf", "infinity", "-infinity"])
-_DECIMAL_POINT = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
-_DECIMAL_COMMA = re.compile(r"[-+]?(?:\d+,?\d*|,\d+)(?:[eE][-+]?\d+)?")
-CLOCK = re.compile(
-    r"(?:(?P<date>\d{4}[-/]\d{1,2}[-/]\d{1,2}|\d{1,2}\.\d{1,2}\.\d{4})[ T])?"
-    r"\d{1,2}:\d{2}:\d{2}(?:[.,]\d+)?(?:Z|[-+]\d{2}:?\d{2})?"
-)
+_DECIMAL_POINT = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+|\d{1,3}(?:,\d{3})+\.\d+)(?:[eE][-+]?\d+)?")
+_DECIMAL_COMMA = re.compile(r"[-+]?(?:\d+,?\d*|,\d+|\d{1,3}(?:\.\d{3})+,\d+)(?:[eE][-+]?\d+)?")
+_DAY = r"\d{4}[-/]\d{1,2}[-/]\d{1,2}|\d{1,2}\.\d{1,2}\.\d{4}"
+DATE = re.compile(rf"{_DAY}|\d{{1,2}}/\d{{1,2}}/\d{{4}}")
+CLOCK = re.compile(rf"(?:(?P<date>{_DAY})[ T])?\d{{1,2}}:\d\d:\d\d(?:[.,]\d+)?(?:Z|[-+]\d\d:?\d\d)?")
+WRITTEN = re.compile(f"(?:{CLOCK.pattern})|{DATE.pattern}")
 
 
 @dataclass(frozen=True)
@@ -57,8 +53,8 @@ class Ending:
     cut: str = ""
 
 
-def ending(path: Path, layout: Layout) -> tuple[int, str]:
-    """The byte at which the whole rows of a text file end, and what is missing behind it, in words."""
+def ending(path: Path, layout: Layout) -> tuple[int, str, str]:
+    """The byte at which the whole rows of a text file end, what is missing behind it, and what else stands there."""
     size = path.stat().st_size
     first = max(layout.offset, size - TAIL + size % 2)
     with path.open("rb") as file:
@@ -66,12 +62,23 @@ def ending(path: Path, layout: Layout) -> tuple[int, str]:
         tail = file.read()
     lines = lines_of(tail, layout.encoding, whole=True)
     if not lines:
-        return size, ""
+        return size, "", ""
     if first > layout.offset:
         lines = lines[1:]  # it may begin within its line
+    if words := _footer(lines, layout):
+        left_out = sum(len(line.encode(layout.encoding, "replace")) for line in lines[-len(words) :])
+        return size - left_out, "", f"left out what stands below the rows: '{' '.join(' '.join(words).split())[:60]}'"
     judgement = judged(lines, layout.delimiter, layout.decimal, layout.comment)
     behind = len(lines[-1].encode(layout.encoding, "replace")) + (len(tail) % 2 if "16" in layout.encoding else 0)
-    return (size - behind if judgement.torn else size), judgement.cut
+    return (size - behind if judgement.torn else size), judgement.cut, ""
+
+
+def _footer(lines: Sequence[str], layout: Layout) -> list[str]:
+    """The lines below the last row, where they are words: statistics, "End of data"."""
+    numbers = (_numbers(split(line, layout.delimiter), layout.decimal) for line in reversed(lines))
+    count = next((count for count, row in enumerate(numbers) if row), 0)
+    words = [line.strip(" \"'*=-") for line in lines[len(lines) - count :] if line.strip()]
+    return list(lines[-count:]) if words and words[0][:1].isalpha() and not is_missing(words[0]) else []
 
 
 def judged(lines: Sequence[str], delimiter: str, decimal: str, comment: str | None = None) -> Ending:
@@ -100,7 +107,7 @@ def _in_doubt(cell: str) -> str:
 
 
 def _is_row(cells: Sequence[str], decimal: str) -> bool:
-    return all(is_number(cell, decimal) or is_missing(cell) or CLOCK.fullmatch(cell) for cell in cells)
+    return all(is_number(cell, decimal) or is_missing(cell) or WRITTEN.fullmatch(cell) for cell in cells)
 
 
 def _is_whole(cell: str, others: Sequence[str], decimal: str) -> bool | None:
@@ -151,8 +158,8 @@ def read(path: Path, options: Options) -> Table:
     notes = [f"decimal sign '{layout.decimal}'"] if layout.decimal != "." else []
     notes += [f"clock times in {layout.names[index]} as seconds since the first" for index in sorted(layout.clocks)]
     notes += [f"another column is called {title}: it is {name}" for name, title in layout.again.items()]
-
-    stop, cut = ending(path, layout)
+    stop, cut, below = ending(path, layout)
+    notes += [below] if below else []
 
     def blocks(names: Sequence[str], size: int) -> Iterator[Block]:
         return _blocks(path, layout, stop, names, size)
@@ -188,6 +195,7 @@ def _frames(file: BinaryIO, layout: Layout, stop: int, indexes: Sequence[int], s
         io.BufferedReader(_Headed(titles.encode(layout.encoding), file, stop)),
         sep=layout.delimiter,
         decimal=layout.decimal,
+        thousands=layout.thousands,
         comment=layout.comment,
         header=0,
         usecols=[str(index) for index in [*indexes, width]],
@@ -332,7 +340,9 @@ class Layout:
     clocks : frozenset of int
         Columns that hold clock times or dates.
     used : tuple of int
-        Columns that hold anything.
+        Columns that hold anything, but dates beside a clock.
+    thousands : str or None
+        The sign between thousands, where numbers have one.
     """
 
     encoding: str
@@ -346,6 +356,7 @@ class Layout:
     units: tuple[str | None, ...]
     clocks: frozenset[int]
     used: tuple[int, ...]
+    thousands: str | None = None
 
 
 def encoding_of(head: bytes) -> tuple[str, int] | None:
@@ -390,12 +401,7 @@ def find_layout(head: bytes, whole: bool, options: Options, name: str) -> Layout
     options : Options
         The delimiter and decimal sign, where the user states them.
     name : str
-        The file's name, for the error.
-
-    Raises
-    ------
-    FormatError
-        There is no row of numbers, or no text.
+        The file's name, for the error where there is no row of numbers, or no text.
     """
     codec = encoding_of(head)
     if codec is None:
@@ -417,7 +423,10 @@ def find_layout(head: bytes, whole: bool, options: Options, name: str) -> Layout
     rows = [row for row in cells[start:] if row and len(row) == width]
     comments = [line.lstrip()[0] for line in lines if line.lstrip().startswith(("#", "%"))]
     names, units = _header(lines[:start], delimiter, width)
-    used = tuple(i for i in range(width) if names[i] or any(row[i] for row in rows))
+    dates = {i for i in range(width) if any(DATE.fullmatch(row[i]) for row in rows)}  # beside them stands the clock
+    used = tuple(i for i in range(width) if i not in dates and (names[i] or any(row[i] for row in rows)))
+    grouping = "." if decimal == "," else ","
+    grouped = any(grouping in row[i] for row in rows for i in used)
     own = unique([name or f"c{index + 1}" for index, name in enumerate(names)])
     clocks = frozenset(i for i in used if any(CLOCK.fullmatch(row[i]) for row in rows))
     return Layout(
@@ -432,6 +441,7 @@ def find_layout(head: bytes, whole: bool, options: Options, name: str) -> Layout
         tuple("s" if index in clocks else unit for index, unit in enumerate(units)),
         clocks,
         used,
+        grouping if grouped else None,
     )
 
 
@@ -507,12 +517,12 @@ def _named_delimiter(text: str) -> str:
 
 
 def _numbers(row: list[str], decimal: str) -> list[str] | None:
-    """The row, if every cell is a number, a clock time or empty, and one is not empty."""
+    """The row, if every cell is a number, a clock time, a date or empty, and one is a number or a clock time."""
     full = False
     for cell in row:
         if is_number(cell, decimal) or CLOCK.fullmatch(cell):
             full = True
-        elif not is_missing(cell):
+        elif not is_missing(cell) and not DATE.fullmatch(cell):
             return None
     return row if full else None
 
@@ -568,6 +578,10 @@ def _paired(rows: Sequence[list[str]]) -> tuple[list[str], list[str | None]]:
 def _stacked(upper: Sequence[str], lower: Sequence[str]) -> tuple[list[str], list[str | None]]:
     """Headers of one row of names, or of names over units; a unit may stand in the name's own cell."""
     named = [cell for cell in lower if cell]
+    if all(
+        is_unit(cell.rpartition("/")[2].strip()) and cell.count("/") == 1 for cell in named
+    ):  # one alone may be a path
+        lower = [re.sub(r"\s*/\s*", " / ", cell) for cell in lower]
     unit_row = any(upper) and all(is_unit(_bare(cell)) for cell in named)
     names: list[str] = []
     units: list[str | None] = []

@@ -85,7 +85,7 @@ function dropZone() {
   example.addEventListener("click", () => guarded(useExample));
   const zone = make("div", { class: "data-drop" },
     make("p", {}, "Drop files here, or"), input, make("label", { for: "data-input", class: "button" }, "Choose files …"),
-    make("p", { class: "note" }, "CSV, TDMS, UFF, MAT, WAV, HDF5, Parquet, LVM, JSON, MCAP, ROS bags, MDF"), example);
+    make("p", { class: "note" }, "CSV, oscilloscopes, TDMS, UFF, MAT, WAV, HDF5, Parquet, LVM, JSON, MCAP, ROS bags, MDF"), example);
   return zone;
 }
 
