@@ -20,8 +20,9 @@ import stepped
 import stickslip as ss
 from stickslip.answers.on_twins import _slip, _yields
 from stickslip.cli.program import main
-from stickslip.estimate import UNTRIED, kinds, stands
+from stickslip.estimate import UNTRIED, Estimate, kinds, stands
 from stickslip.law.driven import Sampled, Tones
+from stickslip.story.friction import of_sticks
 from stickslip.twin.belief import EXCESS, GAIN, LATE, SPRING
 from stickslip.twin.descent import within_ends
 from stickslip.twin.search import believe
@@ -202,6 +203,21 @@ def test_a_stick_that_was_there_before_the_record_is_no_stop_of_it() -> None:
     assert quick.sticks.events[0].kind == "stick"
     assert not quick.sticks.events[0].whole
     assert ss.tried(quick, twins=8).sticks.per_cycle.value == pytest.approx(2.0)
+
+
+def test_stops_that_vary_between_cycles_keep_their_scatter() -> None:
+    """Twins that count them without an error said 1.4 stops in each cycle, and that these did not vary."""
+    quick, sure = asked(STOPS)
+    counted, frequency = (
+        replace(estimate(quick, name), status="ok") for name in ("stops per cycle", "forcing frequency")
+    )
+    varies = Estimate.normal(counted.name, 1.4, sd=0.1, unit="1", method=counted.method)
+    answers = {counted.name: varies, frequency.name: frequency}
+    trial = try_on_twins(sure.trial.belief, answers, lambda record: {counted.name: counted}, count=8)
+    assert trial.estimates[counted.name].value == pytest.approx(1.4)
+    assert trial.estimates[counted.name].interval == pytest.approx(varies.interval)
+    told = quick.having(sticks=replace(quick.sticks, per_cycle=varies))
+    assert of_sticks(told).endswith("with 1.4 stops in a cycle on average")
 
 
 def test_a_contact_that_gives_way_is_found_with_its_stiffness() -> None:

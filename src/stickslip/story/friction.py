@@ -254,7 +254,8 @@ def of_sticks(findings: Findings) -> str:
     often = sticks.per_cycle.value
     some = math.isfinite(often) and often > 0
     number = f"{often:.2g}"
-    stops = f", with {number} stop{'' if number == '1' else 's'} in each cycle" if some else ""
+    where = "each cycle" if number.isdigit() else "a cycle on average"
+    stops = f", with {number} stop{'' if number == '1' else 's'} in {where}" if some else ""
     share = interval_of(sticks.share) if high - low > 0.01 else value_of(sticks.share)
     return f"it {'sticks' if stands(sticks.share.status) else 'seems to stick'} {share} of the time{stops}"
 

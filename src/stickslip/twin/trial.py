@@ -226,7 +226,8 @@ def try_on_twins(
     for name in ASKED:
         if name in answers and answers[name].known:
             pairs = [(twin.answers.get(name), twin.truth[name]) for twin in twins]
-            both = belief.falls or UNSTATED in kinds(answers[name].status)
+            # twins count the stops as the record does: how these vary between cycles is in no error of theirs
+            both = name == STOPS or belief.falls or UNSTATED in kinds(answers[name].status)
             tried[name] = _widened(_tried(answers[name], pairs, misfit, both=both), others.get(name, []))
     if GIVE in belief.values:
         answers = {**answers, GIVES: Estimate(GIVES, belief.contact, (0.0, math.inf), math.inf, "N/m", "fit to x")}
