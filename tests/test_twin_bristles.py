@@ -11,7 +11,7 @@ import pytest
 
 import stepped
 import stickslip as ss
-from stickslip.twin.belief import EXCESS, HELD, SLOPE
+from stickslip.twin.belief import EXCESS, HELD, KINETIC, SLOPE
 from stickslip.twin.descent import _damped_step, _downhill, linearised, misfit
 
 PULL = 800 * 4e-3  # N: what shakes these rigs
@@ -50,6 +50,15 @@ def bristled() -> ss.answers.Findings:
     rig = stepped.Rig("LuGre", 2.0, 800.0, 1.0, 4e-3, 2.4, kinetic=0.96, contact=8000.0, **falls)
     record = stepped.record(rig, np.random.default_rng(11), noise=1e-4)
     return ss.tried(ss.analyze(record, **rig.stated), twins=8)
+
+
+def test_a_draw_without_sliding_friction_is_a_twin_too() -> None:
+    """Half of the twins of a record whose sliding friction is unsure were lost, and the trial with them."""
+    belief = bristled().trial.belief
+    faint = belief.at(**{KINETIC: 0.0})
+    assert 0 < faint.law.kinetic < 0.02 * faint.law.static
+    assert len(faint.twin(np.random.default_rng(1))) == len(belief.record)
+    assert isinstance(belief.at(**{KINETIC: 0.0, EXCESS: 0.0}).law, ss.laws.LinearSlope)
 
 
 def test_bristles_are_found_with_their_stiffness() -> None:

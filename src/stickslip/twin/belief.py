@@ -57,6 +57,7 @@ POWERS = (math.log(0.5), math.log(4.0))  # between which the logarithm of the ex
 FALLS = (3e-3, 10.0)  # Stribeck speed over the largest speed: below it is static friction, above a line
 STEEP = 1e-3  # of the largest speed, at which the backbone of a friction that lags has turned over: as good as a jump
 GAUSS = 2.0  # exponent of the bristles' curve
+FAINT = 0.01  # of the static friction: bristles have no law without a sliding one, which a draw may leave at none
 ALIKE = 0.25  # of c/k, within which a late x is what a damper on the base does
 SLIDES = 0.2  # of the largest speed, above which friction is that of sliding: below, sticks and smoothing are in it
 FALL = 0.02  # of friction, over the speeds at which it slides
@@ -123,11 +124,11 @@ class Belief:
             steepness = 1 / (STEEP * _sizes(self.record).fastest)
             return StateVariable(kinetic, rate=math.exp(values[RATE]) / kinetic, steepness=steepness)
         loss = values.get(LOSS, 0.0) * math.sqrt(self.contact * self.stated.mass) if LOSS in values else 0.0
-        if GIVE in values and HELD in values:
+        if GIVE in values and HELD in values and (static or kinetic) > 0:
             if static is None:
                 return Dahl(kinetic, stiffness=self.contact)
             fall = math.exp(values.get(SPEED, self.ends(SPEED)[0]))
-            return LuGre(kinetic, static, speed=fall, stiffness=self.contact, damping=loss)
+            return LuGre(max(kinetic, FAINT * static), static, speed=fall, stiffness=self.contact, damping=loss)
         if GIVE in values:
             return CompliantContact(kinetic, stiffness=self.contact, damping=loss, static=static)
         if SPEED in values:
