@@ -47,6 +47,7 @@ DIALECTS = {
     "quoted names": '"t","x [mm]","force [N]"\n' + rows(),
     "units after slashes": "t / s,x / mm,force / N\n" + rows(),
     "units after slashes without blanks": "t/s,x/mm,force/N\n" + rows(),
+    "units behind words": "t_s,x_mm,force_N\n" + rows(),
     "units in words": "t in s,x in mm,force in N\n" + rows(),
     "words below the rows": "t,x [mm],force [N]\n" + rows() + "\nEnd of data\nMean,0.1,2.0\n",
     "comments between the rows": "t,x [mm],force [N]\n# start\n" + rows() + "# stop\n",

@@ -26,7 +26,7 @@ def titled(table: Table) -> Table:
     """The table with the units that stand in its columns' titles taken out of them; what the file states counts."""
     if table.record:  # written by write_record: the names are names
         return table
-    parts = [split_name(column.name) for column in table.columns]
+    parts = [split_name(column.name) if column.unit else _titled(column.name) for column in table.columns]
     parts = [
         (name, unit) if column.unit is None or column.name.rstrip().endswith("]") else (column.name, None)
         for column, (name, unit) in zip(table.columns, parts, strict=True)
@@ -48,6 +48,13 @@ def titled(table: Table) -> Table:
             yield {name: block[written[name]] for name in wanted}
 
     return replace(table, columns=tuple(columns), blocks=blocks, notes=tuple(notes))
+
+
+def _titled(text: str) -> tuple[str, str | None]:
+    """As :func:`split_name`; ``"x_mm"`` too, where the word is a channel's and the unit one of it."""
+    word = text.rpartition("_")[0]
+    unit = unit_in_name(text, word) if word in VOCABULARY else None
+    return (word, unit) if unit else split_name(text)
 
 
 def split_name(text: str) -> tuple[str, str | None]:
@@ -189,7 +196,7 @@ class Columns:
                 self._admit(qualified + [(f"{source.path.name}:{name}", key) for name, key in numbered])
         last = [(last_part(name), key) for key, name in self._fields.items()]
         self._admit(last)
-        for title in ("{} [{}]", "{} ({})", "{}({})"):  # as the file may have it
+        for title in ("{} [{}]", "{} ({})", "{}({})", "{}_{}"):  # as the file may have it
             self._admit([(title.format(name, self.columns[key].unit), key) for name, key in exact])
         self._admit([(_word_of(name), key) for name, key in last])  # as a check-up shows it
         self._stated = {key: unit for name, unit in self.units.items() for key in self._called(name, set(channels))}
