@@ -8,10 +8,13 @@ from functools import cache
 import numpy as np
 import pytest
 
+import stepped
 import stickslip as ss
 from rigs import LAG, RIG, measured, told
 from stickslip.answers.preparation import _doubt
 from stickslip.estimate import UNTRIED, kinds, stands
+
+SHAKEN = stepped.Rig("static", 2.42, 2310.0, 3.0, 2e-3, 3.0, kinetic=1.1, static=1.4)
 
 
 @cache
@@ -122,6 +125,42 @@ def test_micro_slips_are_not_sure_where_the_load_strays_from_every_contact() -> 
     assert findings.sticks is not None
     assert findings.sticks.microslips is not None
     assert "likeliest contact" in findings.sticks.microslips.status
+
+
+@cache
+def shaken(what: str) -> ss.answers.Findings:
+    """Of a rig by another integrator, some of its channels otherwise; gains as sure as stated."""
+    record = stepped.record(SHAKEN, np.random.default_rng(3), felt=True, noise=3e-4, cycles=15)
+    x, far = record["x"], 0.8 * np.abs(record["x"]).max()
+    changed = {"zero": {"x": x + 3e-3}, "cut": {"x": np.clip(x, -far, far)}, "gain": {"x": 1.03 * x}}
+    channels = {"x": x, "z": record["z"], "a": record["a"]}
+    sensed = ss.Record.of({**channels, **changed.get(what, {})}, fs=record.fs)
+    for name in channels:
+        sensed = sensed.with_details(name, gain_sd=0.004)
+    return ss.analyze(sensed, **SHAKEN.stated)
+
+
+def test_a_zero_of_a_displacement_is_called_so() -> None:
+    """It was called a force or a displacement of the wrong sign, or a drive that is not read."""
+    for what, off in (("zero", True), ("", False)):
+        findings = shaken(what)
+        first = ss.summary(findings).headline[0]
+        assert ("zero of x or z is off by 3 mm" in first) == off
+        assert findings.loops.forward.known != off
+        assert findings.level.includes(1.1)
+        assert not findings.consistency.failed
+    assert "drives the motion" not in " ".join(e.status for e in shaken("zero").estimates)
+
+
+def test_a_displacement_that_is_cut_is_told_first() -> None:
+    story = ss.summary(shaken("cut"))
+    assert "x has 2550 samples clipped" in story.headline[0]
+    assert not [caution for caution in story.cautions if "check-up" in caution]
+
+
+def test_a_gain_is_held_against_how_sure_it_is_stated_to_be() -> None:
+    """Of 400 rigs whose gains were as stated one was called so."""
+    assert [check.name for check in shaken("gain").consistency.failed] == ["acceleration is that of the displacement"]
 
 
 def test_a_base_that_is_not_measured_is_told_and_negative_friction_is_never_sure() -> None:

@@ -104,6 +104,10 @@ class Seen:
         spreads = [mean_uncertainty(np.asarray(part, dtype=float))[0] if len(part) > 1 else 0.0 for part in parts]
         return math.hypot(*spreads) / math.sqrt(self.lines.worth)
 
+    def unsure(self, *names: str) -> float:
+        """By which share channels may be apart: as unsure as each one's gain is stated to be, or as is usual."""
+        return math.hypot(*(self.stated_channels[name].gain_sd or self.tolerance for name in names))
+
     @property
     def steady(self) -> bool:
         """Whether each channel keeps its phase from stretch to stretch: else their mean lines are of no one motion."""
@@ -166,7 +170,7 @@ def _derivative(seen: Seen, channel: str, name: str, unit: str) -> Check:
         read, moved = read * turn, moved * turn
     left, right = abs(read.mean()), abs(moved.mean())
     turned = -1.0 if (complex(read.mean()) * complex(moved.mean()).conjugate()).real < 0 else 1.0
-    sd = math.hypot(seen.sd(read - moved), math.sqrt(2) * seen.tolerance * right)
+    sd = math.hypot(seen.sd(read - moved), seen.unsure(channel, "x") * right)
     return judged(
         name,
         turned * float(left),
@@ -181,7 +185,7 @@ def _derivative(seen: Seen, channel: str, name: str, unit: str) -> Check:
 def _off(name: str, other: str, ratio: complex, seen: Seen) -> str:
     """In which way one reading is not what another lets expect."""
     phase = float(np.angle(ratio))
-    small = 3 * math.sqrt(2) * seen.tolerance
+    small = 3 * seen.unsure(name, other)
     reasons = []
     if abs(abs(phase) - math.pi) < 0.3:
         reasons.append(f"{name} and {other} have opposite signs")
@@ -332,15 +336,29 @@ def momentum_check(seen: Seen) -> Check:
 
 
 def zero_off(seen: Seen) -> Slip | None:
-    """The accelerometer or the load cell whose zero is off by a good part of what it reads, with the cure."""
+    """The sensor whose zero is off by a good part of what it reads, with the cure; of x or z by what friction bears."""
     check = momentum_check(seen)
     if check.verdict != FAILS:
-        return None
+        return _stretched(seen)
     name = "a" if check.unit == "m/s^2" else "load"
     off = check.left if name == "a" else check.right - check.left
     if abs(off) < FAR_OFF * abs(complex(seen.strongest(name).mean())):
         return None
     return Slip(check.sentence, zeros={name: off})
+
+
+def _stretched(seen: Seen) -> Slip | None:
+    """A spring that pulls more on the average than friction can bear: one way twice its level, the other way none."""
+    cycles, beside = seen.lines.cycles is not None and seen.knows, {"load", "force"} & set(seen.channels)
+    if not cycles or beside or "z" not in seen.channels or seen.contact == "base":
+        return None
+    k, means = seen.rig["stiffness"], seen.lines.means
+    off, amplitude = float(np.mean(means["x"] - means["z"])), _mean_cycle(seen)[0]
+    friction = float(seen.work(k * seen.channels["z"] - seen.drag).mean()) / (4 * amplitude)
+    if friction <= 0 or abs(off) < max(2 * friction / k, FAR_OFF * amplitude):
+        return None
+    pull = f"the spring would pull {k * abs(off):.3g} N on the average, more than the friction bears"
+    return Slip(f"a zero of x or z is off by {1e3 * off:.3g} mm: {pull}", zeros={"x": off})
 
 
 def identity_check(seen: Seen) -> Check:

@@ -228,7 +228,10 @@ def _magnitudes(
     }
     if slides["forward"] != slides["back"]:
         magnitudes |= {key: replace(told, status=Status(told.status, ONE_WAY)) for key, told in magnitudes.items()}
-    return magnitudes | {key: magnitudes[key].within(0.0, otherwise=DRIVES) for key in ("forward", "back", "level")}
+    level, off = magnitudes["level"].within(0.0, otherwise=DRIVES), magnitudes["offset"]
+    aside = f"a zero of x, z or the force is off by {abs(off.value):.3g} {unit}, more than the friction"
+    why = aside if level.known and level.interval[0] > 0 else DRIVES
+    return magnitudes | {"level": level} | {s: magnitudes[s].within(0.0, otherwise=why) for s in ("forward", "back")}
 
 
 def levels_of(sign: float, friction: Array, motion: Motion, sliding: Mask, label: Rows, count: int) -> Array:

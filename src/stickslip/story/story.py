@@ -180,7 +180,7 @@ def _of_few(few: Mapping[Doubt, Sequence[str]]) -> Iterator[Caution]:
 
 def faulty(faults: Sequence[Fault], *, of: str = "") -> Iterator[Caution]:
     """What the check-up found beside what leads: the first, and how many more; `of` which record of several."""
-    others = [str(fault) for fault in faults if fault.kind != "unit"]
+    others = [str(fault) for fault in faults if not _leads(fault)]
     if others:
         more = len(others) - 1
         those = f" ({more} more fault{'s' * (more > 1)} in the record)" if more else ""
@@ -189,8 +189,13 @@ def faulty(faults: Sequence[Fault], *, of: str = "") -> Iterator[Caution]:
 
 
 def leading(faults: Iterable[Fault]) -> list[Caution]:
-    """What the check-up found wrong with units: every number hangs on it, so that it comes first."""
-    return [Caution(str(fault)) for fault in faults if fault.kind == "unit"]
+    """What the check-up found wrong that every number hangs on, so that it comes first."""
+    return [Caution(str(fault)) for fault in faults if _leads(fault)]
+
+
+def _leads(fault: Fault) -> bool:
+    """Whether it is of units, or of a displacement that is cut."""
+    return fault.kind == "unit" or (fault.kind == "clipped" and fault.channel in ("x", "theta", "v"))
 
 
 def sentence(text: str) -> str:
