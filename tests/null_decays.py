@@ -1,4 +1,4 @@
-"""Free decays without any dry friction, closed form, seen by sensors that are not clean."""
+"""Free decays without any dry friction, closed form, seen by sensors that are not clean; and on a cubic spring."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.integrate import solve_ivp
 
 Array = NDArray[np.float64]
 NOISES = ("white", "pink", "12 bit", "16 bit", "mains", "drift")
@@ -48,6 +49,32 @@ def let_go(t: Array, w: float, zeta: float, dry: float, rise: float = 0.0) -> Ar
         x[rows] = side * (dry + (swing - dry) * wave)
         swing, side, begin = (swing - dry) * math.exp(-math.pi * ratio) - dry, -side, begin + half
         dry += rise
+    return x
+
+
+def on_a_cubic_spring(t: Array, w: float, zeta: float, dry: float, cubic: float) -> Array:
+    """From one on a spring ``x + cubic x^3``, half cycle by half cycle, by scipy's eighth-order rule."""
+    x, begin, at = np.ones(len(t)), 0.0, 1.0
+
+    def turning(_: float, state: Array) -> float:
+        return float(state[1])
+
+    turning.terminal = True  # type: ignore[attr-defined]
+    while begin <= t[-1] and abs(at + cubic * at**3) > dry:
+        side = math.copysign(1.0, at)
+
+        def rates(_: float, state: Array, side: float = side) -> list[float]:
+            u, v = state
+            return [v, -w * w * (u + cubic * u**3 - side * dry) - 2 * zeta * w * v]
+
+        turning.direction = side  # type: ignore[attr-defined]
+        span, begun = (begin, begin + 4 * math.pi / w), [at, -1e-12 * side * w]
+        run = solve_ivp(rates, span, begun, "DOP853", events=turning, dense_output=True, rtol=1e-9, atol=1e-12)
+        rows = (t >= begin) & (t < run.t[-1])
+        if rows.any():
+            x[rows] = run.sol(t[rows])[0]
+        begin, at = float(run.t[-1]), float(run.y[0, -1])
+        x[t >= begin] = at
     return x
 
 

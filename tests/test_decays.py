@@ -11,6 +11,7 @@ from click.testing import CliRunner
 
 import stickslip as ss
 from motions import free_decay
+from null_decays import on_a_cubic_spring
 from stickslip.cli.program import main
 from stickslip.estimate import stands
 
@@ -337,6 +338,28 @@ def test_a_motion_that_has_dry_friction_claims_none_that_is_not_there():
     assert "dies away as it would by" in told
     assert "and a curvature of the spring" in told
     assert "That there is dry friction too can not be told: less than" in told
+
+
+@pytest.mark.parametrize("draws", [6, pytest.param(100, marks=pytest.mark.soak)])
+def test_a_spring_that_hardens_or_softens_is_named_and_what_stands_holds(draws):
+    """A straight spring's fit lost its phase after some periods, and the decrements stood, off by ten deviations."""
+    rng, held, named = np.random.default_rng(draws), [], 0
+    for _ in range(draws):
+        cubic = rng.choice([-1, 1]) * rng.uniform(0.03, 0.3)
+        truth = {"damping ratio": rng.uniform(0.002, 0.04), "dry friction displacement": rng.uniform(0.003, 0.04)}
+        fs, held_for = rng.choice([50.0, 100.0]), rng.choice([0.0, 0.5])
+        t = np.arange(int(rng.uniform(8, 30) * fs)) / fs - held_for
+        x = on_a_cubic_spring(np.maximum(t, 0.0), 2 * np.pi, *truth.values(), cubic)
+        x += 10 ** rng.uniform(-3.5, -2.3) * rng.standard_normal(len(t))
+        findings = ss.analyze_decay(ss.Record.of({"x": x}, fs=fs))
+        way = "rises with the amplitude" if cubic > 0 else "falls with the amplitude"
+        named += way in " ".join(ss.summary(findings).headline)
+        truth["natural frequency"] = 1.0
+        sure = [estimate for estimate in findings.decay.quoted if estimate.name in truth and stands(estimate.status)]
+        held += [estimate.includes(truth[estimate.name]) for estimate in sure]
+    assert named >= 0.9 * draws - 1
+    assert len(held) >= 2 * draws
+    assert np.mean(held) >= 0.95 - 2 * np.sqrt(0.05 / len(held))
 
 
 def test_a_pendulum_read_with_a_straight_spring_is_told_so():

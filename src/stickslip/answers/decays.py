@@ -13,6 +13,7 @@ import numpy as np
 from stickslip.answers.findings import BY_DECREMENTS, Comparison, Findings, Inquiry, record_name, require_several
 from stickslip.answers.mistakes import mistakes_of_decay
 from stickslip.decay.answer import DecayFit, rig_units
+from stickslip.decay.choice import COLOURED
 from stickslip.decay.decrement import Decrement, decrement
 from stickslip.decay.extremes import EnvelopeDecay, extreme_decay, hilbert_decay, linear_decrement, log_decrement
 from stickslip.decay.fit_decay import LEFT_OVER, fit_decay
@@ -98,8 +99,9 @@ class Decay(Result):
 
         Where the record speaks against viscous and dry friction and for another of the motions tried, of that one.
         """
-        if self.motion is not None and self.against < CLEAR and self.motion.choice.status == "ok":
-            return self.motion
+        told = () if self.motion is None or self.against >= CLEAR else (self.motion,)
+        if told and (self.waveform is None or told[0].choice.status == "ok"):
+            return told[0]
         swings = cast(BothFrictions | None, self.older.get(EXTREMES))  # of extremes alone, and they tell both
         answers = (self.waveform, self.thesis, self.motion, swings)
         best = next((answer for answer in answers if answer is not None), None)
@@ -365,8 +367,9 @@ def _by_waveform(
     waveform = inquiry.ask("The whole waveform", partial(_followed, waveform, way["restoring"]))
     if waveform is not None:
         return waveform, motion, None
-    unsure = motion is not None and motion.choice.status != "ok"
-    return None, None if unsure else motion, inquiry.refusals[-1]
+    # a clock that can not be trusted leaves a motion that is neither kept nor followed down to the noise
+    likely = motion is not None and (motion.choice.chosen.kept or motion.choice.chosen.whiteness >= COLOURED)
+    return None, motion if likely else None, inquiry.refusals[-1]
 
 
 def _followed(fit: DecayFit, restoring: Restoring) -> DecayFit:

@@ -33,7 +33,7 @@ BEYOND = f"swings beyond {SWING:g} rad are left out"
 SURE = 3.0  # standard deviations of the noise by which a bracket is widened
 
 SHARED = 3
-FEWEST = 8.0  # degrees of freedom of counts that tell no noise: of 400 intervals 3 held 99 %, 5 98.5 %, 8 96 %
+FEWEST = 8.0  # degrees of freedom of counts or a drift that tell little: of 400 intervals 3 held 99 %, 5 98.5 %, 8 96 %
 WORSE = 20.0  # minus twice the log likelihood by which a number of half cycles may be worse and still count
 
 
@@ -305,14 +305,15 @@ class Together:
         return np.asarray(self.p[self.places[number]][:6])
 
     def freedom(self, releases: list[Release]) -> float:
-        """Degrees of freedom that tell the noise: of counts, what the information on its logarithm is worth.
+        """Degrees of freedom that tell the noise: of drift, the cosines that it outweighs the white noise at; of
+        counts, what the information on the noise's logarithm is worth.
 
         Of n samples it is 2 n, but of coarse counts only those near a step tell: a few, to which six parameters are
         fitted as well, so that the noise looks less than it is.
         """
         total = 0.0
         for release, at in zip(releases, self.places, strict=True):
-            own = release.blocks.freedom
+            own = min(release.blocks.freedom, max(release.noise.told_by, FEWEST))
             if release.noise.extra:
                 own = min(own, max((self.curvature[at[6], at[6]] - LOOSE) / 2 - 6, FEWEST))
             total += own

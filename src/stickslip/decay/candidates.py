@@ -12,10 +12,11 @@ import numpy as np
 from stickslip.arrays import Array
 from stickslip.decay.motions import MOTIONS, PARAMETERS, WORN, Motion, Restoring, free_decay
 
+CURVED = "curved spring"  # whose phase a straight spring's fit loses after some periods
 ALWAYS = ("both", "static")  # candidates that are fitted whatever is asked for
 DRIFTS = (0.0, -0.01, 0.01)  # in a first amplitude, from which friction that wears is searched
 TRIES = 12  # numbers of half cycles
-FIRST = 4.0  # periods fitted first; then twice as many, till the end: the phase can not slip
+FIRST = 2.0  # periods fitted first; then twice as many, till the end: the phase can not slip
 LEAST = 24  # blocks of a fit
 HOPELESS = 4.0  # times what viscous damping with dry friction leaves
 EVALUATIONS = 60  # of one search
@@ -171,12 +172,8 @@ def fit_candidates(names: tuple[str, ...], blocks: BlockMeans, start: Array) -> 
     """
     first = np.zeros(len(PARAMETERS))
     first[:6], first[NUMBERS["exponent"]] = start[:6], EXPONENT
-    period = 2 * math.pi / start[0]
-    reach, end = FIRST * period, float(blocks.times[-1] - start[5])
-    while reach < end:
-        first = fit_motion(MOTIONS["static"], blocks.until(float(start[5]) + reach), first).parameters
-        reach *= 2
-    fitted = {name: fit_motion(MOTIONS[name], blocks, first) for name in ALWAYS}
+    straight = _followed(MOTIONS["static"], blocks, first)
+    fitted = {name: fit_motion(MOTIONS[name], blocks, straight) for name in ALWAYS}
     base = min(fitted.values(), key=lambda candidate: candidate.cost)
     hopeless = HOPELESS * base.cost
     wanted = sorted((name for name in MOTIONS if name in names or name in fitted), key=lambda name: MOTIONS[name].size)
@@ -184,7 +181,8 @@ def fit_candidates(names: tuple[str, ...], blocks: BlockMeans, start: Array) -> 
         motion = MOTIONS[name]
         tries = [fitted[name]] if name in fitted else []
         if not tries:
-            tries = [fit_motion(motion, blocks, s, hopeless=hopeless) for s in _starts(motion, base)]
+            starts = [*_starts(motion, base), *([_followed(motion, blocks, first)] if name == CURVED else [])]
+            tries = [fit_motion(motion, blocks, s, hopeless=hopeless) for s in starts]
         for other in fitted.values():
             within = set(other.motion.terms) < set(motion.terms) and other.motion.sticks_early <= motion.sticks_early
             if within and other.cost < min(candidate.cost for candidate in tries):
@@ -192,6 +190,16 @@ def fit_candidates(names: tuple[str, ...], blocks: BlockMeans, start: Array) -> 
                 tries += [fit_motion(motion, blocks, s, hopeless=hopeless) for s in shaped]
         fitted[name] = min(tries, key=lambda candidate: candidate.cost)
     return {name: fitted[name] for name in wanted}
+
+
+def _followed(motion: Motion, blocks: BlockMeans, start: Array) -> Array:
+    """Parameters of a candidate that follows the first periods, then twice as many, till the end."""
+    end, release = float(blocks.times[-1]), float(start[NUMBERS["release"]])
+    reach = FIRST * 2 * math.pi / start[0]
+    while release + reach < end:
+        start = fit_motion(motion, blocks.until(release + reach), start).parameters
+        reach *= 2
+    return start
 
 
 def fit_motion(
@@ -238,9 +246,9 @@ def fit_motion(
     if motion.sticks_early:
         return tried[best]
     own = [candidate for number, candidate in tried.items() if blocks.motion(candidate.parameters)[2] == number]
-    if own:
-        return replace(min(own, key=lambda candidate: candidate.cost), forced=False)
-    return _search(motion, blocks, tried[best].parameters, None)  # on the kink itself
+    if tried[best] not in own:  # the kink itself may be best: numbers that its friction allows left ten times as much
+        own.append(_search(motion, blocks, tried[best].parameters, None))
+    return replace(min(own, key=lambda candidate: candidate.cost), forced=False)
 
 
 def _search(motion: Motion, blocks: BlockMeans, start: Array, half_cycles: int | None) -> Fitted:

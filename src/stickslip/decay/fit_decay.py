@@ -68,7 +68,8 @@ def fit_decay(
     reaches the Cramer-Rao bound, while the decrement of the extremes lies at 13 times it (median over 288 conditions).
 
     The noise is told from the record: white; counts of a digitiser whose step is not small beside the noise, fitted by
-    the probability of each count's interval; or white and drift with a 1/f spectrum, by restricted maximum likelihood.
+    the probability of each count's interval; or white and drift, of a power like 1/f, 1/f^2 or 1/f^4, by restricted
+    maximum likelihood, which counts that drift take too.
     Several releases are fitted together: they share frequency and friction, and narrow the static friction's bracket.
 
     A pendulum's spring is ``sin x``: with ``restoring="pendulum"`` its motion is integrated, and the intervals are

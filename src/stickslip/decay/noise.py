@@ -2,8 +2,8 @@ r"""What the noise of a decay's record is, and the likelihood that goes with it.
 
 * Quantised: the digitiser's step q is not small beside the noise. A count y says that the signal plus noise lay between
   y - q/2 and y + q/2: the likelihood of a sample is ``Phi(b) - Phi(a)``, a, b = (y -+ q/2 - x) / sigma, sigma unknown.
-* Coloured: white noise and drift with a spectrum 1/f, of power ``S(f) = s^2 (1 + f_c / f)``. The cosine transform makes
-  both nearly independent from one frequency to the next; s and f_c are those of restricted maximum likelihood (REML).
+* Coloured: white noise and drift, of power ``S(f) = s^2 (1 + (f_c / f)^k)``, k = 1, 2 or 4. The cosine transform makes
+  both nearly independent from one frequency to the next; s, f_c and k are those of restricted maximum likelihood.
 
 Best fit and profile likelihood where the likelihood is more than a sum of squares: other noise, several releases.
 
@@ -31,12 +31,16 @@ from stickslip.errors import EstimateError
 STEEPEST = 0.9  # damping ratio
 FINEST = 0.02  # of the step: less noise than this is not told from it
 LOOSE = 1.0  # what holds the logarithm of a noise that counts do not show
+STEEPNESSES = (1, 2, 4)  # of the drift's power, a power of 1/f: flicker, a walk, a line
 CORNERS = 30  # trial corners of the drift's spectrum
 GAINED = 2.7  # minus twice the log likelihood that drift must gain before it is believed
 COARSE = 0.7  # of the step: noise, the counts' own included, below which counts are not a sum of white noises
 PRECISION = 1e-7  # of the range: a residual below it is rounding, and of no colour
 SHORT = 24  # blocks in which drift is not told from the motion
 SURE = 9.0  # standard deviations from which a count tells nothing
+SLOW = 6  # cosines over the record, of half a cycle up, that a drift is sought by
+SHARP = 0.05  # of the step: a noise no less than that, for a count near a step would weigh too much
+WANDERS = 1e-3  # chance of a record of counts without drift to be told to drift
 KINDS = ("white", "quantised", "coloured")
 Objective = Callable[[Array], tuple[float, Array, Array]]
 
@@ -60,12 +64,15 @@ class Noise:
         All of it, in words.
     objective : callable
         The likelihood for a number of half cycles.
+    told_by : float
+        How many cosines tell its drift, where it has one.
     """
 
     kind: str
     level: float
     words: str
     objective: Callable[[int], Objective]
+    told_by: float = math.inf
 
     @property
     def extra(self) -> int:
@@ -88,10 +95,13 @@ def find_noise(blocks: Blocks, fits: Array, samples: Array, step: float, kind: s
     row = fits[np.argmin(fits[:, 1])]
     least = variance(fits, blocks)
     level = math.sqrt(least * blocks.size)
-    left = _left(samples, blocks, int(row[0]), row[3:]) if step > 0 else math.inf
-    if kind == "quantised" or (kind is None and left < COARSE * step):
-        counts = f"counts of {step:.3g}"
-        return Noise("quantised", max(left, 0.3 * step), counts, lambda n: quantised(_single(samples, blocks), n, step))
+    counts = blocks._replace(means=samples, size=1, total=len(samples))  # each sample a block
+    left = _left(counts, int(row[0]), row[3:]) if step > 0 else math.inf
+    coarse = kind is None and left < COARSE * step
+    drifts = coarse and _wanders(counts, row, step, left)
+    if kind == "quantised" or (coarse and not drifts):
+        words = f"counts of {step:.3g}"
+        return Noise("quantised", max(left, 0.3 * step), words, lambda n: quantised(counts, n, step))
     if kind == "coloured" and len(blocks.means) <= SHORT:
         raise EstimateError(
             f"noise = 'coloured' of {len(blocks.means)} blocks",
@@ -100,27 +110,21 @@ def find_noise(blocks: Blocks, fits: Array, samples: Array, step: float, kind: s
         )
     rounded = kind is None and level <= PRECISION * float(np.ptp(blocks.means))
     if kind != "white" and len(blocks.means) > SHORT and not rounded:
-        corner, power, gain = drift(blocks, int(row[0]), row[3:])
-        if kind == "coloured" or gain > GAINED:
+        _, _, power, gain = drift(blocks, int(row[0]), row[3:])
+        if drifts or kind == "coloured" or gain > GAINED:
             smooth = _refined(blocks, int(row[0]), row[3:], power)
-            corner, power, _ = drift(blocks, int(row[0]), smooth)
-            white = math.sqrt(float(power[-1]) / (1 + corner / frequencies(blocks)[-1]) * blocks.size)
+            corner, white, power, _ = drift(blocks, int(row[0]), smooth)
             label = f"white, and drift that outweighs it below {corner:.3g} Hz"
-            return Noise("coloured", white, label, lambda n: coloured(blocks, n, power))
+            level, slow = math.sqrt(white * blocks.size), float(np.sum(frequencies(blocks) < corner))
+            return Noise("coloured", level, label, lambda n: coloured(blocks, n, power), slow)
     return Noise("white", level, "white", lambda n: white_noise(blocks, n, least))
 
 
-def _left(samples: Array, blocks: Blocks, n: int, p: Array) -> float:
+def _left(counts: Blocks, n: int, p: Array) -> float:
     """Standard deviation of the samples from a motion; the blocks' would take a count's steady error for more."""
-    single = _single(samples, blocks)
-    values, jacobian = single.motion(p, n)
-    single.leave_out_release(p, values, jacobian)
-    return float(np.sqrt(np.mean((samples - values) ** 2)))
-
-
-def _single(samples: Array, blocks: Blocks) -> Blocks:
-    """Each sample a block."""
-    return blocks._replace(means=samples, size=1, total=len(samples))
+    values, jacobian = counts.motion(p, n)
+    counts.leave_out_release(p, values, jacobian)
+    return float(np.sqrt(np.mean((counts.means - values) ** 2)))
 
 
 def _refined(blocks: Blocks, n: int, p: Array, power: Array) -> Array:
@@ -171,6 +175,33 @@ def quantised(counts: Blocks, n: int, step: float) -> Objective:
     return objective
 
 
+def _wanders(counts: Blocks, row: Array, step: float, left: float) -> bool:
+    """Whether counts drift beside their likeliest motion, whichever number of half cycles near that of `row` it has.
+
+    Counts know of no drift: of those that drifted half of the 95 % intervals missed, by up to 28 deviations.
+    """
+    start, n, span = np.r_[row[3:], math.log(max(left, 0.3 * step))], int(row[0]), abs(row[7])
+    farthest = np.array([0.1 * row[3], 0.1, 0.3 * span, span, 0.5 * span, 0.5 / row[3], 1.0])
+    # least squares of coarse counts may begin a half cycle or two away
+    near = (number for number in (n, n - 1, n + 1, n - 2, n + 2) if number > 0)
+    fits = ((number, minimise(quantised(counts, number, step), start, farthest)[0]) for number in near)
+    return all(_score(counts, number, p, step) < WANDERS for number, p in fits)
+
+
+def _score(counts: Blocks, n: int, p: Array, step: float) -> float:
+    """p-value of the slow cosines' score beside that of the motion and the noise (Rao's test)."""
+    from scipy.special import chdtrc
+
+    values, jacobian = counts.motion(p[:6], n)
+    counts.leave_out_release(p, values, jacobian)
+    along = (np.arange(counts.total) + 0.5) / counts.total
+    rows = np.vstack([np.cos(math.pi * np.outer(np.arange(1, SLOW + 1), along)), jacobian])
+    slope, curvature = np.empty(len(rows) + 1), np.empty((len(rows) + 1, len(rows) + 1))
+    add_counts(values, rows, counts.means, step, max(math.exp(p[6]), SHARP * step), slope, curvature)
+    whole, alone = slope @ solve(curvature, slope), slope[SLOW:] @ solve(curvature[SLOW:, SLOW:], slope[SLOW:])
+    return float(chdtrc(SLOW, max(0.0, whole - alone)))
+
+
 def _transformed(blocks: Blocks, n: int, p: Array) -> tuple[Array, Array]:
     """Cosine transforms of the residual and the Jacobian."""
     from scipy.fft import dct
@@ -203,27 +234,25 @@ def coloured(blocks: Blocks, n: int, power: Array) -> Objective:
     return objective
 
 
-def drift(blocks: Blocks, n: int, p: Array) -> tuple[float, Array, float]:
-    """Corner [Hz] of the drift, the power at each cosine, and what it gains over white noise, by REML."""
+def drift(blocks: Blocks, n: int, p: Array) -> tuple[float, float, Array, float]:
+    """Corner [Hz] of the drift, the white power, that at each cosine, and what the drift gains, by REML."""
     residual, jacobian = _transformed(blocks, n, p)
-    tones = frequencies(blocks)
-    work = np.empty((3, 6, 6))
+    tones, work = frequencies(blocks), np.empty((3, 6, 6))
 
-    def judged(corner: float) -> tuple[float, float]:
-        cost, squares = restricted(residual, jacobian, tones, corner, work)
+    def judged(corner: float, steepness: int) -> tuple[float, float]:
+        cost, squares = restricted(residual, jacobian, tones**steepness, corner**steepness, work)
         return float(cost), float(squares)
 
     corners = np.geomspace(0.1 * tones[1], 2 * tones[-1], CORNERS)
-    costs = [judged(place)[0] for place in corners]
-    best = int(np.argmin(costs))
+    costs = np.array([[judged(place, steepness)[0] for place in corners] for steepness in STEEPNESSES])
+    row, best = np.unravel_index(np.argmin(costs), costs.shape)
+    corner, steepness = float(corners[best]), STEEPNESSES[row]
     if 0 < best < CORNERS - 1:  # a parabola through three costs
-        below, here, above = costs[best - 1 : best + 2]
+        below, here, above = costs[row, best - 1 : best + 2]
         shift = 0.5 * (below - above) / (below - 2 * here + above)
-        corner = float(corners[best] * (corners[1] / corners[0]) ** shift)
-    else:
-        corner = float(corners[best])
-    cost, squares = judged(corner)
-    return corner, squares * (1 + corner / tones), judged(0.0)[0] - cost
+        corner *= float((corners[1] / corners[0]) ** shift)
+    cost, squares = judged(corner, steepness)
+    return corner, squares, squares * (1 + (corner / tones) ** steepness), judged(0.0, steepness)[0] - cost
 
 
 @compiled(**FAST)
@@ -238,15 +267,15 @@ def mills(a: float) -> float:
 def add_counts(
     values: Array, jacobian: Array, counts: Array, step: float, level: float, slope: Array, curvature: Array
 ) -> float:
-    """Minus twice the log likelihood of counts; half its slope and curvature (7), the last for the noise's logarithm.
+    """Minus twice the log likelihood of counts; half its slope and curvature, the last for the noise's logarithm.
 
     log(Phi(b) - Phi(a)) is concave in (a, b), so the curvature is positive. `values` and `counts` are (n,), `jacobian`
-    (6, n), `slope` (7,), `curvature` (7, 7); `step` and `level`, the noise, are in the counts' unit.
+    (k, n), `slope` (k + 1,), `curvature` (k + 1, k + 1); `step` and `level`, the noise, are in the counts' unit.
     """
-    total = 0.0
-    for k in range(7):
+    total, size = 0.0, jacobian.shape[0]
+    for k in range(size + 1):
         slope[k] = 0.0
-        for j in range(7):
+        for j in range(size + 1):
             curvature[k, j] = 0.0
     for i in range(values.shape[0]):
         a, b = (counts[i] - 0.5 * step - values[i]) / level, (counts[i] + 0.5 * step - values[i]) / level
@@ -274,14 +303,14 @@ def add_counts(
         c_value = (aa + 2.0 * ab + bb) / (level * level)
         c_mixed = -d_value * ((aa + ab) * a + (ab + bb) * b)
         c_noise = aa * a * a + 2.0 * ab * a * b + bb * b * b
-        for k in range(6):
+        for k in range(size):
             slope[k] += s_value * jacobian[k, i]
-            curvature[6, k] += c_mixed * jacobian[k, i]
+            curvature[size, k] += c_mixed * jacobian[k, i]
             for j in range(k + 1):
                 curvature[k, j] += c_value * jacobian[k, i] * jacobian[j, i]
-        slope[6] += s_noise
-        curvature[6, 6] += c_noise
-    for k in range(7):
+        slope[size] += s_noise
+        curvature[size, size] += c_noise
+    for k in range(size + 1):
         for j in range(k):
             curvature[j, k] = curvature[k, j]
     return total
@@ -298,9 +327,9 @@ def restricted(residual: Array, jacobian: Array, tones: Array, corner: float, wo
     jacobian : ndarray (6, n)
         That of the motion's derivatives.
     tones : ndarray (n,)
-        Frequencies [Hz].
+        Frequencies [Hz], or a power of them.
     corner : float
-        Frequency [Hz] below which the drift outweighs the white noise.
+        Frequency [Hz], or that power of it, below which the drift outweighs the white noise.
     work : ndarray (3, 6, 6)
         Scratch.
     """

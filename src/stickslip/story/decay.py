@@ -13,6 +13,7 @@ from stickslip.answers.decays import CLEAR, Decay
 from stickslip.answers.findings import Comparison, Findings
 from stickslip.arrays import Array
 from stickslip.decay.answer import beginning, rig_units
+from stickslip.decay.candidates import CURVED
 from stickslip.decay.choice import SIZE
 from stickslip.decay.decrement import Decrement
 from stickslip.decay.fit_decay import LEFT_OVER, UNSHARED
@@ -193,6 +194,7 @@ def _frictions(findings: Findings) -> Iterator[str]:
     decay = findings.decay
     yield _dying(decay)
     yield from _steady(decay)
+    yield from _curved(decay)
     if decay.strays and decay.against >= CLEAR:
         words = decay.strays[0].words
         yield f"{words[0].upper()}{words[1:]}."
@@ -263,6 +265,17 @@ def _steady(decay: Decay) -> Iterator[str]:
         f"If the dry friction rises by 1 % over the decay, the damping ratio is read {abs(per_drift) / 100:.2g} too "
         f"{moved}{all_of_it}."
     )
+
+
+def _curved(decay: Decay) -> Iterator[str]:
+    """By how much the frequency of a spring that is not straight moves with the amplitude, to first order."""
+    if decay.motion is None or decay.motion.model != CURVED or decay.against >= CLEAR:
+        return
+    fitted = decay.motion.choice.chosen.fitted
+    if decay.motion.choice.chosen.p_value >= CLEAR:
+        shift = 3 / 8 * fitted.value("curvature") * fitted.value("amplitude") ** 2
+        way = "rises with the amplitude: it hardens" if shift > 0 else "falls with the amplitude: it softens"
+        yield f"The spring is not straight, its frequency {way}, by {100 * abs(shift):.2g} % at the first swing."
 
 
 def _listed(parts: list[str]) -> str:
