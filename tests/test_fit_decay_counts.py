@@ -71,7 +71,7 @@ def test_counts_that_drift_are_told_to_and_counts_that_do_not_are_counts(draws: 
             held += [found.damping_ratio.includes(truth["damping"]), found.dry_displacement.includes(truth["dry"])]
     assert seen.count((False, True)) <= 0.01 * draws + 1
     assert seen.count((True, False)) <= 0.15 * draws
-    assert np.mean(held) >= (0.9 if draws < 100 else 0.93)
+    assert np.mean(held) >= 0.9
 
 
 @pytest.mark.parametrize(
