@@ -152,6 +152,13 @@ def test_a_zero_of_a_displacement_is_called_so() -> None:
     assert "drives the motion" not in " ".join(e.status for e in shaken("zero").estimates)
 
 
+def test_one_column_for_mass_and_base_is_told_in_one_sentence() -> None:
+    record = ss.Record.of(dict.fromkeys("xz", shaken("").record["x"]), fs=shaken("").record.fs)
+    story = ss.summary(ss.analyze(record, **SHAKEN.stated))
+    assert "x and z are read from the same column" in story.headline[0]
+    assert not story.remedies
+
+
 def test_a_displacement_that_is_cut_is_told_first() -> None:
     story = ss.summary(shaken("cut"))
     assert "x has 2550 samples clipped" in story.headline[0]

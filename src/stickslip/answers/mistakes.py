@@ -83,8 +83,15 @@ def mistakes(
 
     Where the base is `unseen`, a column may be its motion.
     """
-    first = _late(record, rig, loops) or (_base(record) if unseen else None)
+    first = _twice(record) or _late(record, rig, loops) or (_base(record) if unseen else None)
     return (first,) if first is not None else consistent.slips if consistent is not None else ()
+
+
+def _twice(record: Record) -> Slip | None:
+    """One column that stands for the mass and for its base."""
+    if not {"x", "z"} <= set(record) or not np.array_equal(record["x"], record["z"]):
+        return None
+    return Slip(f"x and z are read from the same column, {_called(record.channels['z'])}, and not each from its own")
 
 
 def base_unseen(record: Record) -> bool:

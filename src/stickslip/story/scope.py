@@ -268,7 +268,7 @@ def _corrected(findings: Findings, slip: Slip, question: str, options: Sequence[
     record, settings = findings.record, dict(findings.settings)
     read = dict(_read(record))
     channels: dict[str, str] = dict(read.get("channels") or _sources(record))
-    if not channels.keys() >= {*slip.zeros, *(of for of, _ in slip.cure.values())}:
+    if slip == Slip(slip.words) or not channels.keys() >= {*slip.zeros, *(of for of, _ in slip.cure.values())}:
         return ""
     # of two that were exchanged each keeps its unit; a channel that there was not is read from the other's column
     cured = {
