@@ -8,8 +8,9 @@ from scipy.signal import lfilter
 
 from stickslip import datasets
 from stickslip.balance.force import friction_force
-from stickslip.cycle.loops import friction_loops
+from stickslip.cycle.loops import DRIFTING, friction_loops
 from stickslip.errors import EstimateError, RecordError
+from stickslip.estimate import kinds
 from stickslip.files.read import read_record
 from stickslip.record.record import Record
 
@@ -27,6 +28,17 @@ def sliding(*, seconds=10.0, fs=FS, slope=0.0, offset=0.0, uneven=0.0, noise=0.0
     friction = np.sign(v) * (1.5 + slope * np.abs(v)) + uneven * (v > 0) + offset + error
     x = REACH * np.sin(2 * np.pi * FREQUENCY * t) + 1e-6 * rng.standard_normal(t.size)
     return Record.of({"x": x, "friction": friction}, fs=fs)
+
+
+@pytest.mark.parametrize("grows", [0.2, -0.2, 0.0])
+def test_friction_that_changes_along_the_record_is_told(grows: float) -> None:
+    time = np.arange(20000) / 1000
+    friction = 1.5 * (1 + grows * time / time[-1]) * np.sign(np.cos(2 * np.pi * time))
+    noisy = friction + np.random.default_rng(1).normal(0, 0.02, time.size)
+    loops = friction_loops(Record.of({"x": 0.01 * np.sin(2 * np.pi * time), "friction": noisy}, fs=1000))
+    told = f"friction {'rises' if grows > 0 else 'falls'} by 20 % over the record"
+    assert (told in loops.level.status) == (grows != 0)
+    assert (DRIFTING in kinds(loops.status)) == (grows != 0)
 
 
 def test_coulomb_friction_by_closed_form():
