@@ -36,7 +36,7 @@ from stickslip.story.story import (
 )
 
 MOST = 0.5  # of the power of what is left over
-OTHER = 0.1  # of the oscillation's frequency: farther from its multiples swings something else
+OTHER = 0.1  # of the oscillation's frequency, within which it is a multiple of it
 LEAVES_MORE = 1.5  # times the residual: a difference worth a sentence
 FAR = 0.2  # rad: a pendulum's swing that a straight spring does not follow
 SMOOTH = 4  # blocks that a cubic needs
@@ -351,10 +351,15 @@ def _left_over(decay: Decay) -> Iterator[str]:
     at = float(power[near] @ frequency[near]) / line
     if float(power[frequency < own / 3].sum()) > MOST * total:
         yield "Most of what the fit leaves over is slower than the oscillation: the rest position drifts."
-    elif line > MOST * total and abs(at / own - round(at / own)) > OTHER:
+        return
+    times = round(at / own)
+    multiple = abs(at / own - times) < OTHER
+    if line > MOST * total and not (multiple and times == 1):
+        about = f", about {times} times the oscillation's own" if multiple else ""
+        who = "a spring or a sensor that is not straight" if multiple else "something that drives it"
         yield (
-            f"Most of what the fit leaves over swings at {number(at, frequency[1] / 10, 'Hz')}: another mode of "
-            "the rig, or something that drives it; hold it still, or filter it out."
+            f"Most of what the fit leaves over swings at {number(at, frequency[1] / 10, 'Hz')}{about}: another mode of "
+            f"the rig, or {who}; hold it still, or filter it out."
         )
 
 
