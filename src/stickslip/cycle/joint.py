@@ -19,6 +19,7 @@ from stickslip.cycle.joint_fit import (
     WORDS,
     JointData,
     about_load,
+    cogged,
     coefficient,
     fitted,
     joint_data,
@@ -27,6 +28,7 @@ from stickslip.cycle.joint_fit import (
     turning,
     warmed,
 )
+from stickslip.cycle.joint_slides import COGS
 from stickslip.cycle.regression import TURNING, UNITS
 from stickslip.errors import EstimateError
 from stickslip.estimate import NORMAL_95, Constant, Doubt, Estimate, Result, Status
@@ -244,12 +246,12 @@ def regress_joint(
     given = {"inertia": inertia, "kp": kp, "kd": kd, "torque_constant": torque_constant, "play": play}
     teeth = seating(record, gravity, **given)
     record, data = joint_data(record, gravity, False, teeth, **given)
-    (data,) = warmed([data])
+    (data,) = cogged(warmed([data]))
     delay = delay_of(data)
     data = punctual(data, delay)
     fit, terms, pull, left_out = fitted(data)
     (slow,) = warmed([joint_data(record, gravity, True, teeth, **given)[1]])
-    slow = punctual(slow, delay)
+    slow = punctual(slow.alike(data), delay)
     fall = falling(slow, fit, terms, pull)
     data = slow if fall else data
     if delay is None:
@@ -388,7 +390,7 @@ def _answer(
     tell = Telling(data, fit, terms, turning(record), status, beside)
     if fall is not None:
         tell = Averaged(data, fit, terms, turning(record), status, beside, fall)
-    known = {term: tell.one(term) for term in terms if term not in ("uneven", *FALL)}
+    known = {term: tell.one(term) for term in terms if term not in ("uneven", *FALL, *COGS)}
     if "load" in known:
         known["load"] = known["load"].within(0.0)
     forward, back = tell.ways()

@@ -13,6 +13,7 @@ import numpy as np
 from stickslip.arrays import Array
 from stickslip.balance.motion import require_fit
 from stickslip.cycle.joint_slides import (
+    COGS,
     DERIVATIVES,
     NARROW,
     SHORTEST,
@@ -51,7 +52,7 @@ WORDS = {
     "warming": "friction per kelvin", "thinning": "viscous friction per kelvin",
     "sine": "gravity, sine part", "cosine": "gravity, cosine part", "damping": "damping of the control loop",
     "late": "delay of the torque", "lag": "delay of the controller", "fall": "friction that falls with the speed",
-    "fall of load": "its part of the load",
+    "fall of load": "its part of the load", **{term: "torque along the way" for term in COGS},
 }  # fmt: skip
 ADVICE = {
     "inertia": "accelerate harder, by steps or faster swings",
@@ -72,6 +73,11 @@ ADVICE = {
 WARM = ("warming", "thinning")
 # Of the variance of a temperature, its counts' and its noise's: a regression on it is low by as much.
 ROUGHLY = 0.02
+LEAST_WAVES, WAVES = 3.0, 800  # periods of cogging within the way: fewer pass for gravity; how many, a radian apart
+ENOUGH = 1500  # rows that are searched for cogging
+SEEN = 0.01  # of the power of a wave, that the windows have to leave of it
+COGGED = 25.0  # independent samples times the share that a wave explains: TODO
+TINY = 1e-300
 # left out in this order where the motion can not tell all of them apart
 OPTIONAL: tuple[tuple[str, ...], ...] = (WARM, ("load",), ("sine", "cosine"))
 
@@ -105,6 +111,11 @@ class JointData:
     ) -> Array:
         """The columns of all logs, one below the other."""
         return np.concatenate([log.columns(terms, load, pull, steered=steered) for log in self.logs])
+
+    def alike(self, other: JointData) -> JointData:
+        """With the cogging of another."""
+        logs = tuple(replace(log, cogs=other.logs[0].cogs) for log in self.logs)
+        return replace(self, terms=(*self.terms, *(term for term in COGS if term in other.terms)), logs=logs)
 
     def noise(self, terms: tuple[str, ...]) -> Array:
         """``E'E`` of the encoders' noise in the columns; in those that are no derivatives it is smoothed to nothing."""
@@ -180,6 +191,48 @@ def warmed(data: Sequence[JointData]) -> list[JointData]:
     about = float(np.mean(while_sliding))
     centred = [tuple(replace(log, about=about) for log in one.logs) for one in data]
     return [replace(one, terms=(*one.terms, *WARM), logs=logs) for one, logs in zip(data, centred, strict=True)]
+
+
+def cogged(data: Sequence[JointData]) -> list[JointData]:
+    """Logs beside whose other terms a torque surely goes up and down along the way, as a motor's teeth make it.
+
+    What the terms leave of the torque is held against waves of the place, each as the windows smooth it at the speed
+    there. A wave that is not there explains so much of it rarely, as many as are tried.
+    """
+    whole = pooled(data)
+    fit, *_ = separable(whole)
+    parts = [_waved(log) for log in whole.logs]
+    place, dulled, weights = (np.concatenate(part) for part in zip(*parts, strict=True))
+    reach, left = float(np.ptp(place)), fit.residual / weights
+    every = math.ceil(len(place) / ENOUGH)
+
+    def explained(waves: Array, every: int) -> Array:
+        q, dull, r = place[::every], dulled[::every], left[::every]
+        turned = 2 * np.pi * waves[:, None]
+        columns = np.exp(1j * turned * q - turned**2 * dull)
+        power = np.sum(np.abs(columns) ** 2, axis=1)
+        seen = 2 * np.abs(columns @ r) ** 2 / np.maximum(power, SEEN * len(q)) / max(float(r @ r), TINY)
+        return np.where(power > SEEN * len(q), seen, 0.0)
+
+    waves = (LEAST_WAVES + np.arange(WAVES) / (2 * np.pi)) / reach
+    best = waves[int(np.argmax(np.concatenate([explained(some, every) for some in np.array_split(waves, 8)])))]
+    finer = best + np.linspace(-1, 1, 41) / (2 * np.pi * reach)
+    shares = explained(finer, 1)
+    if not fit.independent * float(shares.max()) > COGGED:
+        return list(data)
+    cogs = float(finer[int(np.argmax(shares))])
+    with_cogs = [tuple(replace(log, cogs=cogs) for log in one.logs) for one in data]
+    return [replace(one, terms=(*one.terms, *COGS), logs=logs) for one, logs in zip(data, with_cogs, strict=True)]
+
+
+def _waved(log: Log) -> tuple[Array, Array, Array]:
+    """Places of the rows, by how much windows dull a wave there over its wave number squared, and weights.
+
+    The kernel is nearly Gauss's, of a variance of an eleventh of its half's square.
+    """
+    slides = log.sliding
+    half = (slides.window.half + 1) / slides.window.fs
+    return log.position[slides.rows], (slides.at(log.turned, 1) / slides.weights * half) ** 2 / 22, slides.weights
 
 
 def _error_of(temperature: Array, fs: float) -> float:

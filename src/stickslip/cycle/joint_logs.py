@@ -17,6 +17,7 @@ from stickslip.cycle.joint_fall import bends, misfits
 from stickslip.cycle.joint_fit import (
     JointData,
     about_load,
+    cogged,
     fitted,
     joint_data,
     pooled,
@@ -24,7 +25,7 @@ from stickslip.cycle.joint_fit import (
     turning,
     warmed,
 )
-from stickslip.cycle.joint_slides import motor_lead, sliding
+from stickslip.cycle.joint_slides import COGS, motor_lead, sliding
 from stickslip.errors import EstimateError, RecordError
 from stickslip.estimate import NORMAL_95, Constant, Estimate, Result
 from stickslip.parameters import finite
@@ -489,12 +490,14 @@ def regress_joint_logs(
             "several logs are told together by torques of one source",
             "give two logs or more, of one robot and one kind",
         )
+    data = cogged(data)
+    slow = [one.alike(data[0]) for one in slow]
     delay = delay_of(pooled(data))
     data, slow = [punctual(one, delay) for one in data], [punctual(one, delay) for one in slow]
     fit, terms, pull, left_out = fitted(pooled(data))
     beside = misfits(pooled(data), fit, terms, bends(pooled(slow), fit, terms, pull), turning(records[0]))
     tell = Telling(pooled(data), fit, terms, turning(records[0]), "ok", beside)
-    known = {term: tell.one(term) for term in terms if term != "uneven"}
+    known = {term: tell.one(term) for term in terms if term not in ("uneven", *COGS)}
     predictions = [
         _predicted(log, pooled(data[:place] + data[place + 1 :]), record)
         for place, (log, record) in enumerate(zip(data, records, strict=True))
@@ -519,7 +522,7 @@ def _predicted(log: JointData, others: JointData, record: Record) -> JointPredic
     """A log's torque by the regression of the others, and by a plain one."""
     fit, terms, pull, _ = fitted(others)
     predicted = log.model(fit, terms, pull)
-    plain = tuple("coulomb" if term == "forward" else term for term in terms if term not in {*RICHER, "back"})
+    plain = tuple("coulomb" if term == "forward" else term for term in terms if term not in {*RICHER, *COGS, "back"})
     fit, pull = about_load(replace(others, terms=plain), plain)
     spread = float(np.linalg.norm(log.torque - log.torque.mean()))
     if spread == 0:

@@ -27,6 +27,7 @@ SLOWER = 0.02  # where that fall is asked for
 NARROW = 0.3  # of the window, near the ends of strokes
 GRAVITY = ("sine", "cosine", "load")  # terms whose columns are made about a load part and gravity's torque
 DERIVATIVES = ("inertia", "viscous", "uneven")  # terms in which the counts of an encoder are noise
+COGS = ("cogging, sine", "cogging, cosine")  # terms of a torque of so many periods along the way
 TOGETHER = 0.995  # correlation of motor and link: an encoder that wraps, or the motor of another joint, has less
 DRAWS = 4  # of an encoder's errors
 APART = 4  # rows in the window's half: nearer ones tell the same
@@ -242,6 +243,8 @@ class Log:
         As it was measured, or as a controller makes it of its error.
     error : ndarray or None
         Of a controller whose torque is not measured: how far the position is from the reference.
+    cogs : float
+        Periods in a radian of a torque that a motor's teeth, or a gear's, make along the way; 0: none is known.
     damped : float
         By what that controller damps its error [N m s/rad], where that is regressed.
     bodies : ndarray or None
@@ -260,6 +263,7 @@ class Log:
     about: float = 0.0
     torque: Array | None = None
     error: Array | None = None
+    cogs: float = 0.0
     damped: float = 0.0
     bodies: Array | None = None
     ahead: Array | float = 0.0
@@ -289,8 +293,8 @@ class Log:
         terms : tuple of str
             Of inertia, viscous, uneven, forward, back, coulomb (both alike), sine,
             cosine, load, damping, warming and thinning (Coulomb and viscous friction per kelvin), late (by how much
-            the torque is), borne (friction per torque of the bodies), and wound (torque per sum of a controller's
-            error).
+            the torque is), borne (friction per torque of the bodies), wound (torque per sum of a controller's
+            error), and of `COGS`.
         load : float
             The load part about which gravity's columns are linear.
         pull : (float, float)
@@ -320,6 +324,9 @@ class Log:
             "thinning": lambda: at(five_point_difference(turned, 1) * fs * warmer),
             "late": lambda: self._torque_rate(steered),
             "wound": lambda: at(np.cumsum(np.zeros_like(turned) if self.error is None else self.error) / fs),
+            # at its own place, of the instruments too: a reference that is ahead passes other teeth
+            COGS[0]: lambda: at(np.sin(2 * np.pi * self.cogs * self.position)),
+            COGS[1]: lambda: at(np.cos(2 * np.pi * self.cogs * self.position)),
             "borne": lambda: at(side * np.abs(np.zeros_like(position) if self.bodies is None else self.bodies)),
         }
         for term in terms:
