@@ -14,8 +14,7 @@ import stickslip as ss
 from stickslip.answers import analyze_joint, axis_record
 from stickslip.cli.program import main
 from stickslip.cycle import joint_backlash, joint_breakaway, regress_joint, regress_joint_logs
-from stickslip.cycle.joint import is_late
-from stickslip.cycle.joint_fit import SURELY
+from stickslip.cycle.joint_fit import SURELY, is_late
 from stickslip.errors import EstimateError, ModelError, RecordError
 from stickslip.estimate import kinds, stands
 from stickslip.figures.contact import plot_joint

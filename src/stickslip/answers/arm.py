@@ -15,7 +15,8 @@ import numpy as np
 from stickslip.answers.mistakes import called, require_angle
 from stickslip.arrays import Array
 from stickslip.compiled import OPTIONS, compiled
-from stickslip.cycle.joint import LOOP, JointFriction, is_late
+from stickslip.cycle.joint import JointFriction
+from stickslip.cycle.joint_fit import LOOP, is_late
 from stickslip.cycle.joint_slides import sliding
 from stickslip.errors import ABSENT, ModelError, RecordError, package
 from stickslip.estimate import Estimate
@@ -361,6 +362,8 @@ class Joint:
     ----------
     inertia, forward, back, viscous_forward, viscous_back, load, sine, cosine : float
         As of :class:`~stickslip.cycle.JointFriction`.
+    cogging, waves, phase : float
+        Of a torque that goes up and down along the way: its size, periods in a radian, and phase.
     excess, speed, exponent : float
         By how much its friction at rest is above that, within which speed it falls, and Stribeck's exponent.
     kp, damping : float
@@ -381,6 +384,9 @@ class Joint:
     load: float = 0.0
     sine: float = 0.0
     cosine: float = 0.0
+    cogging: float = 0.0
+    waves: float = 0.0
+    phase: float = 0.0
     excess: float = 0.0
     speed: float = 1.0
     exponent: float = 2.0
@@ -411,7 +417,8 @@ class Joint:
         rubs = {"forward": joint.forward.value, "back": joint.back.value}
         constant = stated.get("torque_constant", 0.0)
         loop_of = {"kp": kp, "damping": damping, "torque_constant": constant, "delay": late if surely else 0.0}
-        numbers = {"inertia": joint.inertia.value, **rubs, **ways, **pulls, **falls, **loop_of}
+        teeth = {"cogging": _known(joint.cogging), "waves": joint.waves[0], "phase": joint.waves[1]}
+        numbers = {"inertia": joint.inertia.value, **rubs, **ways, **pulls, **teeth, **falls, **loop_of}
         return cls(**{name: float(value) for name, value in numbers.items()}, axis=axis)
 
     @classmethod
@@ -454,7 +461,7 @@ class Joint:
         steps = math.ceil(max(FINEST, fastest) / fs)
         velocity = differentiate(position, fs)
         rate = np.where(np.abs(velocity.values) > MOVES * velocity.sd, velocity.values, 0.0)
-        numbers = np.array([getattr(self, field.name) for field in fields(self)[:11]])
+        numbers = np.array([getattr(self, field.name) for field in fields(self)[:14]])
         place, torque = smooth(position, fs).values.copy(), np.ascontiguousarray(drive).copy()
         anew[0] = True
         march_joint(numbers, np.array([kp, kd]), anew, rate, steps, 1 / (fs * steps), place, torque)
@@ -473,7 +480,7 @@ def march_joint(p, gains, anew, rate, steps, dt, place, torque):  # type: ignore
     Runge's and Kutta's fourth order, one side of the friction in a step: where the speed changes its sign in it, it
     rests, and slides again as soon as the friction does not bear the torque. It begins `anew` as the log does there.
     """
-    inertia, forward, back, ahead, behind, share, sine, cosine, excess, fall, exponent = p
+    inertia, forward, back, ahead, behind, share, sine, cosine, cogging, waves, phase, excess, fall, exponent = p
     kp, kd = gains
     closed = kp != 0.0
     q, v = place[0], rate[0]
@@ -490,6 +497,7 @@ def march_joint(p, gains, anew, rate, steps, dt, place, torque):  # type: ignore
                 told = drive + slope * j * dt
                 push = kp * (told - q) + kd * slope if closed else told
                 load = sine * np.sin(q) + cosine * np.cos(q)
+                push -= cogging * np.sin(2 * np.pi * waves * q + phase)
                 side = 1.0 if push > load else -1.0
                 if abs(push - load) <= (forward if side > 0 else back) + share * abs(load) + excess:
                     continue
@@ -500,6 +508,7 @@ def march_joint(p, gains, anew, rate, steps, dt, place, torque):  # type: ignore
                 x, vs = q + h * vs, v + h * a
                 told = drive + slope * (j * dt + h)
                 push = kp * (told - x) + kd * (slope - vs) if closed else told
+                push -= cogging * np.sin(2 * np.pi * waves * x + phase)
                 load = sine * np.sin(x) + cosine * np.cos(x)
                 rubs = (forward if side > 0 else back) + share * abs(load)
                 if excess > 0.0:

@@ -241,7 +241,7 @@ def _with_friction(record: Record, joint: JointFriction) -> Record:
     position = record["theta" if "theta" in record else "x"]
     inertial = joint.inertia.value * differentiate(position, record.fs, order=2).values
     bodies = record.samples.get("bodies", 0.0)
-    friction, unit = joint.torque - bodies - joint.weight(position) - inertial, joint.level.unit
+    friction, unit = joint.torque - bodies - joint.weight(position) - joint.cogs(position) - inertial, joint.level.unit
     step = Step("analyze_joint", {}, "torque less inertia and gravity")
     return record.with_channel("friction", friction, unit=unit, source="analyze_joint", step=step)
 

@@ -14,17 +14,19 @@ from stickslip.arrays import Array
 from stickslip.cycle.joint_fall import FALL, Fall, Misfit, bends, damps_error, falling, misfits
 from stickslip.cycle.joint_fit import (
     ADVICE,
+    LOOP,
     SURELY,
     WARM,
     WORDS,
     JointData,
     about_load,
-    cogged,
     coefficient,
+    cogged,
+    damped,
     fitted,
     joint_data,
+    punctual,
     seating,
-    separable,
     turning,
     warmed,
 )
@@ -40,10 +42,6 @@ from stickslip.statistics import FEW_INDEPENDENT, LeastSquares, mixture
 # seeds 91000 to 94117; above it one of 5 was low by 85 %.
 DROWNED = 0.5
 LATEST = 0.1  # s that a torque may be late
-OFTEN, USUAL = 0.25, 0.02  # odds that a torque is late, chosen, and s by which it then usually is, chosen
-# s, and how that varies, chosen: of a torque in time. What a computer at 1 kHz sets acts half a period late on average.
-HELD = (0.0, 5e-4)
-LOOP = (1e-3, 2e-3)  # s, delay of a controller, and how that varies, chosen: it holds its output for 0.2 to 10 ms
 # Times the power of noise in the torque's rate: noise alone had 0.9 to 1.2 on 10 logs, 41 others 1.4 at least.
 HEARD = 1.5
 STRAYS = 1.6  # times its chance that a delay strays: so it did on 60 joints of 15 ms, seeds 70100 to 70225
@@ -115,6 +113,11 @@ class JointFriction(Result):
         made of; taken out where it is surely there. None where the motion does not tell it.
     stated : mapping of str to Estimate
         The constants that were stated, by name.
+    cogging : Estimate or None
+        Amplitude of a torque that goes up and down along the way [N m], as a motor's teeth make it; None where none is
+        surely there.
+    waves : (float, float)
+        How often it does in a radian, and its phase [rad].
     """
 
     level: Estimate
@@ -149,6 +152,13 @@ class JointFriction(Result):
     exponent: float | None = None
     delay: Estimate | None = None
     stated: Mapping[str, Estimate] = field(default_factory=dict)
+    cogging: Estimate | None = None
+    waves: tuple[float, float] = (0.0, 0.0)
+
+    def cogs(self, position: Array) -> Array:
+        """The torque [N m] that goes up and down along the way, at positions."""
+        size = 0.0 if self.cogging is None else self.cogging.value
+        return np.asarray(size * np.sin(2 * np.pi * self.waves[0] * position + self.waves[1]))
 
     def weight(self, position: Array) -> Array:
         """Gravity's torque [N m] at positions."""
@@ -314,17 +324,6 @@ def delay_of(data: JointData) -> Estimate | None:
     return Estimate.normal(name, late, sd=sd, unit="s", method="the balance of torque, read later")
 
 
-def damped(data: JointData, late: float, damping: float | None = None) -> JointData:
-    """With what a controller's damping makes of a delay, where that is regressed: it is told as it damps."""
-    if data.source != "reference" or "damping" not in data.terms:
-        return data
-    if damping is None:
-        fit, terms, *_ = separable(data)
-        damping = coefficient(fit, terms, "damping")
-    own = damping + data.stated["kp"].value * late
-    return replace(data, logs=tuple(replace(log, damped=own) for log in data.logs))
-
-
 def _heard(data: JointData, fit: LeastSquares, terms: tuple[str, ...]) -> bool:
     """Whether the torque changes, beside what the other terms explain of that, by more than its noise makes of it."""
     columns = data.columns(terms, coefficient(fit, terms, "load"), (0.0, 0.0))
@@ -335,45 +334,9 @@ def _heard(data: JointData, fit: LeastSquares, terms: tuple[str, ...]) -> bool:
     return float(np.mean(beside**2)) > HEARD * float(np.mean(np.square(noises)))
 
 
-def punctual(data: JointData, delay: Estimate | None) -> JointData:
-    """The data with a torque read as much later as it surely is late, and unsure by how unsure that is."""
-    if data.source == "reference":
-        late, unsure = _lag(delay, LOOP)
-        data = damped(data.earlier(late), late)
-    elif delay is not None and is_late(delay):
-        data, unsure = data.earlier(delay.value), delay.sd
-    else:
-        unsure = math.hypot(*_lag(delay, HELD), 0.0 if delay is None else _unseen(delay))
-    return replace(data, unsure=(*data.unsure, unsure * data.columns(("late",), 0.0, (0.0, 0.0))[:, 0]))
-
-
-def _lag(delay: Estimate | None, usual: tuple[float, float]) -> tuple[float, float]:
-    """A delay [s] and its deviation, by what the log tells of it and by what it usually is."""
-    about, spread = usual
-    if delay is None:
-        return usual
-    share = spread**2 / (spread**2 + delay.sd**2)
-    return about + share * (delay.value - about), math.sqrt(share) * delay.sd
-
-
-def _unseen(delay: Estimate) -> float:
-    """Deviation [s] by a delay that is not surely there: most torques are in time, which one seen badly may not be."""
-    among, few = (delay.sd**2 + spread**2 for spread in (USUAL, HELD[1]))  # variances of what is seen of either
-    share = USUAL**2 / among
-    seen = min(delay.value**2 / few, SURELY**2)
-    odds = OFTEN * math.sqrt(few / among) * math.exp(seen / 2 * (1 - few / among))
-    size = math.hypot(share * delay.value, math.sqrt(share) * delay.sd)
-    return math.sqrt(odds / (1 + odds)) * size
-
-
 def is_wide(estimate: Estimate) -> bool:
     """Whether its interval hardly tells it."""
     return NORMAL_95 * estimate.sd > BARELY * abs(estimate.value)
-
-
-def is_late(delay: Estimate) -> bool:
-    """Whether a delay is surely there."""
-    return abs(delay.value) > SURELY * delay.sd
 
 
 def _answer(
@@ -424,18 +387,27 @@ def _answer(
         source=data.source,
         stated=data.stated,
         status=status,
-        **_rows(record, data, fit, pull, inertia.value, damped),
+        **_rows(record, data, fit, terms, pull, inertia.value, damped),
         **_stribeck(tell, fall, pull, known.get("load")),
+        **_cogging(tell),
     )
 
 
 def _rows(
-    record: Record, data: JointData, fit: LeastSquares, pull: tuple[float, float], inertia: float, damped: Array
+    record: Record,
+    data: JointData,
+    fit: LeastSquares,
+    terms: tuple[str, ...],
+    pull: tuple[float, float],
+    inertia: float,
+    damped: Array,
 ) -> dict[str, Any]:
     """Speed, torque and friction wherever it slides."""
     slides, position = data.logs[0].sliding, data.logs[0].link
     speed, acceleration = (slides.at(data.logs[0].turned, order) for order in (1, 2))
     weight = pull[0] * slides.at(np.sin(position)) + pull[1] * slides.at(np.cos(position))
+    if COGS[0] in terms:
+        weight = weight + data.columns(COGS, 0.0, (0.0, 0.0)) @ [coefficient(fit, terms, term) for term in COGS]
     if "bodies" in record:
         weight = weight + slides.at(record["bodies"])
     return {
@@ -458,6 +430,18 @@ def _stribeck(tell: Telling, fall: Fall | None, pull: tuple[float, float], load:
         unseen = Doubt(f"the log slides too fast to tell it: {ADVICE[FALL[0]]}", CONFOUNDED, lesser=True)
         static = replace(static, status=Status(static.status, unseen))
     return {"static": static, "stribeck_speed": speed, "exponent": fall.exponent}
+
+
+def _cogging(tell: Telling) -> dict[str, Any]:
+    """What is told of a torque that goes up and down along the way."""
+    if COGS[0] not in tell.terms:
+        return {}
+    sine, cosine, grows, turns = (coefficient(tell.fit, tell.terms, term) for term in COGS)
+    phase, (waves, middle) = math.atan2(cosine, sine), tell.data.logs[0].cogs
+    waves += (sine * turns - cosine * grows) / (sine**2 + cosine**2) / (2 * math.pi)
+    weights = dict(zip(COGS, (math.cos(phase), math.sin(phase)), strict=False))
+    size = tell.sum(weights, "cogging torque" if tell.turning else "cogging force")
+    return {"cogging": size, "waves": (waves, phase - 2 * math.pi * waves * middle)}
 
 
 def _carried(data: JointData, pull: tuple[float, float]) -> float:
@@ -556,6 +540,7 @@ class Telling:
         heat = dict(zip(("warming", "thinning"), heats, strict=True))
         units = {**(TURNING if self.turning else UNITS), "load": "1", "late": "s", **heat}
         kind = {"forward": "coulomb", "back": "coulomb", "sine": "coulomb", "cosine": "coulomb", "damping": "viscous"}
+        kind |= dict.fromkeys(COGS, "coulomb")
         unit = units[kind.get(next(iter(weights)), next(iter(weights)))]
         # a lesser one is less of the mean of both directions alone: any other term may have taken what it is about
         mean = {"forward", "back"} <= set(weights)

@@ -12,7 +12,7 @@ import numpy as np
 
 from stickslip.arrays import Array, stretches
 from stickslip.balance.motion import away_from
-from stickslip.cycle.joint import RICHER, JointFriction, Telling, delay_of, punctual
+from stickslip.cycle.joint import RICHER, JointFriction, Telling, delay_of
 from stickslip.cycle.joint_fall import bends, misfits
 from stickslip.cycle.joint_fit import (
     JointData,
@@ -21,6 +21,7 @@ from stickslip.cycle.joint_fit import (
     fitted,
     joint_data,
     pooled,
+    punctual,
     seating,
     turning,
     warmed,
@@ -268,7 +269,7 @@ def _ends(record: Record, joint: JointFriction) -> Iterator[tuple[float, float]]
     count = max(quantisation_step(position), DEVIATIONS * noise_level(position, record.fs))
     side = sliding(position, record.fs).side
     begins, ends = stretches(side == 0)
-    pull = joint.torque - joint.weight(position)
+    pull = joint.torque - joint.weight(position) - joint.cogs(position)
     for begin, end in zip(begins, ends, strict=True):
         way = side[end] if end < len(side) else 0.0
         if way == 0 or end - begin < LEAST:

@@ -27,7 +27,8 @@ SLOWER = 0.02  # where that fall is asked for
 NARROW = 0.3  # of the window, near the ends of strokes
 GRAVITY = ("sine", "cosine", "load")  # terms whose columns are made about a load part and gravity's torque
 DERIVATIVES = ("inertia", "viscous", "uneven")  # terms in which the counts of an encoder are noise
-COGS = ("cogging, sine", "cogging, cosine")  # terms of a torque of so many periods along the way
+# Terms of a torque of so many periods along the way; the last two as it grows along it, or is of a little more periods.
+COGS = ("cogging, sine", "cogging, cosine", "growing, sine", "growing, cosine")
 TOGETHER = 0.995  # correlation of motor and link: an encoder that wraps, or the motor of another joint, has less
 DRAWS = 4  # of an encoder's errors
 APART = 4  # rows in the window's half: nearer ones tell the same
@@ -243,8 +244,8 @@ class Log:
         As it was measured, or as a controller makes it of its error.
     error : ndarray or None
         Of a controller whose torque is not measured: how far the position is from the reference.
-    cogs : float
-        Periods in a radian of a torque that a motor's teeth, or a gear's, make along the way; 0: none is known.
+    cogs : (float, float)
+        Periods in a radian of a torque that a motor's teeth, or a gear's, make along the way, and the middle of that.
     damped : float
         By what that controller damps its error [N m s/rad], where that is regressed.
     bodies : ndarray or None
@@ -263,7 +264,7 @@ class Log:
     about: float = 0.0
     torque: Array | None = None
     error: Array | None = None
-    cogs: float = 0.0
+    cogs: tuple[float, float] = (0.0, 0.0)
     damped: float = 0.0
     bodies: Array | None = None
     ahead: Array | float = 0.0
@@ -308,6 +309,8 @@ class Log:
         side, at, fs = self.sliding.side, self.sliding.at, self.sliding.window.fs
         carried = pull[0] * np.sin(position) + pull[1] * np.cos(position)
         warmer = 0.0 if self.temperature is None else self.temperature - self.about
+        along = self.position - self.cogs[1]
+        teeth = 2 * np.pi * self.cogs[0] * along
         stronger = 1 + load * side * np.sign(carried)
         made = {
             "inertia": lambda: at(turned, 2),
@@ -325,8 +328,10 @@ class Log:
             "late": lambda: self._torque_rate(steered),
             "wound": lambda: at(np.cumsum(np.zeros_like(turned) if self.error is None else self.error) / fs),
             # at its own place, of the instruments too: a reference that is ahead passes other teeth
-            COGS[0]: lambda: at(np.sin(2 * np.pi * self.cogs * self.position)),
-            COGS[1]: lambda: at(np.cos(2 * np.pi * self.cogs * self.position)),
+            COGS[0]: lambda: at(np.sin(teeth)),
+            COGS[1]: lambda: at(np.cos(teeth)),
+            COGS[2]: lambda: at(along * np.sin(teeth)),
+            COGS[3]: lambda: at(along * np.cos(teeth)),
             "borne": lambda: at(side * np.abs(np.zeros_like(position) if self.bodies is None else self.bodies)),
         }
         for term in terms:

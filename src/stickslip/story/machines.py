@@ -12,8 +12,8 @@ import numpy as np
 from stickslip.answers.arm import Joint
 from stickslip.answers.findings import Comparison, Findings
 from stickslip.answers.machines import joint_law
-from stickslip.cycle.joint import JointFriction, is_late
-from stickslip.cycle.joint_fit import SURELY
+from stickslip.cycle.joint import JointFriction
+from stickslip.cycle.joint_fit import SURELY, is_late
 from stickslip.cycle.joint_logs import JointLogs
 from stickslip.cycle.tribometer import DEFINITIONS
 from stickslip.errors import ModelError
@@ -191,6 +191,9 @@ def _of_one_joint(findings: Findings) -> Iterator[str]:
         moved = number(abs(delay.value), delay.sd, "s")
         known = "error that it is made of" if joint.source == "reference" else "position"
         yield f"It comes {moved} {way} than the {known} (95 %: {interval_of(delay)}), which is taken out."
+    if joint.cogging is not None:
+        often, angle = (2 * np.pi * joint.waves[0], "turn") if unit == "N m" else (joint.waves[0], "metre")
+        yield f"A torque of {value_of(joint.cogging)} goes up and down {often:.4g} times a {angle}, as teeth make it."
     if findings.breakaway is not None:
         ratio = findings.breakaway.ratio
         yield f"It breaks away at {value_of(ratio)} times its sliding friction (95 %: {interval_of(ratio)})."
