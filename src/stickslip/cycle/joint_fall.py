@@ -371,6 +371,5 @@ def misfits(
     if size > ROUNDING * float(np.sqrt(np.mean(data.torque**2))):
         unit = (TURNING if turning else UNITS)["coulomb"]
         doubt = Doubt(f"{what} changes along the way, by {size:.2g} {unit} r.m.s.", PLACE, lesser=True)
-        # a torque that is slow for a cogging passed for inertia too, on 2 of 4 joints
-        seen.append(Misfit((*PLACED, *SPEED) if what == "torque" else PLACED, doubt, elsewhere))
+        seen.append(Misfit(PLACED, doubt, elsewhere))
     return tuple(seen)
