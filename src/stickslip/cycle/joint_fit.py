@@ -77,7 +77,7 @@ LEAST_WAVES, WAVES = 3.0, 400  # periods of cogging within the way: fewer pass f
 ENOUGH = 1500  # rows that are searched for cogging
 SEEN = 0.01  # of the power of a wave, that the windows have to leave of it
 # Independent samples times the share of what is left that a wave explains: of 170 logs without cogging, seeds 201000
-# to 201021, 15 at most, of 101 others once over 25 by a wave no longer tried, with cogging to 33 or more on 18 of 20.
+# to 201021, 15 at most, of 101 others once over 25 by a wave no longer tried, with cogging to 33 or more on 19 of 20.
 COGGED = 25.0
 OFTEN, USUAL = 0.25, 0.02  # odds that a torque is late, chosen, and s by which it then usually is, chosen
 # s, and how that varies, chosen: of a torque in time. What a computer at 1 kHz sets acts half a period late on average.
