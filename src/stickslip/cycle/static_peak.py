@@ -308,14 +308,14 @@ def begun(stroke: Stroke, pull: Array, mass: float, fs: float) -> Begun | None:
     if last - first < LEAST:
         return None
     force = stroke.way * pull[stroke.first + first : stroke.first + last]
-    found = [(np.nan, np.nan, np.inf)] * len(MODELS)
+    onsets = [(np.nan, np.nan, np.inf)] * len(MODELS)
     for place, (begins, misfit) in enumerate(_starts(way[first:last], force, mass, fs)):
         if not np.isfinite(misfit):
             continue
         rows = np.arange(max(0, int(begins) - max(4, (first + int(begins)) // BEFORE)), int(begins) + 1)
         slope, value = np.polyfit(rows - begins, force[rows], 1) if len(rows) > 1 else (0.0, force[rows[0]])
-        found[place] = (float(value), float(abs(slope)), misfit)
-    return Begun(*np.transpose(found)) if np.isfinite(found[0][2]) or np.isfinite(found[1][2]) else None
+        onsets[place] = (float(value), float(abs(slope)), misfit)
+    return Begun(*np.transpose(onsets)) if np.isfinite(onsets[0][2]) or np.isfinite(onsets[1][2]) else None
 
 
 def _starts(travel: Array, pull: Array, mass: float, fs: float) -> list[tuple[float, float]]:

@@ -288,7 +288,8 @@ class Problem:
         moved = point.u + STEP * np.eye(len(self.knobs))[k]
         near = self.mounted(moved, j).sensors[s]
         read, _ = near.predicted(motion, self.delays(moved, j)[sensor.channel.name])
-        left, beside = (one.freed(sensor.readings - gain * told, passed) for one, told in ((sensor, raw), (near, read)))
+        pairs = ((sensor, raw), (near, read))
+        left, beside = (mounted.freed(sensor.readings - gain * readings, passed) for mounted, readings in pairs)
         return np.asarray((left - beside) / STEP)
 
     def _changed(self, point: Point, j: int, moving: Sequence[int], system: Oscillator) -> list[Array] | None:

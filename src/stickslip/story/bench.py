@@ -113,15 +113,15 @@ def of_commissioned(done: Commissioned) -> Story:
 
 def _cautions(done: Commissioned) -> list[Caution]:
     """Why steps were refused, and what speaks against their numbers, at those that lead where it is theirs."""
-    told = [Caution(f"{_title(name)} {why}") for name, why in done.refused.items()]
+    cautions = [Caution(f"{_title(name)} {why}") for name, why in done.refused.items()]
     leading = list(_leading(done))
     for name, result in done.results.items():
         flagged = [one for step, one in leading if step == name and not stands(one.status)]
         if flagged:
-            told += doubts(flagged)
+            cautions += doubts(flagged)
         elif not stands(status := str(getattr(result, "status", "ok"))):
-            told.append(Caution(f"{_title(name)} {status}."))
-    return told
+            cautions.append(Caution(f"{_title(name)} {status}."))
+    return cautions
 
 
 def _headline(done: Commissioned) -> str:

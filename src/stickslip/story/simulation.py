@@ -391,7 +391,7 @@ def holding(run: Trajectory) -> str:
     cycles = max(1, min(COUNTED_CYCLES, int(run.duration / cycle * (1 + 1e-9))))
     first, holds = run.duration - cycles * cycle, []
     late = f"In the last {f'{cycles} cycles' if cycles > 1 else 'cycle'} t" if first > 1e-9 * cycle else "T"
-    each = "a cycle" if cycle == period_of(run) else f"in {_text(run.duration, 's')}"
+    span = "a cycle" if cycle == period_of(run) else f"in {_text(run.duration, 's')}"
     for kind, verb in (("stick", "sticks"), ("microstick", "holds, giving a little,"), ("flight", "lifts off")):
         spans = stretches(run, kind, first=first, last=run.duration)
         if not len(spans):
@@ -401,7 +401,7 @@ def holding(run: Trajectory) -> str:
         count = (1 + int(begins.sum()) - bool(cut)) / cycles
         often = {1.0: "once", 2.0: "twice"}.get(count, f"{count:.2g} times")
         share = float(spans[:, 1].sum()) / (cycles * cycle)
-        part = f"{verb} {often} {each}, {100 * share:.2g} % of the time"
+        part = f"{verb} {often} {span}, {100 * share:.2g} % of the time"
         holds.append(part if share < 1 - 1e-9 else f"{verb} throughout")
     return f"{late}he mass {_listed(holds) if holds else 'slides without a stop'}."
 

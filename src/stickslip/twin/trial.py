@@ -470,8 +470,8 @@ def _counted_offsets(belief: Belief, frequency: float) -> dict[str, list[float]]
     true, *others = (_truth(r, r.twin(np.random.default_rng(0)), frequency) for r in (belief, *belief.rivals))
     # a contact that gives way holds at each reversal, which is no stop of one that does not
     alike = [other for other, stops in zip(others, rigid, strict=True) if stops or {GIVE, RATE} & belief.values.keys()]
-    told = [name for name in ASKED if math.isfinite(true[name])]  # without a cycle there is none of its stops and work
-    return {name: [one[name] - true[name] for one in (alike if name in (SHARE, STOPS) else others)] for name in told}
+    names = [name for name in ASKED if math.isfinite(true[name])]  # without a cycle there is none of its stops and work
+    return {name: [one[name] - true[name] for one in (alike if name in (SHARE, STOPS) else others)] for name in names}
 
 
 def _work_of_drift(belief: Belief, frequency: float) -> float:
