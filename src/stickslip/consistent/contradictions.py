@@ -302,7 +302,8 @@ def cycle_checks(record: Record, seen: Seen) -> list[Check]:
         if max(left.values()) < distinct:
             checks.append(untold(title, "the motion repeats: a lag of whole cycles leaves no trace, and does no harm"))
             continue
-        if best and here < distinct:
+        # a shift to the end of those that are tried leaves most of how the motion begins out: no least of its own
+        if best and (here < distinct or best in (min(left), max(left))):
             checks.append(untold(title, "the cycles differ too little to tell a lag of whole cycles"))
             continue
         apart = math.inf if best else 0.0
