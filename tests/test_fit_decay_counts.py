@@ -9,6 +9,7 @@ import pytest
 
 import stickslip as ss
 from null_decays import let_go
+from stickslip.decay.noise import extreme
 
 
 def coarse(
@@ -95,3 +96,18 @@ def test_a_slider_seen_in_hundredths_of_a_millimetre(
         assert decay.damping_ratio.value == pytest.approx(ratio, rel=3e-3)
         assert abs(decay.dry_force.value - kinetic) < 4 * decay.dry_force.sd
         assert abs(decay.damping_ratio.value - ratio) < 4 * decay.damping_ratio.sd
+
+
+def test_what_nothing_tells_has_no_extreme() -> None:
+    """Its curvature is none, and what it would be moved by overflowed."""
+
+    best = np.r_[1.0, 0.1, np.zeros(5)]
+
+    def objective(p: np.ndarray) -> tuple[float, np.ndarray, np.ndarray]:
+        off = np.r_[(p - best)[:6], 0.0]
+        return float(off @ off), -off, np.diag([1.0] * 6 + [0.0])
+
+    assert extreme(objective, best, 0.0, 6, 1, 4.0) is None
+    farthest = extreme(objective, best, 0.0, 2, 1, 4.0)
+    assert farthest is not None
+    assert farthest[2] == pytest.approx(2.0, rel=0.05)

@@ -402,7 +402,10 @@ def extreme(objective: Objective, best: Array, value: float, which: int, side: i
             p = (p + last) / 2
             continue
         last = p.copy()
-        step, across = solve(curvature, slope), solve(curvature, aim)
+        with np.errstate(over="ignore"):
+            step, across = solve(curvature, slope), solve(curvature, aim)
+        if not np.all(np.isfinite(across)):  # nothing tells the parameter
+            return None
         room = max(level - now + float(step @ slope), 0.0)
         whole = np.sqrt((level - value) * across[which])
         step = step + side * np.sqrt(room / across[which]) * across
