@@ -494,8 +494,8 @@ def march_joint(p, gains, anew, rate, steps, dt, place, torque):  # type: ignore
         for j in range(steps):
             side = 1.0 if v > 0 else -1.0
             if v == 0.0:
-                told = drive + slope * j * dt
-                push = kp * (told - q) + kd * slope if closed else told
+                command = drive + slope * j * dt
+                push = kp * (command - q) + kd * slope if closed else command
                 load = sine * np.sin(q) + cosine * np.cos(q)
                 push -= cogging * np.sin(2 * np.pi * waves * q + phase)
                 side = 1.0 if push > load else -1.0
@@ -506,8 +506,8 @@ def march_joint(p, gains, anew, rate, steps, dt, place, torque):  # type: ignore
             for k in range(4):
                 h = 0.0 if k == 0 else dt if k == 3 else dt / 2
                 x, vs = q + h * vs, v + h * a
-                told = drive + slope * (j * dt + h)
-                push = kp * (told - x) + kd * (slope - vs) if closed else told
+                command = drive + slope * (j * dt + h)
+                push = kp * (command - x) + kd * (slope - vs) if closed else command
                 push -= cogging * np.sin(2 * np.pi * waves * x + phase)
                 load = sine * np.sin(x) + cosine * np.cos(x)
                 rubs = (forward if side > 0 else back) + share * abs(load)
