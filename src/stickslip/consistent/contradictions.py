@@ -222,10 +222,9 @@ def range_checks(record: Record, names: Sequence[str]) -> list[Check]:
         if not mask.any() and cut is None:
             continue
         top = float(np.abs(record[name]).max())
-        message = f"{name} is held at the end of its range in {int(mask.sum())} of {len(mask)} samples"
-        sentence = message if cut is None else cut.message
-        unit = record.channels[name].unit
-        checks.append(Check(f"range of {name}", top, top, unit, math.inf, FAILS, sentence.rstrip(".")))
+        held = sum(last - first + 1 for first, last in cut.rows) if cut is not None else int(mask.sum())
+        sentence = f"{name} is held at the end of its range in {held} of {len(record)} samples"
+        checks.append(Check(f"range of {name}", top, top, record.channels[name].unit, math.inf, FAILS, sentence))
     none = "none stands at the end of its range"
     return checks or [Check("range of the sensors", math.nan, math.nan, "1", math.nan, HOLDS, none)]
 

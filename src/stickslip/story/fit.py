@@ -96,7 +96,7 @@ def _story(fit: Fit, record: Records, headline: list[str], **content: Any) -> St
     """What all fits tell of their parameters and of the records that they were made to."""
     records = [record] if isinstance(record, Record) else list(record)
     checked = [(f"{record_name(record)}: " if len(records) > 1 else "", record.check()) for record in records]
-    units = list(dict.fromkeys(caution for _, faults in checked for caution in leading(faults)))
+    units = list(dict.fromkeys(caution for name, faults in checked for caution in leading(faults, of=name)))
     own = doubts(fit.estimates)
     said = {caution.reason for caution in own}
     cautions = [*(Caution(doubt.words) for doubt in doubts_of(fit.status) if doubt.words not in said), *own]

@@ -188,9 +188,12 @@ def faulty(faults: Sequence[Fault], *, of: str = "") -> Iterator[Caution]:
         yield Caution(f"{of}{others[0]}{those}" if more or of else one)
 
 
-def leading(faults: Iterable[Fault]) -> list[Caution]:
-    """What the check-up found wrong that every number hangs on, so that it comes first."""
-    return [Caution(str(fault)) for fault in faults if _leads(fault)]
+def leading(faults: Iterable[Fault], *, of: str = "") -> list[Caution]:
+    """What the check-up found wrong that every number hangs on, so that it comes first.
+
+    A unit that nobody stated is that of all records alike; else `of` says which of several it is.
+    """
+    return [Caution(f"{'' if fault.kind == 'unit' else of}{fault}") for fault in faults if _leads(fault)]
 
 
 def _leads(fault: Fault) -> bool:
