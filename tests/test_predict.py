@@ -254,6 +254,12 @@ def test_a_joint_under_a_steady_torque_falls_as_galileo_says() -> None:
     assert place[-1] - place[0] == pytest.approx(log["theta"][-1], rel=0.02)  # its torque rises within a sample
 
 
+def test_a_joint_of_next_to_no_inertia_is_refused_and_not_waited_for() -> None:
+    log = ss.Record.of({"theta": np.sin(np.arange(400) / 20), "reference": np.sin(np.arange(400) / 20)}, fs=200)
+    with pytest.raises(ss.errors.ModelError, match=r"an inertia of 1e-12 .*stickslip joint tells"):
+        Joint(1e-12, 0.1, 0.1, 0.05, 0.05, kp=10.0).moved(log, loop=True)
+
+
 def test_friction_at_rest_holds_a_joint_longer_and_falls_within_its_speed() -> None:
     time = np.arange(2000) / 1000
     log = ss.Record.of({"theta": 0.01 * time, "force": 0.5 * time}, fs=1000, units={"force": "N m"})

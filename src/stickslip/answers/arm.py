@@ -351,6 +351,7 @@ def _torques(pinocchio: Any, model: Any, logs: dict[str, Record], fs: float) -> 
 # Steps in a second at least, and in the time in which the loop answers: of 12 joints of tests/joints.py, seeds 300 to
 # 311, the motion is then within 6e-6 rad (r.m.s.) of that of 32 times as many, a sixteenth of a count of 16 bit.
 FINEST, STEPS = 1000.0, 20.0
+FASTEST = 1e6  # steps in a second at most: a minute of a log takes some 20 s then
 MOVES = 4.0  # deviations of its speed, above which a joint surely moves where it begins
 
 
@@ -458,6 +459,12 @@ class Joint:
         kp, kd = (self.kp, self.damping) if loop else (0.0, 0.0)
         most = max(abs(self.viscous_forward), abs(self.viscous_back)) + abs(kd)
         fastest = STEPS * (math.sqrt((kp + math.hypot(self.sine, self.cosine)) / self.inertia) + most / self.inertia)
+        if fastest > FASTEST:
+            raise ModelError(
+                f"an inertia of {self.inertia:.3g} under such a gain and such friction",
+                f"a joint is followed that answers within {STEPS / FASTEST:g} s or later",
+                "look at what stickslip joint tells of its inertia",
+            )
         steps = math.ceil(max(FINEST, fastest) / fs)
         velocity = differentiate(position, fs)
         rate = np.where(np.abs(velocity.values) > MOVES * velocity.sd, velocity.values, 0.0)

@@ -367,6 +367,8 @@ def _carried(x: Array, fs: float) -> float | None:
     """The one speed at which a mass is carried along all its way, again and again, and to one side."""
     velocity = differentiate(x, fs).values
     low, high = np.quantile(velocity, [0.005, 0.995])
+    if not high > low:
+        return None
     near = CREEP * (high - low)
     counts, edges = np.histogram(velocity, np.arange(low, high + near, near))
     speed = float(edges[np.argmax(counts)] + near / 2)
