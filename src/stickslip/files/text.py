@@ -578,9 +578,8 @@ def _paired(rows: Sequence[list[str]]) -> tuple[list[str], list[str | None]]:
 def _stacked(upper: Sequence[str], lower: Sequence[str]) -> tuple[list[str], list[str | None]]:
     """Headers of one row of names, or of names over units; a unit may stand in the name's own cell."""
     named = [cell for cell in lower if cell]
-    if all(
-        is_unit(cell.rpartition("/")[2].strip()) and cell.count("/") == 1 for cell in named
-    ):  # one alone may be a path
+    # one alone may be a path; what has no slash is not asked, as units that are not known are looked up at length
+    if all(cell.count("/") == 1 and is_unit(cell.rpartition("/")[2].strip()) for cell in named):
         lower = [re.sub(r"\s*/\s*", " / ", cell) for cell in lower]
     unit_row = any(upper) and all(is_unit(_bare(cell)) for cell in named)
     names: list[str] = []
