@@ -256,7 +256,8 @@ def of_predictions(predictions: Predictions) -> Story:
     if len(parts) == 1:
         return _noted(parts[0], predictions)
     least = _listed(predictions.least)
-    what = f"{len(parts)} {'predictions' if any(part.how for part in predictions.parts) else 'records'}"
+    several = any(part.how for part in predictions.parts)  # of one log
+    what = f"{len(parts)} {'predictions' if several else 'records'}"
     headline = f"{_law(predictions)}, as it was given, follows at least {least} in each of {what}."
     first = next(iter(predictions.least))
     compared = any(part.plain for part in predictions.parts)
@@ -272,7 +273,7 @@ def of_predictions(predictions: Predictions) -> Story:
     beside = [f"{first}, Coulomb"] if compared else []
     headings = ("record", *predictions.least, *beside, "stops per cycle", "predicted")
     table = Table("Fit of each channel", headings, rows, f"{DEFINITION} {COMPARED}" if compared else DEFINITION)
-    title = f"{len(parts)} records predicted" if what.endswith("records") else what
+    title = what if several else f"{what} predicted"
     return _noted(Story(title, [headline], tables=[table], parts=parts), predictions)
 
 
