@@ -44,7 +44,7 @@ STEADY = 0.05  # of its spread that a base may stray from a straight line: a ton
 ALONE = "# a law alone: to simulate it, add [system] with its mass and stiffness, and [drive]"
 DEFINITION = (
     "Fit: 100 (1 - |y - yhat| / |y - mean y|) %, the fit of system identification: 100 % is the record itself, 0 % "
-    "no better than its mean. Nothing was fitted to it but how the motion begins and each sensor's zero."
+    "no better than its mean. Nothing was fitted to it, but of an oscillator how it begins and each sensor's zero."
 )
 LIKE_NOISE = 1.5  # times its noise, chosen: what a prediction leaves of a channel by noise alone
 COMPARED = "Coulomb: the same of one level of friction and a viscous damper, both fitted to the record itself."
