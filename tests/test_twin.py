@@ -463,6 +463,7 @@ def test_a_constant_whose_force_is_little_of_the_friction_leaves_the_numbers() -
     assert level.includes(STOPS.kinetic)
     assert not tried.trial.unlike
     assert not ss.summary(tried).remedies
+    assert not stands(estimate(tried, "static over sliding friction").status), "as small a force may pass for it"
 
 
 def test_a_mended_constant_has_the_digits_that_mend_it() -> None:

@@ -75,8 +75,11 @@ LOST = 0.3  # of x, that the nearest rig may leave: beyond, twins scatter so far
 SAME = 0.95  # of x, that is the same in every cycle, where noise is told from a misfit by that: a bin of 16 holds 0.99
 UNLIKE = 1.15  # times what noise explains, by which x may stray from its twin before that is said
 # Of the sliding friction, the force that a constant amounts to which is off by more than was stated, below which the
-# numbers stand: nobody knows a spring to a ten thousandth, and of a quiet record x asks for less.
+# numbers stand: nobody knows a spring to a ten thousandth, and of a quiet record x asks for less. Those of a part that
+# acts briefly or weakly do not, since as small a force may pass for all of it: of ten rigs with textbook bristles by
+# tests/stepped.py two told static friction 1.3 and 2.3 times as large as it is, beside a misfit of 0.3 %.
 SLIGHT = 0.01
+BRIEF = (FALL, *STATIC, GIVES)
 ASTRAY, UNFELT, RIVALS = "unlike its twins", "not felt", "another law as likely"  # kinds of doubt
 
 
@@ -530,6 +533,8 @@ def _estimate(
 ) -> Estimate:
     """The answer as tried, with a doubt where the record is not of its twins' kind."""
     doubts = [*doubts, misfit.doubt] if misfit.doubt else doubts
+    if misfit.doubt and misfit.doubt.lesser and quick.name in BRIEF:
+        doubts = [*doubts, Doubt("as small a force may pass for it", ASTRAY)]
     sd = (interval[1] - interval[0]) / (2 * NORMAL_95)
     return Estimate(quick.name, value, interval, sd, quick.unit, method, Status(*doubts), checks or quick.checks)
 
