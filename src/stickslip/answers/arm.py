@@ -19,7 +19,7 @@ from stickslip.cycle.joint import JointFriction
 from stickslip.cycle.joint_fit import LOOP, is_late
 from stickslip.cycle.joint_slides import sliding
 from stickslip.errors import ABSENT, ModelError, RecordError, package
-from stickslip.estimate import Estimate
+from stickslip.estimate import Estimate, doubts_of
 from stickslip.files.expression import split_gain
 from stickslip.files.select import split_name
 from stickslip.record.channels import VOCABULARY, Channel
@@ -352,6 +352,10 @@ def _torques(pinocchio: Any, model: Any, logs: dict[str, Record], fs: float) -> 
 # 311, the motion is then within 6e-6 rad (r.m.s.) of that of 32 times as many, a sixteenth of a count of 16 bit.
 FINEST, STEPS = 1000.0, 20.0
 FASTEST = 1e6  # steps in a second at most: a minute of a log takes some 20 s then
+# What a log tells of a joint that moves it.
+PARTS = (
+    "inertia", "forward", "back", "viscous_forward", "viscous_back", "load", "sine", "cosine", "damping"
+)  # fmt: skip
 MOVES = 4.0  # deviations of its speed, above which a joint surely moves where it begins
 
 
@@ -375,6 +379,8 @@ class Joint:
         By how much a measured torque comes later than the position.
     axis : str
         Which of a log of several.
+    doubtful : tuple of str
+        Quantities that its log told with a doubt.
     """
 
     inertia: float
@@ -396,15 +402,17 @@ class Joint:
     torque_constant: float = 0.0
     delay: float = 0.0
     axis: str = ""
+    doubtful: tuple[str, ...] = ()
 
     @classmethod
     def of(cls, joint: JointFriction, axis: str) -> Self:
         """That of a regression."""
         stated = {name: constant.value for name, constant in joint.stated.items()}
-        pulls = {name: _known(getattr(joint, name)) for name in ("load", "sine", "cosine")}
-        ways = {
-            f"viscous_{way}": _known(getattr(joint, f"viscous_{way}") or joint.viscous) for way in ("forward", "back")
-        }
+        told = {name: getattr(joint, name) for name in PARTS}
+        told |= {name: told[name] or joint.viscous for name in ("viscous_forward", "viscous_back")}
+        # all together as they fit the log: each cut where it can not be, they would move as nothing in it did
+        numbers = {name: joint.moving.get(name, _known(estimate)) for name, estimate in told.items()}
+        doubted = [estimate for estimate in told.values() if estimate is not None and doubts_of(estimate.status)]
         falls = {}
         if joint.static is not None and joint.stribeck_speed is not None and joint.exponent is not None:
             excess = max(joint.static.value - joint.level.value, 0.0)
@@ -413,21 +421,22 @@ class Joint:
         if "kd" in stated:  # a late controller damps less
             damping = stated["kd"] - kp * (late if loop and late else LOOP[0])
         else:
-            kp, damping = (kp, _known(joint.damping)) if loop else (0.0, 0.0)
+            kp, damping = (kp, numbers["damping"]) if loop else (0.0, 0.0)
         surely = not loop and joint.delay is not None and is_late(joint.delay)
-        rubs = {"forward": joint.forward.value, "back": joint.back.value}
         constant = stated.get("torque_constant", 0.0)
         loop_of = {"kp": kp, "damping": damping, "torque_constant": constant, "delay": late if surely else 0.0}
         teeth = {"cogging": _known(joint.cogging), "waves": joint.waves[0], "phase": joint.waves[1]}
-        numbers = {"inertia": joint.inertia.value, **rubs, **ways, **pulls, **teeth, **falls, **loop_of}
-        return cls(**{name: float(value) for name, value in numbers.items()}, axis=axis)
+        numbers |= {**teeth, **falls, **loop_of}
+        doubtful = tuple(dict.fromkeys(estimate.name for estimate in doubted))
+        return cls(**{name: float(value) for name, value in numbers.items()}, axis=axis, doubtful=doubtful)
 
     @classmethod
     def read(cls, values: Mapping[str, Any]) -> Self:
         """That of a file."""
         try:
-            joint = cls(**values)
-            right = all(np.isfinite(value) for name, value in vars(joint).items() if name != "axis")
+            joint = cls(**{**values, "doubtful": tuple(values.get("doubtful", ()))})
+            words = ("axis", "doubtful")
+            right = all(np.isfinite(value) for name, value in vars(joint).items() if name not in words)
         except TypeError as error:
             raise ModelError(f"[joint]: {error}", "it holds what stickslip joint writes", "write it anew") from error
         if not (right and joint.inertia > 0):

@@ -23,6 +23,7 @@ from stickslip.cycle.joint_fit import (
     coefficient,
     cogged,
     damped,
+    feasible,
     fitted,
     joint_data,
     punctual,
@@ -118,6 +119,9 @@ class JointFriction(Result):
         surely there.
     waves : (float, float)
         How often it does in a radian, and its phase [rad].
+    moving : mapping of str to float
+        What the numbers are all together where none is below zero, by which the joint can be moved: each by itself may
+        lie beyond what the others allow. Empty where they are as told.
     """
 
     level: Estimate
@@ -154,6 +158,7 @@ class JointFriction(Result):
     stated: Mapping[str, Estimate] = field(default_factory=dict)
     cogging: Estimate | None = None
     waves: tuple[float, float] = (0.0, 0.0)
+    moving: Mapping[str, float] = field(default_factory=dict)
 
     def cogs(self, position: Array) -> Array:
         """The torque [N m] that goes up and down along the way, at positions."""
@@ -358,6 +363,7 @@ def _answer(
         known["load"] = known["load"].within(0.0)
     forward, back = tell.ways()
     level = _level(tell, pull, known.get("load"))
+    moving = feasible(data, terms) if fall is None else {}
     ways: list[Estimate | None] = [None, None]
     if "uneven" in terms:
         ways = [tell.sum({"viscous": 1, "uneven": by}, f"viscous friction {way}") for by, way in WAYS]
@@ -387,6 +393,7 @@ def _answer(
         source=data.source,
         stated=data.stated,
         status=status,
+        moving=moving,
         **_rows(record, data, fit, terms, pull, inertia.value, damped),
         **_stribeck(tell, fall, pull, known.get("load")),
         **_cogging(tell),

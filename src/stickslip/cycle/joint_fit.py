@@ -85,6 +85,7 @@ HELD = (0.0, 5e-4)
 LOOP = (1e-3, 2e-3)  # s, delay of a controller, and how that varies, chosen: it holds its output for 0.2 to 10 ms
 # left out in this order where the motion can not tell all of them apart
 OPTIONAL: tuple[tuple[str, ...], ...] = (WARM, ("load",), ("sine", "cosine"))
+RESISTING = ("inertia", "forward", "back", "viscous_forward", "viscous_back", "load")  # never below zero
 
 
 Fitted = tuple[LeastSquares, tuple[str, ...], tuple[float, float]]  # with its terms and gravity's sine and cosine part
@@ -520,6 +521,24 @@ def separable(data: JointData) -> tuple[LeastSquares, tuple[str, ...], tuple[flo
             terms = tuple(term for term in terms if term not in optional)
             left_out.append(f"{' and '.join(WORDS[term] for term in optional)}: {ADVICE[optional[0]]}")
     raise _inseparable(data, terms)
+
+
+def feasible(data: JointData, terms: tuple[str, ...]) -> dict[str, float]:
+    """Coefficients of a balance in which no friction drives: if need be without a load part, and alike both ways."""
+    bare = tuple(term for term in terms if term != "load")
+    alike = tuple("coulomb" if term == "forward" else term for term in bare if term not in ("back", "uneven"))
+    for some in dict.fromkeys((terms, bare, alike)):
+        try:
+            fit, _ = about_load(data, some)
+        except EstimateError:
+            continue
+        values = {"load": 0.0, **dict(zip(some, map(float, fit.coefficients), strict=True))}
+        both, uneven = values.pop("coulomb", 0.0), values.pop("uneven", 0.0)
+        values = {"forward": both, "back": both, **values}
+        values |= {f"viscous_{way}": values["viscous"] + by * uneven for way, by in (("forward", 1), ("back", -1))}
+        if all(value >= 0 for name, value in values.items() if name in RESISTING):
+            return values
+    return {}
 
 
 def about_load(data: JointData, terms: tuple[str, ...]) -> tuple[LeastSquares, tuple[float, float]]:

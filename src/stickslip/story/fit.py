@@ -10,6 +10,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
+from stickslip.answers.arm import Joint
 from stickslip.answers.findings import Findings, record_name
 from stickslip.answers.fits import Prediction, Predictions
 from stickslip.arrays import Array
@@ -278,7 +279,11 @@ def of_predictions(predictions: Predictions) -> Story:
 
 
 def _noted(story: Story, predictions: Predictions) -> Story:
-    return replace(story, notes=[*story.notes, *predictions.notes], data=predictions.to_dict)
+    moved = predictions.oscillator
+    doubtful = moved.doubtful if isinstance(moved, Joint) else ()
+    cautions = [f"The log that told this joint leaves doubtful: {', '.join(doubtful)}."] if doubtful else []
+    notes = [*story.notes, *predictions.notes]
+    return replace(story, cautions=[*story.cautions, *cautions], notes=notes, data=predictions.to_dict)
 
 
 def _of_one(part: Prediction, law: str) -> Story:
