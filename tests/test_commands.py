@@ -56,12 +56,14 @@ def test_stability_names_what_feeds_the_vibration() -> None:
 
 
 @pytest.mark.figures
-def test_a_bifurcation_has_its_changes_where_python_has_them() -> None:
-    words = ("bifurcation", "DH-3 b=0.5 r=0.8", "law.kinetic", "--from", "200 mN", "--to", "0.8", "--steps", "4")
+@pytest.mark.parametrize("case", ["DH-1 b=0.6", pytest.param("DH-3 b=0.5 r=0.8", marks=pytest.mark.soak)])
+def test_a_bifurcation_has_its_changes_where_python_has_them(case: str) -> None:
+    """Between two periodic motions; the longer way goes through one that is not periodic."""
+    words = ("bifurcation", case, "law.kinetic", "--from", "200 mN", "--to", "0.8", "--steps", "4")
     text = ask(*words, "--output", "out").stdout
     data = json.loads(Path("out/results.json").read_text("utf-8"))
-    system = ss.scenarios.get("DH-3 b=0.5 r=0.8").system
-    diagram = ss.bifurcation(system, "law.kinetic", values=np.linspace(0.2, 0.8, 4))
+    diagram = ss.bifurcation(ss.scenarios.get(case).system, "law.kinetic", values=np.linspace(0.2, 0.8, 4))
+    assert diagram.changes
     assert [each["value"] for each in data["changes"]] == pytest.approx([change.value for change in diagram.changes])
     assert "the motion changes its kind" in text
     assert "no stops" in text

@@ -8,7 +8,7 @@ import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
-from functools import partial
+from functools import lru_cache, partial
 from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -96,6 +96,7 @@ def render(stories: Sequence[Story], wording: Callable[[str], str] = str) -> str
     return templates(wording=wording).get_template(TEMPLATE).render(stories=stories, version=__version__)
 
 
+@lru_cache(maxsize=8)  # read and compiled once: a tenth of a second each time, of many records for each page
 def templates(*folders: Path, wording: Callable[[str], str] = str) -> Environment:
     """The page's template and those of other folders that extend it, with the filters that they use."""
     from jinja2 import ChoiceLoader, Environment, FileSystemLoader, PackageLoader, StrictUndefined
