@@ -203,16 +203,24 @@ class _Fit:
         _slide(place, give, share)
         return self.behind(share)
 
+    @cached_property
+    def mount(self) -> tuple[Array, Array]:
+        """The load cell's, from sample to sample: asked for thousands of times in a search, it took half of it."""
+        from scipy import signal
+
+        assert self.channel.mount is not None
+        discrete: Any = signal.cont2discrete
+        w, ratio = 2 * math.pi * self.channel.mount[0], self.channel.mount[1]
+        top, bottom, _ = discrete(([w * w], [1.0, 2 * ratio * w, w * w]), 1 / self.fs, method="foh")
+        return np.ravel(top), bottom
+
     def behind(self, values: Array) -> Array:
         """Through the mount of the load cell."""
         if self.channel.mount is None:
             return values
         from scipy import signal
 
-        discrete: Any = signal.cont2discrete
-        w, ratio = 2 * math.pi * self.channel.mount[0], self.channel.mount[1]
-        top, bottom, _ = discrete(([w * w], [1.0, 2 * ratio * w, w * w]), 1 / self.fs, method="foh")
-        return np.asarray(signal.lfilter(np.ravel(top), bottom, values))
+        return np.asarray(signal.lfilter(*self.mount, values))
 
     def design(self, lag: float, give: float, place: Array | None = None) -> Array:
         """Columns: the element, its level, and the inertia of what lies on a load cell."""
