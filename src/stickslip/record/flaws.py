@@ -159,6 +159,10 @@ def frozen(values: Array, shortest: int = 5) -> Runs:
 def _is_frozen(values: Array, still: Mask, run: tuple[int, int], step: float, span: float) -> bool:
     first, last = run
     length = last - first + 1
+    repeats = np.concatenate([still[max(0, first - 40) : first], still[last + 1 : last + 41]])
+    chance = len(values) * float((np.sum(repeats) + 1) / (len(repeats) + 2)) ** (length - 1)
+    if chance > 1e-3:  # as of most runs where a sensor's counts are coarse
+        return False
     reach = max(8, min(length, 40))
     before, after = (np.abs(np.diff(side)) for side in (values[:first][-reach - 1 :], values[last + 1 :][: reach + 1]))
     if len(before) < 8 or len(after) < 8:
@@ -168,10 +172,6 @@ def _is_frozen(values: Array, still: Mask, run: tuple[int, int], step: float, sp
     moving = min(float(np.mean(before)), float(np.mean(after))) > EXACT * span
     moving &= abs(float(values[first])) > EXACT * span  # the acceleration of a stuck mass is zero, until it is not
     made_up = 0.4 * length * float(np.median(after[:5]))
-    repeats = np.concatenate([still[max(0, first - 40) : first], still[last + 1 : last + 41]])
-    chance = len(values) * float((np.sum(repeats) + 1) / (len(repeats) + 2)) ** (length - 1)
-    if chance > 1e-3:
-        return False
     if moving and jump > 5 * step and (jump > 3 * nearest or (jump > made_up and jump > 2.5 * float(np.max(after)))):
         return True
     sides = [values[max(0, first - 40) : first], values[last + 1 : last + 41]]
