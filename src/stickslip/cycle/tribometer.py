@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -26,6 +26,11 @@ SHORTEST = 2.0  # cycles that a wear-in lasts at least: shorter it is one odd va
 TIMES = 60  # tried
 SETTLED = 5.0  # times its length, after which 0.7 % of a wear-in are left
 WEARING = "wearing"  # kind of doubt: the coefficient still changes
+# Twice the logarithm by which a line must be likelier: of 12,000 even series, alike by 0 to 1, none came to 25.
+LIKELIER = 30.0
+ALIKENESS = np.linspace(0.0, 1.0, 21)  # of neighbours, tried
+ENDING = 0.1  # of the cycles, chosen: the first and the last, between which a change is told
+SLIGHT, LASTS = 1e-3, 0.05  # of the mean, chosen: a change that is worth a word, and one that no state outlasts
 DEFINITIONS = {  # of the coefficient, beside what each is of a cycle
     "plateau": "median while it slides, weighed by the way",
     "by_stroke": "mean of a whole stroke forward less that of one back, half of it",
@@ -92,6 +97,9 @@ class Coefficients(Result):
         Whether the load was measured, or stated.
     steady : int
         The first cycle of those that the means are of.
+    first, last : Estimate or None
+        Of a coefficient that surely rises or falls along the test: the plateau of the first tenth and of the last of
+        these cycles, eight at least; None of an even one.
     status : str
         "ok", or in words what to beware of.
     """
@@ -111,6 +119,8 @@ class Coefficients(Result):
     unit: str
     measured: bool
     steady: int
+    first: Estimate | None
+    last: Estimate | None
     status: str
 
 
@@ -126,12 +136,15 @@ def friction_coefficients(
     * by stroke: :math:`(\bar f_\text{forward} - \bar f_\text{back}) / 2N`, means of whole strokes, so that an offset of
       the force is not in it, and a rounded corner at the reversal is;
     * by cycle: :math:`\overline{|f|} / N` of all samples, where an offset stays (ASTM G133 asks for a mean like this);
-    * by energy: :math:`\oint f\,dx / (N \oint |dx|)` (Fouvry, Kapsa and Vincent, Wear 1995).
+    * by energy: :math:`\oint f\,dx / (N \oint |dx|)` (Fouvry, Kapsa and Vincent, Wear 1995), the way by the sign of
+      the smoothed velocity, so that noise of x is no way.
 
     Each is the mean of the cycles, its interval Student's t on the scatter between them, which knows that neighbours
     are alike, and on what the load and the force's gain are known to. A wear-in is
     ``final + change exp(-n / cycles)``, by least squares over the plateaus; it is told where an even coefficient would
-    not look so, and then the definitions are of the cycles after five times its length, where eight remain.
+    not look so, and then the definitions are of the cycles after five times its length, where eight remain. A
+    coefficient that rises or falls along these is told where a line is surely likelier than an even one whose
+    neighbours are alike, up to a random walk; the intervals are then of the scatter about lines.
 
     Parameters
     ----------
@@ -190,14 +203,18 @@ def friction_coefficients(
     of_cycles = {name: values / loads for name, values in forces.items()}
     wear_in = fit_wear_in(of_cycles["plateau"])
     steady = _steady(wear_in, len(loads))
-    status = Status(*_doubts(wear_in, steady, len(loads)), *([cycles.status] if cycles.status != "ok" else []))
     relative = math.hypot(record.channels["friction"].gain_sd, load.sd / load.value)
+    ends = _ends(of_cycles["plateau"], wear_in, steady, relative)
+    status = Status(*_doubts(wear_in, steady, len(loads), ends), *([cycles.status] if cycles.status != "ok" else []))
     if wear_in is not None:
         wear_in = replace(wear_in, final=wear_in.final.widened(relative), change=wear_in.change.widened(relative))
-    coefficients = {
-        name: _beside(mean_of_cycles(_called(name), of_cycles[name][steady:], unit="1", method=how), relative, status)
-        for name, how in DEFINITIONS.items()
-    }
+    coefficients = {}
+    for name, how in DEFINITIONS.items():
+        values = of_cycles[name][steady:]
+        scatter = values if ends is None else _without_slope(values)
+        mean = mean_of_cycles(_called(name), scatter, unit="1", method=how)
+        beside = math.hypot(relative, _unsure_work(friction, motion) if name == "by_energy" else 0.0)
+        coefficients[name] = _beside(mean, beside, status)
     coefficients["plateau"] = _as_far_as_it_slides(coefficients["plateau"], levels.share)
     position, cycle, forward, back = _map(even, motion, label, loads)
     return Coefficients(
@@ -213,6 +230,8 @@ def friction_coefficients(
         unit=motion.unit,
         measured=load.method != "stated",
         steady=steady,
+        first=None if ends is None else ends[0],
+        last=None if ends is None else ends[1],
         status=status,
     )
 
@@ -266,13 +285,26 @@ def _forces(friction: Array, motion: Motion, cycles: Cycles, label: Rows) -> dic
         stroke = (label >= 0) & (sign * motion.velocity > 0)
         means.append(np.bincount(label[stroke], friction[stroke], count) / np.bincount(label[stroke], minlength=count))
     way, middle = np.diff(motion.displacement), (friction[1:] + friction[:-1]) / 2
-    work, length = (np.concatenate([[0.0], np.cumsum(steps)]) for steps in (middle * way, np.abs(way)))
+    # to and fro with the smoothed velocity: noise of the position is no way, however many samples there are
+    along = way * np.sign(motion.velocity[1:] + motion.velocity[:-1])
+    work, length = (np.concatenate([[0.0], np.cumsum(steps)]) for steps in (middle * way, along))
     at = np.arange(len(work))
     per_cycle = [np.diff(np.interp(cycles.edges, at, values)) for values in (work, length)]
     return {
         "by_stroke": (means[0] - means[1]) / 2,
         "by_energy": per_cycle[0] / per_cycle[1],
     }
+
+
+def _unsure_work(friction: Array, motion: Motion) -> float:
+    """Standard deviation of the work, relatively: where between two samples the friction turns round nobody knows.
+
+    Two of it are the most that this can be: of a test whose samples lie at its turns it is that in every cycle.
+    """
+    way, change = np.diff(motion.displacement), np.diff(friction)
+    middle = (friction[1:] + friction[:-1]) / 2
+    turns = friction[1:] * friction[:-1] < 0
+    return float(np.sum(np.abs(change * way)[turns]) / 4 / np.sum(np.abs(middle * way)))
 
 
 def _mean_magnitudes(friction: Array, label: Rows) -> Array:
@@ -464,11 +496,64 @@ def _steady(wear_in: WearIn | None, count: int) -> int:
     return after if count - after >= FEW_CYCLES else 0
 
 
-def _doubts(wear_in: WearIn | None, steady: int, count: int) -> list[Doubt]:
-    if wear_in is None or steady:
-        return []
-    doubt = f"it is still wearing in after {count} cycles: the mean is not of a state that lasts"
-    return [Doubt(doubt, WEARING)]
+def changes(values: Array) -> bool:
+    """Whether a coefficient surely rises or falls along its cycles: a line is likelier than an even one.
+
+    Neighbours are alike as is likeliest for either (an autoregression of first order), up to a random walk, which seems
+    to rise by itself.
+
+    Examples
+    --------
+    >>> noise = np.random.default_rng(0).normal(0, 0.01, 400)
+    >>> changes(0.3 + noise), changes(0.3 + np.cumsum(noise)), changes(0.3 + 1e-4 * np.arange(400) + noise)
+    (False, False, True)
+    """
+    present = values[np.isfinite(values)]
+    if len(present) < FEWEST:
+        return False
+    line = np.vander(np.arange(len(present)), 2, increasing=True)
+    least = []
+    for design in (line[:, :1], line):
+        left = []
+        for alike in ALIKENESS:
+            told, shape = (one[1:] - alike * one[:-1] for one in (present, design))
+            left.append(float(np.sum((told - shape @ np.linalg.lstsq(shape, told, rcond=None)[0]) ** 2)))
+        least.append(min(left))
+    return least[0] > least[1] * math.exp(LIKELIER / (len(present) - 1))
+
+
+def _ends(values: Array, wear_in: WearIn | None, steady: int, relative: float) -> tuple[Estimate, Estimate] | None:
+    """The coefficient of the first cycles and of the last; None where it is even, or still wears in."""
+    if wear_in is not None:
+        values = values - wear_in.fitted + wear_in.final.value if steady else values[:0]
+    values = values[steady:]
+    if not changes(values):
+        return None
+    some = max(FEW_CYCLES, round(ENDING * len(values)))
+    ends = [
+        mean_of_cycles(
+            _called(f"{name} cycles"), _without_slope(part), unit="1", method=f"mean of the {name} {some} cycles"
+        )
+        for name, part in (("first", values[:some]), ("last", values[-some:]))
+    ]
+    slight = abs(ends[1].value - ends[0].value) < SLIGHT * ends[0].value
+    return None if slight else (ends[0].widened(relative), ends[1].widened(relative))
+
+
+def _without_slope(values: Array) -> Array:
+    """What scatters about a line over the cycles, about its mean."""
+    from scipy.signal import detrend
+
+    present = values[np.isfinite(values)]
+    return np.asarray(detrend(present) + present.mean())
+
+
+def _doubts(wear_in: WearIn | None, steady: int, count: int, ends: tuple[Estimate, Estimate] | None) -> Iterator[Doubt]:
+    rest = "the mean is not of a state that lasts"
+    if wear_in is not None and not steady:
+        yield Doubt(f"it is still wearing in after {count} cycles: {rest}", WEARING)
+    if ends is not None and abs(ends[1].value - ends[0].value) > LASTS * max(end.value for end in ends):
+        yield Doubt(f"it changes along the test: {rest}", WEARING)
 
 
 def _map(friction: Array, motion: Motion, label: Rows, loads: Array) -> tuple[Array, Array, Array, Array]:

@@ -66,6 +66,10 @@ def _of_one_test(findings: Findings) -> Iterator[str]:
         )
     else:
         yield f"No kinetic coefficient of friction is told: {plateau.status}."
+    first, last = tribometer.first, tribometer.last
+    if first is not None and last is not None:
+        way = "rises" if last.value > first.value else "falls"
+        yield f"It {way} along the test, from {value_of(first)} in its first cycles to {value_of(last)} in its last."
     others = [getattr(tribometer, name) for name in DEFINITIONS if name != "plateau"]
     if any(abs(one.value - plateau.value) > APART * plateau.value for one in others if one.known):
         rest = ", ".join(f"{value_of(one)} {one.name.rpartition(', ')[2]}" for one in others if one.known)
