@@ -243,7 +243,7 @@ def test_blocks_that_were_asked_are_not_kept() -> None:
     time = np.arange(4000) / 500
 
     def blocks() -> Iterator[ss.Record]:
-        for seed in range(6):
+        for seed in range(4):
             friction = np.sign(np.cos(6 * time)) + np.random.default_rng(seed).normal(0, 0.01, time.size)
             block = ss.Record.of({"x": np.sin(6 * time), "friction": friction}, fs=500)
             gc.collect()

@@ -68,7 +68,7 @@ def test_the_friction_alone_tells_it_less_surely() -> None:
     assert "mount is not stated" in ss.contact.lag_or_compliance(bare.with_details("load", mount=None)).status
 
 
-@pytest.mark.parametrize("frequency", [2.5, 5.61, 8.7])
+@pytest.mark.parametrize("frequency", [2.5, pytest.param(5.61, marks=pytest.mark.soak), 8.7])
 def test_stiffness_and_give_hold_the_truth(frequency: float) -> None:
     """By the fitted contact where friction was found by the balance of forces, else as far as a damper leaves it."""
     give = CASES[frequency][1] / 192000

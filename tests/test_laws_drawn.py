@@ -20,7 +20,7 @@ def laws() -> ModuleType:
     ("truth", "tried"),
     [
         ("Coulomb", ["Coulomb", "static"]),
-        ("static", ["Coulomb", "static"]),
+        pytest.param("static", ["Coulomb", "static"], marks=pytest.mark.soak),  # of one family with the first
         ("Stribeck", ["Coulomb", "Stribeck"]),
         ("CompliantContact", ["static", "compliant"]),
     ],
