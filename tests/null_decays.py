@@ -1,4 +1,4 @@
-"""Free decays without any dry friction, closed form, seen by sensors that are not clean; and on a cubic spring."""
+"""Free decays without any dry friction, closed form, seen by sensors that are not clean; and of other motions."""
 
 from __future__ import annotations
 
@@ -52,20 +52,26 @@ def let_go(t: Array, w: float, zeta: float, dry: float, rise: float = 0.0) -> Ar
     return x
 
 
-def on_a_cubic_spring(t: Array, w: float, zeta: float, dry: float, cubic: float) -> Array:
-    """From one on a spring ``x + cubic x^3``, half cycle by half cycle, by scipy's eighth-order rule."""
+def on_a_cubic_spring(
+    t: Array, w: float, zeta: float, dry: float, cubic: float = 0.0, *, air: float = 0.0, rise: float = 0.0
+) -> Array:
+    """From one on a spring ``x + cubic x^3``, half cycle by half cycle, by scipy's eighth-order rule.
+
+    A drag `air` v^2 may slow it too, and its dry friction `rise` towards rest, on a bell curve of a tenth of w.
+    """
     x, begin, at = np.ones(len(t)), 0.0, 1.0
 
     def turning(_: float, state: Array) -> float:
         return float(state[1])
 
     turning.terminal = True  # type: ignore[attr-defined]
-    while begin <= t[-1] and abs(at + cubic * at**3) > dry:
+    while begin <= t[-1] and abs(at + cubic * at**3) > dry * (1 + rise):
         side = math.copysign(1.0, at)
 
         def rates(_: float, state: Array, side: float = side) -> list[float]:
             u, v = state
-            return [v, -w * w * (u + cubic * u**3 - side * dry) - 2 * zeta * w * v]
+            rubbing = side * dry * (1 + rise * math.exp(-((10 * v / w) ** 2)))
+            return [v, -w * w * (u + cubic * u**3 - rubbing) - 2 * zeta * w * v - air * v * abs(v)]
 
         turning.direction = side  # type: ignore[attr-defined]
         span, begun = (begin, begin + 4 * math.pi / w), [at, -1e-12 * side * w]

@@ -428,3 +428,42 @@ def test_the_release_is_told_by_one_number_everywhere():
         assert begin.name == words[1]
         assert f"at {value_of(begin)}" in sentence
         assert f"from {value_of(far, abs(far.value))}" in sentence
+
+
+def let_go_of(**motion):
+    """Answer and headline of a release from 50 mm of a mass of 1 kg on 100 N/m, seen with a micrometre of noise."""
+    t = np.arange(3500) / 100 - 0.5
+    x = 0.05 * on_a_cubic_spring(np.maximum(t, 0.0), 10.0, **motion)
+    noisy = x + 1e-6 * np.random.default_rng(2).standard_normal(len(x))
+    findings = ss.analyze_decay(ss.Record.of({"x": noisy}, fs=100), stiffness=100.0)
+    return findings, " ".join(ss.summary(findings).headline)
+
+
+@pytest.mark.parametrize("more", [{"air": 0.02}, {"cubic": 0.04}])
+def test_begin_and_rest_are_those_of_the_motion_that_is_named(more):
+    """Those of the rejected fit stood there: 44.6 mm of 50.0 mm, and a rest position that drifts."""
+    findings, headline = let_go_of(zeta=0.004, dry=0.008, **more)
+    decay = findings.decay
+    assert decay.best is decay.motion
+    rows = {estimate.name: estimate for estimate in decay.quoted}
+    truth = {"amplitude at release": 0.05, "release time": 0.5, "rest position": 0.0}
+    for name, value in truth.items():
+        assert abs(rows[name].value - value) < 4 * rows[name].sd
+        assert stands(rows[name].status)
+    assert rows["static friction displacement"].includes(0.05 * 0.008)
+    assert "from 50.0" in headline
+    assert "drifts" not in headline
+
+
+def test_where_no_motion_fits_the_nearest_tells_the_course():
+    """A rejected fit's bracket stood sure, and far off; its force stood beside the displacement of whichever motion."""
+    findings, headline = let_go_of(zeta=0.004, dry=0.006, rise=0.5)
+    decay = findings.decay
+    assert decay.denied
+    assert not stands(decay.waveform.static_displacement.status)
+    rows = {estimate.name: estimate for estimate in decay.quoted}
+    assert rows["static friction displacement"].includes(0.05 * 0.009)
+    assert rows["dry friction force"].interval == pytest.approx([100 * end for end in decay.whichever[1].interval])
+    assert rows["amplitude at release"].value == pytest.approx(0.05, rel=1e-3)
+    assert "dry friction displacement" not in rows
+    assert "drifts" not in headline

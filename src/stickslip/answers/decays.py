@@ -39,6 +39,7 @@ OLDER: dict[str, Callable[..., EnvelopeDecay]] = {
     "Hilbert envelope": hilbert_decay,
 }  # fmt: skip
 FOR_PENDULUMS = {EXTREMES: partial(extreme_decay, restoring="pendulum")}
+COURSE = ("frequency", "static_displacement", "bias", "release_time", "amplitude")
 SHARED = ("damping_ratio", "dry_displacement", "frequency")
 OF_ALL_AT_ONCE = (*SHARED, "static_displacement", "damping_ratio_any", "dry_displacement_any")
 ASKED = ("channel", "restoring", "mass", "stiffness")
@@ -115,11 +116,17 @@ class Decay(Result):
         return max((candidate.p_value for candidate in tried if candidate.name in PLAIN), default=1.0)
 
     @property
+    def course(self) -> DecayFit | DecayMotion | None:
+        """What followed the record best: it tells when and from where it swings, and where it rests.
+
+        Viscous and dry friction, but of a record that speaks against them the motion that was chosen.
+        """
+        return self.motion if self.waveform is None or self.against < CLEAR else self.waveform
+
+    @property
     def rest(self) -> float:
         """Where the spring is at rest, in the record's zero."""
-        if self.motion is not None and self.best is self.motion:
-            return self.motion.choice.chosen.fitted.value("rest")
-        rest = next((answer.bias.value for answer in (self.waveform, self.thesis) if answer is not None), None)
+        rest = next((answer.bias.value for answer in (self.course, self.thesis) if answer is not None), None)
         return self.releases.ring_downs[0].rest if rest is None else rest
 
     @property
@@ -141,7 +148,7 @@ class Decay(Result):
     @property
     def dry_force(self) -> Estimate | None:
         """The dry friction as a force, where the mass or the stiffness is stated."""
-        dry = self.best.dry_displacement
+        dry = self.whichever[1] if self.denied and self.whichever else self.best.dry_displacement
         return None if dry.interval == (0.0, 0.0) else self.as_force(dry, "dry friction force")
 
     def as_force(self, displacement: Estimate, name: str) -> Estimate | None:
@@ -203,8 +210,9 @@ class Decay(Result):
         """The best answer's numbers, each once: of whichever motion, where its own hang on what is not shown."""
         force = self.dry_force
         quoted = [] if force is None or self.undecided else [force]
-        if self.motion is not None and self.best is self.motion:
-            quoted += [*self.motion.terms, self.motion.frequency, *self.whichever]
+        if self.motion is not None and self.course is self.motion:
+            terms = self.motion.terms if self.best is self.motion else ()
+            quoted += [*terms, *(getattr(self.motion, name) for name in COURSE), *self.whichever]
         elif self.waveform is None:
             quoted += self.best.estimates
         else:
@@ -229,9 +237,9 @@ class Decay(Result):
         """What is not quoted of the motion's numbers and those of whichever motion it was, where there are both."""
         if not self.whichever or self.best is self.thesis:
             return ()
-        if self.undecided:
+        if self.undecided or self.denied:
             return self.best.damping_ratio, self.best.dry_displacement
-        return (self.best.damping_ratio if self.denied else self.whichever[0],)
+        return (self.whichever[0],)
 
     @property
     def comparisons(self) -> tuple[Estimate, ...]:

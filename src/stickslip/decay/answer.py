@@ -17,20 +17,27 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from stickslip.arrays import Array
-from stickslip.decay.candidates import ALWAYS, Fitted
+from stickslip.decay.candidates import ALWAYS
 from stickslip.decay.choice import COLOURED, Candidate, lack_of_fit
-from stickslip.decay.motions import Restoring, free_decay
+from stickslip.decay.motions import Restoring
 from stickslip.decay.noise import LOOSE, Noise, Objective, extreme, minimise, solve
 from stickslip.decay.profile import last_swing
 from stickslip.decay.release import RingDown
 from stickslip.decay.waveform import Blocks
-from stickslip.decay.which_motion import SWING, DecayMotion, choice_of, status_of, whichever
+from stickslip.decay.which_motion import (
+    SWING,
+    DecayMotion,
+    beginning,
+    choice_of,
+    static_between,
+    status_of,
+    whichever,
+)
 from stickslip.errors import EstimateError
 from stickslip.estimate import Constant, Estimate, Result
 from stickslip.record.record import Step
 
 BEYOND = f"swings beyond {SWING:g} rad are left out"
-SURE = 3.0  # standard deviations of the noise by which a bracket is widened
 
 SHARED = 3
 FEWEST = 8.0  # degrees of freedom of counts or a drift that tell little: of 400 intervals 3 held 99 %, 5 98.5 %, 8 96 %
@@ -122,11 +129,6 @@ class DecayFit(Result):
         return tuple(m - f for m, f in zip(self.measured, self.fitted, strict=True))
 
 
-def beginning(released: bool) -> tuple[str, str]:
-    """What the time and the amplitude are called where a fit begins."""
-    return ("release time", "amplitude at release") if released else ("time of the first turn", "first amplitude")
-
-
 def rig_units(channel: str) -> dict[str, str]:
     """Units of mass and stiffness: of an angle those of a moment of inertia, and of a torque over the angle."""
     return {"mass": "kg m^2", "stiffness": "N m/rad"} if channel == "theta" else {"mass": "kg", "stiffness": "N/m"}
@@ -206,7 +208,7 @@ def fit_pendulum(
         bias=estimate("rest", "rest position", "rad"),
         release_time=estimate("release", begins, "s", offset=zero),
         amplitude=estimate("amplitude", far, "rad"),
-        static_displacement=_static(chosen, ring_down),
+        static_displacement=static_between(chosen, ring_down),
         dry_force=None if spring is None else dry.scaled(spring, "N m", "dry friction"),
         damping_ratio_any=whichever(choices, damping, "damping_ratio") if choices else None,
         dry_displacement_any=whichever(choices, dry, "dry_displacement") if choices else None,
@@ -214,7 +216,7 @@ def fit_pendulum(
         alternatives=(((fitted.half_cycles,), 1.0),),
         model=model,
         noise=kind,
-        noise_level=_level(chosen),
+        noise_level=chosen.level,
         channel=ring_down.channel,
         ring_downs=(ring_down,),
         time=(zero + blocks.times,),
@@ -232,10 +234,8 @@ def _estimator(chosen: Candidate, status: str, noise: str) -> Callable[..., Esti
     method, checks = f"whole waveform, spring sin x, noise {noise}", (f"{chosen.fitted.half_cycles} half cycles",)
 
     def estimate(parameter: str, name: str, unit: str, factor: float = 1.0, offset: float = 0.0) -> Estimate:
-        plain = chosen.estimate(parameter, name=name, unit=unit, factor=factor)
-        low, high = plain.interval
-        value, interval = plain.value + offset, (low + offset, high + offset)
-        return replace(plain, value=value, interval=interval, status=status, method=method, checks=checks)
+        plain = chosen.estimate(parameter, name=name, unit=unit, factor=factor, offset=offset)
+        return replace(plain, status=status, method=method, checks=checks)
 
     return estimate
 
@@ -249,32 +249,6 @@ def _only(ring_downs: list[RingDown], noise: str | None) -> RingDown:
     if noise is not None:
         raise EstimateError(f"noise = '{noise}'", "a pendulum's is told from its residual", "leave noise= out")
     return ring_downs[0]
-
-
-def _level(candidate: Candidate) -> float:
-    """Standard deviation of a sample."""
-    fitted = candidate.fitted
-    return math.sqrt(fitted.cost / max(1, len(fitted.residual) - fitted.jacobian.shape[1]))
-
-
-def _static(candidate: Candidate, ring_down: RingDown) -> Estimate:
-    """Static friction lies between the pull where it stayed and the pull where it last turned, sin x each."""
-    fitted = candidate.fitted
-    error = SURE * _level(candidate) / math.sqrt(max(1.0, ring_down.fs / ring_down.frequency / 2))
-    low = max(_pull(fitted, fitted.half_cycles) - error, 0.0) if ring_down.stopped else 0.0
-    high = _pull(fitted, fitted.half_cycles - 1) + error
-    status = "ok" if ring_down.stopped else "the mass does not come to rest in the record: only an upper bound"
-    middle, sd = (low + high) / 2, (high - low) / math.sqrt(12)
-    method = "between where it stayed and where it last turned"
-    return Estimate("static friction displacement", middle, (low, high), sd, ring_down.unit, method, status)
-
-
-def _pull(fitted: Fitted, half_cycles: int) -> float:
-    """Torque over the stiffness at the turning point after so many half cycles."""
-    period = 2 * math.pi / fitted.value("angular_frequency")
-    later = fitted.value("release") + (half_cycles + 2) * period  # a half cycle below 2.5 rad takes less
-    at = free_decay([later], fitted.parameters, restoring=fitted.blocks.restoring, half_cycles=half_cycles)[0][0]
-    return abs(math.sin(float(at) - fitted.value("rest")))
 
 
 @dataclass(frozen=True, eq=False)

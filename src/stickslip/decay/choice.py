@@ -116,6 +116,11 @@ class Candidate:
         return _whiteness(self.fitted.residual, self.noise.floor)
 
     @property
+    def level(self) -> float:
+        """Standard deviation of what it leaves of a sample."""
+        return math.sqrt(self.fitted.cost / max(1, len(self.fitted.residual) - self.fitted.jacobian.shape[1]))
+
+    @property
     def verdict(self) -> str:
         """In words; the term named is most like what is left over, and need not be at work."""
         if self.kept:
@@ -158,7 +163,9 @@ class Candidate:
             return 0.0
         return max(0.0, float(row @ self._term[0])) / dry
 
-    def estimate(self, parameter: str, *, name: str | None = None, unit: str = "1", factor: float = 1.0) -> Estimate:
+    def estimate(
+        self, parameter: str, *, name: str | None = None, unit: str = "1", factor: float = 1.0, offset: float = 0.0
+    ) -> Estimate:
         """One of its parameters with the interval that holds if this is the motion; exactly zero where it has none."""
         row = self._influences.get(parameter)
         value = self.fitted.value(parameter)
@@ -176,8 +183,9 @@ class Candidate:
             reach = student(freedom) * sd
             low, high = value - math.hypot(reach, min(0.0, *moves)), value + math.hypot(reach, max(0.0, *moves))
             sd = (high - low) / (2 * NORMAL_95)
-        interval, method = (factor * low, factor * high), f"least squares, {self.fitted.motion.words}"
-        return Estimate(name or parameter, factor * value, interval, factor * sd, unit, method, self._status)
+        value, low, high = (factor * number + offset for number in (value, low, high))
+        method = f"least squares, {self.fitted.motion.words}"
+        return Estimate(name or parameter, value, (low, high), factor * sd, unit, method, self._status)
 
     @cached_property
     def damping_per_drift(self) -> float:

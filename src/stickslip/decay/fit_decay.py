@@ -12,7 +12,6 @@ from stickslip.arrays import Array
 from stickslip.decay.answer import (
     DecayFit,
     Release,
-    beginning,
     constants,
     ends_together,
     fit_pendulum,
@@ -27,7 +26,7 @@ from stickslip.decay.noise import KINDS, find_noise
 from stickslip.decay.profile import last_swing
 from stickslip.decay.release import CLIPPED, LOST, Releases, RingDown, find_releases
 from stickslip.decay.start import Search, roughness, variance, weights
-from stickslip.decay.which_motion import DecayMotion, motion_of, named, whichever
+from stickslip.decay.which_motion import DecayMotion, beginning, motion_of, named, whichever
 from stickslip.errors import EstimateError
 from stickslip.estimate import Constant, Doubt, Estimate, Status
 from stickslip.record.record import Record, Step, require_record
@@ -302,7 +301,7 @@ def _answer(
         bias=estimate(3, "rest position" if ring_downs[0].order == 0 else "sensor offset", unit),
         release_time=estimate(5, begins, "s", offset=starts[0]),
         amplitude=estimate(4, far, length),
-        static_displacement=_static(releases, motion, length),
+        static_displacement=_static(releases, motion, length, Status(*doubts)),
         dry_force=None if spring is None else dry.scaled(spring, "N m" if name == "theta" else "N", "dry friction"),
         damping_ratio_any=whichever(choices, damping, "damping_ratio") if choices else None,
         dry_displacement_any=whichever(choices, dry, "dry_displacement") if choices else None,
@@ -350,7 +349,7 @@ def _misfit(releases: list[Release], fitted: list[Array]) -> tuple[Doubt, ...]:
     return (Doubt(doubt, LEFT_OVER),)
 
 
-def _static(releases: list[Release], motion: _Motion, unit: str) -> Estimate:
+def _static(releases: list[Release], motion: _Motion, unit: str, doubts: Status) -> Estimate:
     """Static friction lies between where the mass stayed and where it last turned, in every release."""
     low, high, rested, method = 0.0, math.inf, False, "between where it stayed and where it last turned"
     for number, release in enumerate(releases):
@@ -367,8 +366,8 @@ def _static(releases: list[Release], motion: _Motion, unit: str) -> Estimate:
             turned.append(float(swing + p[2]) + error)
             rested |= rests
         low, high = max(low, min(stayed)), min(high, max(*turned, 0.0))
-    status = "ok" if rested else "the mass does not come to rest in the record: only an upper bound"
+    status = "" if rested else "the mass does not come to rest in the record: only an upper bound"
     if low > high:
         low, high, status = high, low, "the releases disagree on it: it changes, or the model does not hold"
     middle, sd = (low + high) / 2, (high - low) / math.sqrt(12)
-    return Estimate("static friction displacement", middle, (low, high), sd, unit, method, status)
+    return Estimate("static friction displacement", middle, (low, high), sd, unit, method, Status(status, doubts))

@@ -11,8 +11,8 @@ import numpy as np
 
 from stickslip.arrays import Array
 from stickslip.decay.candidates import ALWAYS, Fitted
-from stickslip.decay.choice import Candidate, Choice, choose, choose_fitted, interval_of, kept_by_all
-from stickslip.decay.motions import MOTIONS, RESTORING, Restoring
+from stickslip.decay.choice import Candidate, Choice, choose, choose_fitted, interval_of, kept_by_all, lack_of_fit
+from stickslip.decay.motions import MOTIONS, RESTORING, Restoring, free_decay
 from stickslip.decay.release import CLIPPED, LOST, RingDown, find_releases
 from stickslip.decay.start import BLOCKS
 from stickslip.errors import EstimateError
@@ -23,6 +23,7 @@ PLAIN = {"viscous", "dry", "both", "static"}  # motions that viscous and dry fri
 SWING = 2.5  # rad, above which a pendulum lingers near its top and its phase can not be held
 COARSE = 0.5  # of a digitiser's step: less noise than this, the counts' own included, does not blur it
 TAIL = 2.0  # periods at rest that are kept
+SURE = 3.0  # standard deviations of the noise by which a bracket is widened
 TERMS = {
     "damping_ratio": ("damping ratio", "1"),
     "dry_displacement": ("dry friction displacement", "{}"),
@@ -44,8 +45,12 @@ class DecayMotion(Result):
     damping_ratio, dry_displacement, frequency : Estimate
         Damping ratio, dry friction over the stiffness [m or rad] and undamped natural frequency [Hz] if the motion is
         `model`; exactly zero where it has no such term.
+    static_displacement, bias, release_time, amplitude : Estimate
+        Bracket of the static friction over the stiffness, rest position, time of release (of the first turn where the
+        motion is under way) and amplitude from the rest position then, if that is the motion.
     damping_ratio_any, dry_displacement_any : Estimate
-        The same with the interval that holds whichever candidate not rejected is the motion: the model's form counted.
+        Damping ratio and dry friction with the interval that holds whichever candidate not rejected is the motion: the
+        model's form counted.
     model : str
         The simplest candidate that the record does not speak against, by its name.
     candidates : tuple of (str, str, str)
@@ -62,6 +67,10 @@ class DecayMotion(Result):
     damping_ratio: Estimate
     dry_displacement: Estimate
     frequency: Estimate
+    static_displacement: Estimate
+    bias: Estimate
+    release_time: Estimate
+    amplitude: Estimate
     damping_ratio_any: Estimate
     dry_displacement_any: Estimate
     model: str
@@ -139,8 +148,8 @@ def motion_of(
     ring_down: RingDown, *, restoring: Restoring = "linear", candidates: tuple[str, ...] = tuple(MOTIONS)
 ) -> DecayMotion:
     """:func:`choose_motion` of one release that was found already."""
-    choice, _ = choice_of(ring_down, restoring=restoring, candidates=candidates)
-    return _answer(choice, ring_down)
+    choice, zero = choice_of(ring_down, restoring=restoring, candidates=candidates)
+    return _answer(choice, ring_down, zero)
 
 
 def choice_of(
@@ -257,11 +266,11 @@ def whichever(choices: Sequence[Choice], estimate: Estimate, parameter: str) -> 
     What viscous and dry friction would make of it does not count where the record speaks against both.
     """
     kept, (low, high) = kept_by_all(choices), estimate.interval
-    ends, value = interval_of(choices, parameter), estimate.value
+    ends, value, status = interval_of(choices, parameter), estimate.value, estimate.status
     if PLAIN & set(kept):
         ends = min(low, ends[0]), max(high, ends[1])
     else:
-        value = min(max(value, ends[0]), ends[1])
+        value, status = min(max(value, ends[0]), ends[1]), Status(*(choice.status for choice in choices))
     return replace(
         estimate,
         value=value,
@@ -269,25 +278,67 @@ def whichever(choices: Sequence[Choice], estimate: Estimate, parameter: str) -> 
         interval=ends,
         sd=(ends[1] - ends[0]) / (2 * NORMAL_95),
         method="all candidates not rejected",
+        status=status,
         checks=(f"candidates: {', '.join(kept)}",),
     )
 
 
-def _answer(choice: Choice, ring_down: RingDown) -> DecayMotion:
+def beginning(released: bool) -> tuple[str, str]:
+    """What the time and the amplitude are called where a fit begins."""
+    return ("release time", "amplitude at release") if released else ("time of the first turn", "first amplitude")
+
+
+def static_between(candidate: Candidate, ring_down: RingDown) -> Estimate:
+    """Static friction lies between the pull where it stayed and the pull where it last turned, each over the stiffness.
+
+    Both are places of the candidate's motion, which hold where it leaves noise alone.
+    """
+    fitted = candidate.fitted
+    error = SURE * candidate.level / math.sqrt(max(1.0, ring_down.fs / ring_down.frequency / 2))
+    low = max(_pull(fitted, fitted.half_cycles) - error, 0.0) if ring_down.stopped else 0.0
+    high = _pull(fitted, fitted.half_cycles - 1) + error
+    status = "" if ring_down.stopped else "the mass does not come to rest in the record: only an upper bound"
+    middle, sd = (low + high) / 2, (high - low) / math.sqrt(12)
+    method = "between where it stayed and where it last turned"
+    status = Status(status, lack_of_fit(candidate))
+    return Estimate("static friction displacement", middle, (low, high), sd, ring_down.unit, method, status)
+
+
+def _pull(fitted: Fitted, half_cycles: int) -> float:
+    """Force of the spring over its stiffness at the turning point after so many half cycles."""
+    period = 2 * math.pi / fitted.value("angular_frequency")
+    later = fitted.value("release") + (half_cycles + 2) * period  # a half cycle below 2.5 rad takes less
+    at = free_decay([later], fitted.parameters, restoring=fitted.blocks.restoring, half_cycles=half_cycles)[0][0]
+    away = float(at) - fitted.value("rest")
+    straight = math.sin(away) if fitted.blocks.restoring == "pendulum" else away
+    return abs(straight + fitted.value("curvature") * away**3)
+
+
+def _answer(choice: Choice, ring_down: RingDown, zero: float) -> DecayMotion:
+    """`zero` [s] is the record's time at the candidates' zero."""
     chosen, unit = choice.chosen, ring_down.unit
+    status = status_of(ring_down, "" if choice.status == "ok" else choice.status)
+    begins, far = beginning(ring_down.held and zero <= ring_down.release)
+
+    def course(parameter: str, name: str, unit: str, **shift: float) -> Estimate:
+        return replace(chosen.estimate(parameter, name=name, unit=unit, **shift), status=status)
+
     damping = chosen.estimate("damping_ratio", name="damping ratio")
     dry = chosen.estimate("dry_displacement", name="dry friction displacement", unit=unit)
-    frequency = chosen.estimate("angular_frequency", name="natural frequency", unit="Hz", factor=1 / (2 * math.pi))
     return DecayMotion(
         damping,
         dry,
-        frequency,
+        course("angular_frequency", "natural frequency", "Hz", factor=1 / (2 * math.pi)),
+        static_between(chosen, ring_down),
+        course("rest", "rest position", unit),
+        course("release", begins, "s", offset=zero),
+        course("amplitude", far, unit),
         whichever((choice,), damping, "damping_ratio"),
         whichever((choice,), dry, "dry_displacement"),
         choice.model,
         tuple((candidate.name, candidate.fitted.motion.words, candidate.verdict) for candidate in choice.candidates),
         choice,
-        status_of(ring_down, "" if choice.status == "ok" else choice.status),
+        status,
         _terms(chosen, unit),
     )
 

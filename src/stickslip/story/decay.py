@@ -12,12 +12,13 @@ import numpy as np
 from stickslip.answers.decays import CLEAR, Decay
 from stickslip.answers.findings import Comparison, Findings
 from stickslip.arrays import Array
-from stickslip.decay.answer import beginning, rig_units
+from stickslip.decay.answer import rig_units
 from stickslip.decay.candidates import CURVED
 from stickslip.decay.choice import SIZE
 from stickslip.decay.decrement import Decrement
 from stickslip.decay.fit_decay import LEFT_OVER, UNSHARED
 from stickslip.decay.release import CAUGHT
+from stickslip.decay.which_motion import beginning
 from stickslip.estimate import Estimate, kinds
 from stickslip.figures.decay import plates_of, plates_together
 from stickslip.record.record import Record
@@ -340,9 +341,12 @@ def _hidden(estimate: Estimate, kind: str) -> str:
 def _left_over(decay: Decay) -> Iterator[str]:
     """Where the fit leaves more than noise: whether that drifts, or swings at a frequency of its own."""
     fit = decay.waveform
-    if fit is None or LEFT_OVER not in kinds(fit.status):
+    if fit is None or decay.best is decay.motion or LEFT_OVER not in kinds(fit.status):
         return
-    time, residual = max(zip(fit.time, fit.residual, strict=True), key=lambda pair: float(np.std(pair[1])))
+    # by least squares, where they were asked: noise that drifts takes part of another mode, and bends the motion for it
+    tried = [motion.choice.chosen.fitted for motion in fit.motions]
+    left = [(one.blocks.times, one.residual) for one in tried] or zip(fit.time, fit.residual, strict=True)
+    time, residual = max(left, key=lambda pair: float(np.std(pair[1])))
     power = np.abs(np.fft.rfft((residual - residual.mean()) * np.hanning(len(residual)))) ** 2
     frequency = np.fft.rfftfreq(len(residual), float(time[1] - time[0]))
     own, total = fit.frequency.value, float(power.sum())
@@ -378,7 +382,7 @@ def _motion(decay: Decay) -> Iterator[str]:
 
 def _begin(decay: Decay) -> tuple[str, str]:
     """When the motion begins, and from how far; as it is fitted, where it is."""
-    first, fit = decay.releases.ring_downs[0], decay.waveform
+    first, fit = decay.releases.ring_downs[0], decay.course
     begin = f"begins at {first.release:.4g} s" if first.held else "is under way when the record begins"
     if fit is None:
         return begin, number(abs(first.amplitude), abs(first.amplitude) / 1000, first.unit)
