@@ -36,9 +36,22 @@ def test_play_that_is_stated_is_no_friction(seed):
     """The load part is wrong where the motor crosses the play without the link, and gravity acts half of it beside."""
     joint, record = by_motor(seed)
     plain, stated = regress_joint(record), regress_joint(record, play=(joint.truth["play"], 0.1 * joint.truth["play"]))
-    assert not plain.load.includes(joint.truth["load"])
+    assert "--play" in plain.load.status or not plain.load.includes(joint.truth["load"])
     for name in ("load", "forward", "back", "viscous", "inertia"):
         assert getattr(stated, name).includes(joint.truth[name]), name
+
+
+@pytest.mark.parametrize("seed", [312, 315, 323])
+def test_play_that_nobody_stated_is_named_where_the_torque_seems_too_early(seed):
+    """A torque that comes before the motion that it makes was told, and taken out, as a delay of less than none."""
+    _, record = by_motor(seed)
+    findings = analyze_joint(record)
+    assert not findings.joint.delay.known
+    for name in ("level", "sine", "inertia"):
+        assert "--play" in getattr(findings.joint, name).status, name
+    assert "earlier" not in " ".join(ss.summary(findings).headline)
+    plain = joints.drawn(seed, torque=True).record
+    assert "--play" not in regress_joint(plain).level.status
 
 
 def test_several_logs_are_told_by_it_too():

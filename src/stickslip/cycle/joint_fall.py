@@ -15,7 +15,7 @@ from stickslip.cycle.joint_fit import JointData, about_load, coefficient
 from stickslip.cycle.joint_slides import Log, Sliding
 from stickslip.cycle.regression import TURNING, UNITS
 from stickslip.errors import EstimateError
-from stickslip.estimate import NORMAL_95, Doubt, Estimate
+from stickslip.estimate import NORMAL_95, Doubt, Estimate, doubts_of
 from stickslip.signals.derivatives import differentiate
 from stickslip.statistics import LeastSquares, correlation_time, least_squares
 
@@ -35,7 +35,7 @@ SURELY = 3.5
 METHOD = "likelihood over Stribeck curves"
 FINER = 3  # rounds of likely curves closer together: three make 12 speeds of one step of the first
 # Kinds of doubt.
-CURVED, PLACE, SPEEDY, BORNE, WOUND = "bent", "placed", "speedy", "borne", "wound"
+CURVED, PLACE, SPEEDY, BORNE, WOUND, AHEAD = "bent", "placed", "speedy", "borne", "wound", "ahead"
 SPEED = ("viscous", "uneven", "inertia")  # terms in which a controller's damping of the speed stands, and its delay
 RUBS = ("forward", "back", "viscous")  # terms by which friction is a line over the speed
 PLACED = ("forward", "back", "load", "sine", "cosine")  # terms that friction or torque of the place passes for
@@ -355,15 +355,26 @@ def _surely(value: float, sd: float) -> bool:
     return abs(value) > SURELY * sd
 
 
+def too_early(ahead: float) -> Doubt:
+    """What a torque means that seems to come before the motion that it makes."""
+    words = (
+        f"the torque seems to come {1e3 * ahead:.2g} ms before the motion that it makes: between encoder and link "
+        'there may be play (state it: --play "1 deg"), or the position comes late'
+    )
+    return Doubt(words, AHEAD)
+
+
 def misfits(
     data: JointData,
     fit: LeastSquares,
     terms: tuple[str, ...],
     bent: bool,
     turning: bool,
+    delay: Estimate | None,
 ) -> tuple[Misfit, ...]:
     """What of the friction the terms do not follow."""
-    seen = []
+    early = () if delay is None else [doubt for doubt in doubts_of(delay.status) if doubt.kind == AHEAD]
+    seen = [Misfit((*PLACED, *SPEED), doubt) for doubt in early]
     if bent:
         line = "friction bends with the speed: this is of the line nearest to it, as its interval is"
         seen.append(Misfit(RUBS, Doubt(line, CURVED)))

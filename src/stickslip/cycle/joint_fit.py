@@ -28,7 +28,7 @@ from stickslip.cycle.joint_slides import (
     sliding,
 )
 from stickslip.errors import EstimateError, ModelError, RecordError
-from stickslip.estimate import Constant, Estimate
+from stickslip.estimate import Constant, Estimate, stands
 from stickslip.record.record import Record, Step, require_record
 from stickslip.signals.derivatives import five_point_difference
 from stickslip.signals.interpolate import without_delays
@@ -257,7 +257,7 @@ def punctual(data: JointData, delay: Estimate | None) -> JointData:
     if data.source == "reference":
         late, unsure = _lag(delay, LOOP)
         data = damped(data.earlier(late), late)
-    elif delay is not None and is_late(delay):
+    elif delay is not None and is_late(delay) and stands(delay.status):
         data, unsure = data.earlier(delay.value), delay.sd
     else:
         unsure = math.hypot(*_lag(delay, HELD), 0.0 if delay is None else _unseen(delay))

@@ -12,7 +12,7 @@ import numpy as np
 
 from stickslip.arrays import Array, stretches
 from stickslip.balance.motion import away_from
-from stickslip.cycle.joint import RICHER, JointFriction, Telling, delay_of
+from stickslip.cycle.joint import RICHER, JointFriction, Telling, delay_of, possible
 from stickslip.cycle.joint_fall import bends, misfits
 from stickslip.cycle.joint_fit import (
     JointData,
@@ -496,7 +496,7 @@ def regress_joint_logs(
     delay = delay_of(pooled(data))
     data, slow = [punctual(one, delay) for one in data], [punctual(one, delay) for one in slow]
     fit, terms, pull, left_out = fitted(pooled(data))
-    beside = misfits(pooled(data), fit, terms, bends(pooled(slow), fit, terms, pull), turning(records[0]))
+    beside = misfits(pooled(data), fit, terms, bends(pooled(slow), fit, terms, pull), turning(records[0]), delay)
     tell = Telling(pooled(data), fit, terms, turning(records[0]), "ok", beside)
     known = {term: tell.one(term) for term in terms if term not in ("uneven", *COGS)}
     predictions = [
@@ -515,7 +515,7 @@ def regress_joint_logs(
         thinning=known.get("thinning"),
         predictions=tuple(predictions),
         left_out=left_out,
-        delay=delay.within(0.0) if delay is not None and data[0].source == "reference" else delay,
+        delay=possible(delay, data[0].source),
     )
 
 
