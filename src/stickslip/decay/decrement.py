@@ -219,7 +219,7 @@ def _of_one(ring_down: RingDown, form: str, location: str) -> Decrement:
     upright = side * (values - centre)
     count, cut = _alternating(upright, errors, form, times)
     times, values, sd, errors, upright = (part[:count] for part in (times, values, sd, errors, upright))
-    i, m = _best_pair(upright, errors, form)
+    i, m = _best_pair(upright, errors, form, straight=ring_down.isochronous)
     last = _surest_dry(upright, sd, i, m, form)
     frequency, notes = _frequency(times, values, ring_down)
     motion = (ring_down.order, frequency.value)
@@ -331,11 +331,11 @@ def _alternating(x: Array, errors: Array, form: str, times: Array) -> tuple[int,
     return count, (f"the extremes from {when} on do not shrink in turn and are left out",)
 
 
-def _best_pair(x: Array, errors: Array, form: str) -> tuple[int, int]:
+def _best_pair(x: Array, errors: Array, form: str, *, straight: bool) -> tuple[int, int]:
     """The i and m for which the exact worst-case error of beta is least; the relative one, where errors may hide it."""
     differences = np.abs(ex.differences(x, form))
     both = errors[2:] + errors[:-2] if form == "immune" else errors[1:] + errors[:-1]
-    off = ex.relative(both, differences)
+    off = ex.relative(both, _even(differences, both) if straight else differences)
     best, chosen = math.inf, (0, 1)
     for first in range(min(len(differences) - 1, MOST)):
         m = np.arange(1, len(differences) - first)
@@ -354,6 +354,21 @@ def _best_pair(x: Array, errors: Array, form: str) -> tuple[int, int]:
             "release from farther, or ask fit_decay(record), which uses every sample",
         )
     return chosen[0] + (1 if form == "immune" else 0), chosen[1]
+
+
+def _even(differences: Array, errors: Array) -> Array:
+    """Amplitude differences of a straight spring as evenly as they shrink, each as heavy as it is sure.
+
+    Other frictions bend their logarithm's line a little. A pair is chosen by these: by its own noise the choice fell on
+    differences that were large by chance, and of 39 noisy accelerations the damping ratio was low by 1.3 standard
+    deviations in the mean.
+    """
+    seen = differences > errors
+    if np.count_nonzero(seen) < 4:
+        return differences
+    number, weight = np.arange(len(differences)), differences / np.maximum(errors, 1e-9 * differences.max())
+    line = np.polyfit(number[seen], np.log(differences[seen]), 2, w=weight[seen])
+    return np.asarray(np.exp(np.polyval(line, number)))
 
 
 def _surest_dry(x: Array, sd: Array, i: int, m: int, form: str) -> int:
