@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import stickslip as ss
+from motions import free_decay as closed_form
 from stickslip.decay.motions import free_decay
 from stickslip.decay.start import Search
 from stickslip.decay.waveform import Blocks, normal_equations
@@ -558,3 +559,14 @@ def test_an_acceleration_that_is_released_at_a_sample_is_damped_as_it_is(held: i
     for estimate, truth in ((decay.damping_ratio, 0.25 / 2000**0.5), (decay.dry_displacement, 1.5e-4)):
         assert abs(estimate.value - truth) < 3 * estimate.sd
         assert estimate.sd < 0.2 * truth
+
+
+@pytest.mark.parametrize("channel", ["v", "a"])
+def test_what_moves_no_more_has_come_to_rest_on_any_channel(channel: str) -> None:
+    """Of an acceleration it was an upper bound of 10 mm: its noise in m/s^2 was taken for one in metres."""
+    values, fs, turns = closed_form(order="xva".index(channel), per_cycle=200, hold=3, tail=5)
+    noisy = values + 2e-3 * np.ptp(values) * np.random.default_rng(4).standard_normal(len(values))
+    static = ss.fit_decay(ss.Record.of({channel: noisy}, fs=fs)).static_displacement
+    assert static.status == "ok"
+    assert static.includes(0.02)
+    assert static.interval[1] < 1.2 * abs(turns[-2])

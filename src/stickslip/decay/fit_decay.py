@@ -301,7 +301,7 @@ def _answer(
         bias=estimate(3, "rest position" if ring_downs[0].order == 0 else "sensor offset", unit),
         release_time=estimate(5, begins, "s", offset=starts[0]),
         amplitude=estimate(4, far, length),
-        static_displacement=_static(releases, motion, length, Status(*doubts)),
+        static_displacement=_static(ring_downs, releases, motion, Status(*doubts)),
         dry_force=None if spring is None else dry.scaled(spring, "N m" if name == "theta" else "N", "dry friction"),
         damping_ratio_any=whichever(choices, damping, "damping_ratio") if choices else None,
         dry_displacement_any=whichever(choices, dry, "dry_displacement") if choices else None,
@@ -349,10 +349,10 @@ def _misfit(releases: list[Release], fitted: list[Array]) -> tuple[Doubt, ...]:
     return (Doubt(doubt, LEFT_OVER),)
 
 
-def _static(releases: list[Release], motion: _Motion, unit: str, doubts: Status) -> Estimate:
+def _static(ring_downs: list[RingDown], releases: list[Release], motion: _Motion, doubts: Status) -> Estimate:
     """Static friction lies between where the mass stayed and where it last turned, in every release."""
     low, high, rested, method = 0.0, math.inf, False, "between where it stayed and where it last turned"
-    for number, release in enumerate(releases):
+    for number, (ring_down, release) in enumerate(zip(ring_downs, releases, strict=True)):
         stayed, turned = [], []
         for (half_cycles, share), motions in zip(motion.candidates, motion.motions, strict=True):
             if share < DOUBTED:
@@ -360,8 +360,11 @@ def _static(releases: list[Release], motion: _Motion, unit: str, doubts: Status)
             p, n = motions[number], half_cycles[number]
             swing, end = last_swing(p, n)
             half = math.pi / (p[0] * math.sqrt(1 - p[1] ** 2))
-            rests = p[5] + n * half < (release.blocks.total - 1) * release.blocks.dt
-            error = 3 * release.noise.level / math.sqrt(max(1.0, half / release.blocks.dt))
+            # a velocity or an acceleration is cut where it ends: whether it rests there, its tail has told
+            ended = release.blocks.order > 0 and ring_down.stopped
+            rests = ended or p[5] + n * half < (release.blocks.total - 1) * release.blocks.dt
+            level = release.noise.level / p[0] ** release.blocks.order  # as a displacement
+            error = 3 * level / math.sqrt(max(1.0, half / release.blocks.dt))
             stayed.append(max(abs(float(end)) - error, 0.0) if rests else 0.0)
             turned.append(float(swing + p[2]) + error)
             rested |= rests
@@ -370,4 +373,5 @@ def _static(releases: list[Release], motion: _Motion, unit: str, doubts: Status)
     if low > high:
         low, high, status = high, low, "the releases disagree on it: it changes, or the model does not hold"
     middle, sd = (low + high) / 2, (high - low) / math.sqrt(12)
+    unit = "rad" if ring_downs[0].channel == "theta" else "m"
     return Estimate("static friction displacement", middle, (low, high), sd, unit, method, Status(status, doubts))
