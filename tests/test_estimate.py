@@ -83,3 +83,8 @@ def test_what_has_no_value_keeps_its_reason_and_no_interval_is_made_up() -> None
     assert friction.unknown("the sign is wrong").within(0.0).status == "the sign is wrong"
     loose = Estimate.normal("friction", 5.0, sd=math.nan, unit="N", method="")
     assert all(math.isnan(end) for end in loose.within(0.0).interval)
+
+
+def test_what_can_not_be_is_told_without_a_unit_where_it_has_none() -> None:
+    ratio = Estimate.normal("ratio", 0.5, sd=0.01, unit="1", method="").within(1.0)
+    assert ratio.status == "the record gives a value below 1, which can not be"

@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 from scipy.signal import cont2discrete, lfilter
 
+import joints
 import stickslip as ss
 from scripts import loaded
+from stickslip.answers import analyze_joint
 from stickslip.estimate import stands
 
 INERTIA, KP, KD, LEVEL, VISCOUS = 0.02, 18.0, 0.6, 0.06, 0.03
@@ -70,6 +72,21 @@ def test_damping_of_the_speed_is_doubted_to_be_viscous_friction() -> None:
     stated = ss.cycle.regress_joint(moved(0.5e-3, of_speed=True), kp=KP, kd=KD, gravity=False)
     assert "damp the speed" in stated.inertia.status  # by a delay as long as kd over kp it looked as sound
     assert not stands(stated.level.status)
+
+
+def test_a_headline_says_what_the_rows_of_its_numbers_doubt() -> None:
+    """Viscous friction of which most is the controller's damping stood there as if it were sure."""
+    findings = analyze_joint(moved(0.5e-3, of_speed=True), kp=KP, gravity=False)
+    words = " ".join(ss.summary(findings).headline)
+    assert "viscous friction (in doubt: the controller may damp the speed" in words
+    assert "kg m² (in doubt as well)" in words
+
+
+def test_of_a_joint_without_gravity_the_remedy_is_to_say_so() -> None:
+    """It was told to turn farther, so that gravity's torque changes, and all of its numbers were not to be trusted."""
+    level = ss.cycle.regress_joint(joints.drawn(305, torque=True, loaded=False).record).level
+    assert "--no-gravity" in level.status
+    assert "turn farther" not in level.status
 
 
 def test_a_controller_that_integrates_its_error_is_doubted() -> None:

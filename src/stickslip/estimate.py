@@ -259,7 +259,8 @@ class Estimate(Plain):
             return self
         if ends[0] > ends[1] or (outside and not math.isfinite(self.sd)):
             bound = f"below {low:g}" if self.value < low else f"above {high:g}"
-            return self.unknown(otherwise or f"the record gives a value {bound} {self.unit}, which can not be")
+            unit = "" if self.unit == "1" else f" {self.unit}"
+            return self.unknown(otherwise or f"the record gives a value {bound}{unit}, which can not be")
         return replace(self, value=min(max(self.value, low), high), interval=ends)
 
     def includes(self, value: float) -> bool:

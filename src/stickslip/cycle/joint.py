@@ -11,7 +11,18 @@ from typing import Any
 import numpy as np
 
 from stickslip.arrays import Array
-from stickslip.cycle.joint_fall import FALL, Fall, Misfit, bends, damps_error, falling, misfits, too_early
+from stickslip.cycle.joint_fall import (
+    FALL,
+    Fall,
+    Misfit,
+    bends,
+    damps_error,
+    falling,
+    misfits,
+    possible,
+    too_early,
+    without_load,
+)
 from stickslip.cycle.joint_fit import (
     ADVICE,
     LOOP,
@@ -34,7 +45,7 @@ from stickslip.cycle.joint_fit import (
 from stickslip.cycle.joint_slides import COGS
 from stickslip.cycle.regression import TURNING, UNITS
 from stickslip.errors import EstimateError
-from stickslip.estimate import NORMAL_95, Constant, Doubt, Estimate, Result, Status, stands
+from stickslip.estimate import NORMAL_95, Constant, Doubt, Estimate, Result, Status
 from stickslip.record.record import Record
 from stickslip.signals.noise import noise_level
 from stickslip.statistics import FEW_INDEPENDENT, LeastSquares, mixture
@@ -52,7 +63,7 @@ EARLY = 2.5
 NEARER, NEAR = 8, 1e-3  # steps towards the delay, and the last one's size in samples
 WAYS = ((1.0, "forward"), (-1.0, "back"))
 # Kinds of doubt.
-NOISY, LOADED, CONFOUNDED, SHIFTED = "noisy", "loaded", "confounded", "shifted"
+NOISY, CONFOUNDED, SHIFTED = "noisy", "confounded", "shifted"
 BARELY = 0.5  # of a value: an interval that is wider on either side hardly tells it
 RICHER = {"load", "uneven", *WARM}  # what Coulomb and viscous friction of both directions alike do not have
 
@@ -332,13 +343,6 @@ def delay_of(data: JointData) -> Estimate | None:
     return Estimate.normal(name, late, sd=sd, unit="s", method="the balance of torque, read later", status=status)
 
 
-def possible(delay: Estimate | None, source: str) -> Estimate | None:
-    """A delay as it can be: no controller's is below none, and no torque comes after the motion that it makes."""
-    if delay is None or source == "reference":
-        return None if delay is None else delay.within(0.0)
-    return delay if stands(delay.status) else delay.unknown(delay.status)
-
-
 def _heard(data: JointData, fit: LeastSquares, terms: tuple[str, ...]) -> bool:
     """Whether the torque changes, beside what the other terms explain of that, by more than its noise makes of it."""
     columns = data.columns(terms, coefficient(fit, terms, "load"), (0.0, 0.0))
@@ -493,9 +497,7 @@ def _error_rate(data: JointData) -> Array:
 def _worries(data: JointData, fit: LeastSquares, terms: tuple[str, ...]) -> list[Doubt | str]:
     worries: list[Doubt | str] = []
     if "load" in data.terms and "load" not in terms:
-        worries.append(
-            Doubt(f"friction may grow with the load, which this log does not tell: {ADVICE['load']}", LOADED)
-        )
+        worries.append(without_load(fit, terms))
     if fit.independent < FEW_INDEPENDENT * len(terms):
         worries.append(f"only {fit.independent:.0f} independent samples for {len(terms)} coefficients")
     if data.logs[0].reference is None and "inertia" in terms:

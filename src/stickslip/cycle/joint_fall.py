@@ -11,11 +11,11 @@ from typing import NamedTuple
 import numpy as np
 
 from stickslip.arrays import Array
-from stickslip.cycle.joint_fit import JointData, about_load, coefficient
+from stickslip.cycle.joint_fit import ADVICE, JointData, about_load, coefficient
 from stickslip.cycle.joint_slides import Log, Sliding
 from stickslip.cycle.regression import TURNING, UNITS
 from stickslip.errors import EstimateError
-from stickslip.estimate import NORMAL_95, Doubt, Estimate, doubts_of
+from stickslip.estimate import NORMAL_95, Doubt, Estimate, doubts_of, stands
 from stickslip.signals.derivatives import differentiate
 from stickslip.statistics import LeastSquares, correlation_time, least_squares
 
@@ -35,12 +35,13 @@ SURELY = 3.5
 METHOD = "likelihood over Stribeck curves"
 FINER = 3  # rounds of likely curves closer together: three make 12 speeds of one step of the first
 # Kinds of doubt.
-CURVED, PLACE, SPEEDY, BORNE, WOUND, AHEAD = "bent", "placed", "speedy", "borne", "wound", "ahead"
+CURVED, PLACE, SPEEDY, BORNE, WOUND, AHEAD, LOADED = "bent", "placed", "speedy", "borne", "wound", "ahead", "loaded"
 SPEED = ("viscous", "uneven", "inertia")  # terms in which a controller's damping of the speed stands, and its delay
 RUBS = ("forward", "back", "viscous")  # terms by which friction is a line over the speed
 PLACED = ("forward", "back", "load", "sine", "cosine")  # terms that friction or torque of the place passes for
 # Of a stated kd, chosen: 1 is not damped at all; of 15 sound joints, seeds 93000 to 94020, it was 0.46 at most.
 HARDLY = 0.8
+SLIGHT = 0.05  # of the friction, chosen: gravity that is less can not make it grow by more
 FALL = ("fall", "fall of load")  # the excess at rest under the mean load, and what each N m of load adds to it
 
 
@@ -362,6 +363,26 @@ def too_early(ahead: float) -> Doubt:
         'there may be play (state it: --play "1 deg"), or the position comes late'
     )
     return Doubt(words, AHEAD)
+
+
+def possible(delay: Estimate | None, source: str) -> Estimate | None:
+    """A delay as it can be: no controller's is below none, and no torque comes after the motion that it makes."""
+    if delay is None or source == "reference":
+        return None if delay is None else delay.within(0.0)
+    return delay if stands(delay.status) else delay.unknown(delay.status)
+
+
+def without_load(fit: LeastSquares, terms: tuple[str, ...]) -> Doubt:
+    """What a load part that the log does not tell means: of gravity that is hardly there it is hardly any."""
+    rows = [np.eye(len(terms))[terms.index(term)] for term in ("sine", "cosine") if term in terms]
+    pulls = [fit.combined(row, "", "", "") for row in rows]
+    if any(abs(pull.value) > SURELY * pull.sd for pull in pulls):
+        return Doubt(f"friction may grow with the load, which this log does not tell: {ADVICE['load']}", LOADED)
+    most, rubs = sum(abs(pull.value) + 2 * pull.sd for pull in pulls), coefficient(fit, terms, "forward")
+    words = (
+        "no gravity is felt, with which friction may grow: where none acts, state that by --no-gravity (gravity=False)"
+    )
+    return Doubt(words, LOADED, lesser=most < SLIGHT * rubs)
 
 
 def misfits(

@@ -12,8 +12,8 @@ import numpy as np
 
 from stickslip.arrays import Array, stretches
 from stickslip.balance.motion import away_from
-from stickslip.cycle.joint import RICHER, JointFriction, Telling, delay_of, possible
-from stickslip.cycle.joint_fall import bends, misfits
+from stickslip.cycle.joint import RICHER, JointFriction, Telling, delay_of
+from stickslip.cycle.joint_fall import bends, misfits, possible
 from stickslip.cycle.joint_fit import (
     JointData,
     about_load,

@@ -17,7 +17,7 @@ from stickslip.cycle.joint_fit import SURELY, is_late
 from stickslip.cycle.joint_logs import JointLogs
 from stickslip.cycle.tribometer import DEFINITIONS
 from stickslip.errors import ModelError
-from stickslip.estimate import Estimate, stands
+from stickslip.estimate import Estimate, doubts_of, stands
 from stickslip.figures.contact import plates_of, plates_together, tribometer_plates
 from stickslip.laws.c_code import compiler
 from stickslip.laws.coulomb import LinearSlope
@@ -167,18 +167,20 @@ def _together(comparison: Comparison) -> Iterator[str]:
 def _of_one_joint(findings: Findings) -> Iterator[str]:
     joint = findings.joint
     level, unit = joint.level, joint.level.unit
-    doubt = "" if stands(level.status) else f", which is not to be trusted ({level.status})"
+    said = {doubt.words for doubt in doubts_of(level.status)}
+    doubt = f", which is not to be trusted ({level.status})" if not stands(level.status) else _in_doubt(level, set())
     under = f" under a mean load of {number(joint.carried, joint.carried / 100, unit)}" if joint.carried else ""
     if level.interval[0] > 0:
         yield f"The joint slides against {value_of(level)} of friction{under} (95 %: {interval_of(level)}){doubt}."
         yield from _directions(joint)
-        yield from _fall(joint)
+        yield from _fall(joint, said)
     else:
         yield f"No dry friction{under} is felt{doubt}; more than {value_of(level, level.interval[1])} would be (95 %)."
-    parts = [f"{value_of(joint.viscous)} of viscous friction"]
+    parts = [f"{value_of(joint.viscous)} of viscous friction{_in_doubt(joint.viscous, said)}"]
     if joint.load is not None and joint.load.known:
         most = f"less than {value_of(joint.load, joint.load.interval[1])}"
-        parts.append(f"{value_of(joint.load) if joint.load.interval[0] > 0 else most} of gravity's torque")
+        some = f"{value_of(joint.load)}{_in_doubt(joint.load, said)}" if joint.load.interval[0] > 0 else most
+        parts.append(f"{some} of gravity's torque")
     fastest = float(np.abs(joint.speed).max())
     rate = f"{fastest:.3g} rad/s" if unit == "N m" else f"{fastest:.3g} m/s"
     yield f"To that come {' and '.join(parts)}; it was moved at up to {rate}."
@@ -187,7 +189,7 @@ def _of_one_joint(findings: Findings) -> Iterator[str]:
     torque = "the torque that" if unit == "N m" else "the force that"
     source = sources.get(joint.source, "was measured")
     yield (
-        f"With an inertia of {value_of(joint.inertia)} that explains {torque} {source};"
+        f"With an inertia of {value_of(joint.inertia)}{_in_doubt(joint.inertia, said)} that explains {torque} {source};"
         f" {100 * joint.residual:.2g} % of it is left unexplained while it slides."
     )
     if joint.delay is not None and is_late(joint.delay):
@@ -211,6 +213,16 @@ def _of_one_joint(findings: Findings) -> Iterator[str]:
         )
     if findings.sticks is not None and findings.sticks.share.value > RARELY and stands(findings.sticks.share.status):
         yield f"It stands still up to {value_of(findings.sticks.share)} of the time."
+
+
+def _in_doubt(estimate: Estimate, said: set[str]) -> str:
+    """What its row doubts of a number, behind it; what a sentence before has said, in short."""
+    doubts = doubts_of(estimate.status)
+    fresh = [doubt.words for doubt in doubts if doubt.words not in said]
+    said.update(fresh)
+    if fresh:
+        return f" (in doubt: {'; '.join(fresh)})"
+    return "" if stands(estimate.status) else " (in doubt as well)"
 
 
 def _warmth(findings: Findings) -> Iterator[str]:
@@ -238,13 +250,14 @@ def _directions(joint: JointFriction) -> Iterator[str]:
         yield f"The two directions differ: {value_of(forward)} forward and {value_of(back)} back without load."
 
 
-def _fall(joint: JointFriction) -> Iterator[str]:
+def _fall(joint: JointFriction, said: set[str]) -> Iterator[str]:
     """How its friction falls with the speed, or from which speed on none does."""
     if joint.static is not None and joint.stribeck_speed is not None:
         static, speed = joint.static, joint.stribeck_speed
         yield (
-            f"Its friction falls with the speed: at rest it is {value_of(static)} (95 %: {interval_of(static)}), and "
-            f"falls within {value_of(speed)} (95 %: {interval_of(speed)}), the Stribeck speed."
+            f"Its friction falls with the speed: at rest it is {value_of(static)} (95 %: {interval_of(static)})"
+            f"{_in_doubt(static, said)}, and falls within {value_of(speed)} (95 %: {interval_of(speed)}), the Stribeck "
+            "speed."
         )
         return
     slowest = float(np.abs(joint.speed).min())
