@@ -570,3 +570,14 @@ def test_what_moves_no_more_has_come_to_rest_on_any_channel(channel: str) -> Non
     assert static.status == "ok"
     assert static.includes(0.02)
     assert static.interval[1] < 1.2 * abs(turns[-2])
+
+
+def test_the_rest_position_lies_where_it_swings() -> None:
+    """A second mode passed for drift, beside which the rest position was -7 m to 7 m of swings of 30 mm."""
+    values, fs, _ = closed_form(per_cycle=200, tail=4)
+    since = np.maximum(np.arange(len(values)) / fs - 0.25, 0.0)
+    mode = 0.03 * np.exp(-0.05 * 13.7 * since) * np.cos(2 * np.pi * 6.85 * since)
+    noisy = values + mode + 2e-4 * np.random.default_rng(1).standard_normal(len(values))
+    rest = ss.fit_decay(ss.Record.of({"x": noisy}, fs=fs)).bias
+    assert np.ptp(rest.interval) <= np.ptp(noisy)
+    assert rest.includes(0.0)

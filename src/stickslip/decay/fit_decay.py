@@ -269,8 +269,8 @@ def _answer(
     notes: tuple[str, ...],
     history: tuple[Step, ...],
 ) -> DecayFit:
-    name = ring_downs[0].channel
-    length, unit = ("rad" if name == "theta" else "m"), ring_downs[0].unit
+    name, unit, order = ring_downs[0].channel, ring_downs[0].unit, ring_downs[0].order
+    length, zero = ("rad" if name == "theta" else "m"), "sensor offset" if order else "rest position"
     half_cycles, likelihood = motion.candidates[0]
     motions_first = zip(releases, half_cycles, motion.motions[0], strict=True)
     fitted = [release.blocks.motion(p, n)[0] for release, n, p in motions_first]
@@ -298,7 +298,7 @@ def _answer(
         damping_ratio=damping,
         dry_displacement=dry,
         frequency=frequency,
-        bias=estimate(3, "rest position" if ring_downs[0].order == 0 else "sensor offset", unit),
+        bias=estimate(3, zero, unit).within(*map(float, (first.samples.min(), first.samples.max()))),  # swung about
         release_time=estimate(5, begins, "s", offset=starts[0]),
         amplitude=estimate(4, far, length),
         static_displacement=_static(ring_downs, releases, motion, Status(*doubts)),
