@@ -491,7 +491,7 @@ def _by_peak(record: Record, strokes: Strokes) -> _Borne:
     level = float(np.median([stroke.level for stroke in chosen]))
     if stray > NOTHING * level:
         raise EstimateError(
-            f"the friction strays by {stray:.2g} after each slip, from a level of {level:.2g}",
+            f"the friction strays by {stray / level:.2g} times its level after each slip",
             f"static friction is told where it strays by less than {100 * NOTHING:.0f} % of its level",
             unknown or "give a record with less noise",
         )
