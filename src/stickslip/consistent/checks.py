@@ -117,6 +117,8 @@ class Slip:
         Of each channel whose stated delay is wrong: the delay [s] that it should have.
     zeros : mapping of str to float
         Of each channel whose zero is off: by how much.
+    unsure : float
+        The share by which gains and constants may be off, where that is no more than calibration leaves them.
     """
 
     words: str
@@ -125,6 +127,7 @@ class Slip:
     clock: float = 1.0
     delays: Mapping[str, float] = field(default_factory=dict)
     zeros: Mapping[str, float] = field(default_factory=dict)
+    unsure: float = 0.0
 
     @property
     def of_one_unit(self) -> bool:

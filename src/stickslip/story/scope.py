@@ -18,7 +18,7 @@ from stickslip.consistent.checks import Slip
 from stickslip.errors import StickslipError
 from stickslip.figures.contact import across
 from stickslip.figures.style import envelope, prefixed, spelled
-from stickslip.files.expression import shifted, split_spec, times
+from stickslip.files.expression import shifted, split_gain, split_spec, times
 from stickslip.printing import printable
 from stickslip.record.record import RIG_UNITS, Record
 from stickslip.rig.rig import Rig
@@ -33,6 +33,7 @@ LEVELS = 65_534  # of a value, in two bytes; one more is a gap
 MOST_PANELS = 4
 PANELS = ("x", "theta", "v", "a", "load", "force", "friction", "normal", "sound")
 EXPLAINED = "inertia, viscous and dry friction"  # the model of a regression
+MOVED_BY = ("x", "z", "force")  # channels whose gains an equation of motion compares
 LEFT = "left"  # the line of what a model leaves
 BESIDE = {"x": "z"}  # drawn in the same panel
 HERE = "{here}"  # before the name of a file that lies beside the page, which knows its folder
@@ -280,6 +281,11 @@ def _corrected(findings: Findings, slip: Slip, question: str, options: Sequence[
     cured |= {name: shifted(channels[name], off, name) for name, off in slip.zeros.items()}
     if not all(cured.values()):
         return ""
+    if slip.unsure:
+        sure = f"± {100 * slip.unsure:g} %"
+        cured |= {name: f"{split_gain(channels[name])[0].strip()} {sure}" for name in MOVED_BY if name in channels}
+        sd = {name: slip.unsure * settings[name] for name in ("mass", "stiffness") if settings.get(name)}
+        settings["sd"] = {**(settings.get("sd") or {}), **sd}
     if cured:
         read["channels"] = {**channels, **cured}
     if slip.clock != 1:

@@ -11,7 +11,7 @@ import numpy as np
 from stickslip.arrays import Array
 from stickslip.errors import EstimateError, StickslipError
 from stickslip.statistics import correlation_time
-from stickslip.twin.belief import BENT, HELD, NUDGE, Belief, Fit, levelled
+from stickslip.twin.belief import BENT, EXCESS, HELD, NUDGE, Belief, Fit, levelled
 
 QUESTION = "the twin of a record"
 # Of the descent: in a narrow valley; elsewhere the first two do nearly all of it. At most so many times as many of a
@@ -128,11 +128,20 @@ def linearised(belief: Belief) -> Belief:
     names = tuple(
         name
         for name, slope in slopes.items()
-        if slope.any() and name != belief.held and not belief.pinned(name, float(slope @ residual))
+        if slope.any()
+        and name != belief.held
+        and not belief.pinned(name, float(slope @ residual))
+        # a stick feels an excess of none by its square alone: along a slope of rounding it was drawn to 4e8 N
+        and not (name == EXCESS and not belief.values[name] and _deviation(belief, slope) > belief.size(name))
     )
     if not names:
         raise EstimateError("a displacement that nothing moves", f"{QUESTION} moves as its law does", "see the record")
     return _fitted(belief, names, levelled(np.column_stack([slopes[name] for name in names])))
+
+
+def _deviation(belief: Belief, slope: Array) -> float:
+    """Standard deviation of a value that alone would be unknown, by its slope."""
+    return belief.noise / float(np.linalg.norm(levelled(slope)))
 
 
 def _fitted(belief: Belief, names: tuple[str, ...], jacobian: Array) -> Belief:
