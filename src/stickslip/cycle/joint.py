@@ -57,8 +57,8 @@ LATEST = 0.1  # s that a torque may be late
 # Times the power of noise in the torque's rate: noise alone had 0.9 to 1.2 on 10 logs, 41 others 1.4 at least.
 HEARD = 1.5
 STRAYS = 1.6  # times its chance that a delay strays: so it did on 60 joints of 15 ms, seeds 70100 to 70225
-# Deviations by which a torque is surely too early for the motion that it makes: of 30 joints without play, seeds 300 to
-# 325 of tests/joints.py, none came to 1.7, of 17 with play that was not stated five to more.
+# Deviations by which a torque is surely too early for the motion that it makes: of 33 joints without play none came to
+# 1.7, of 15 with play that was not stated four to more (seeds 300 to 325 of tests/joints.py, which set it).
 EARLY = 2.5
 NEARER, NEAR = 8, 1e-3  # steps towards the delay, and the last one's size in samples
 WAYS = ((1.0, "forward"), (-1.0, "back"))
