@@ -187,6 +187,7 @@ def test_what_the_log_can_not_tell_is_said_with_the_motion_that_would():
     regression = regress_joint(small)
     assert regression.left_out
     assert "turn farther" in " ".join(regression.left_out)
+    assert "turn farther" in regression.level.status, "gravity acts: that none is felt is not so"
     one_way = ss.Record.of({"theta": t, "force": np.sin(t)}, fs=200.0, units={"force": "N m"})
     with pytest.raises(EstimateError, match="back and forth"):
         regress_joint(one_way)

@@ -376,7 +376,7 @@ def without_load(fit: LeastSquares, terms: tuple[str, ...]) -> Doubt:
     """What a load part that the log does not tell means: of gravity that is hardly there it is hardly any."""
     rows = [np.eye(len(terms))[terms.index(term)] for term in ("sine", "cosine") if term in terms]
     pulls = [fit.combined(row, "", "", "") for row in rows]
-    if any(abs(pull.value) > SURELY * pull.sd for pull in pulls):
+    if not pulls or any(abs(pull.value) > SURELY * pull.sd for pull in pulls):
         return Doubt(f"friction may grow with the load, which this log does not tell: {ADVICE['load']}", LOADED)
     most, rubs = sum(abs(pull.value) + 2 * pull.sd for pull in pulls), coefficient(fit, terms, "forward")
     words = (
