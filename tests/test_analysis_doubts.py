@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -12,7 +13,7 @@ import stepped
 import stickslip as ss
 from rigs import LAG, RIG, measured, told
 from stickslip.answers.preparation import _doubt
-from stickslip.estimate import UNTRIED, kinds, stands
+from stickslip.estimate import UNTRIED, Status, kinds, stands
 
 SHAKEN = stepped.Rig("static", 2.42, 2310.0, 3.0, 2e-3, 3.0, kinetic=1.1, static=1.4)
 
@@ -187,6 +188,9 @@ def test_a_mass_found_in_the_record_is_told_beside_the_contact() -> None:
     findings = ss.analyze(settled(2.5), stiffness=2310, damping=RIG["damping"])
     assert findings.stiffness is not None
     assert "the mass (found in this record) is not stated" in findings.stiffness.status
+    doubted = findings.having(stiffness=replace(findings.stiffness, status=Status("as good as rigid")))
+    line = next(line for line in ss.summary(doubted).headline if "While it holds the contact" in line)
+    assert line.endswith(", which is not to be trusted (as good as rigid).")
 
 
 def test_advice_holds_on_the_page_too() -> None:

@@ -281,6 +281,10 @@ def test_friction_that_falls_with_speed_is_found_with_its_static_level() -> None
     truth = tried.record.truth
     assert tried.breakaway.ratio.value == pytest.approx(truth[RATIO], rel=0.01)
     assert tried.loops.level.value == pytest.approx(truth["sliding friction"], rel=0.01)
+    told = "Friction falls from"
+    assert told in " ".join(ss.summary(tried).headline)
+    unlike = tried.having(trial=replace(tried.trial, strays=9.0))
+    assert told not in " ".join(ss.summary(unlike).headline), "of no kind that was tried"
 
 
 def off_as_stated(rig: stepped.Rig, seed: int, *, off: float) -> ss.Record:

@@ -221,9 +221,10 @@ def _of_loops(findings: Findings) -> Iterator[str]:
     yield from _of_directions(loops.forward, loops.back)
     low, high = loops.slope.interval
     changes = loops.slope.status == "ok" and (low > 0 or high < 0)
-    falls = findings.trial is not None and math.isfinite(findings.trial.belief.fall_speed)
+    trial = findings.trial
+    falls = trial is not None and not trial.unlike and math.isfinite(trial.belief.fall_speed)
     if falls:
-        belief = findings.trial.belief
+        belief = trial.belief
         static, speed = value_of(loops.level, belief.static), number(belief.fall_speed, 0.1 * belief.fall_speed, "m/s")
         line = f"; over the speeds at which it slides its slope is {value_of(loops.slope)}" if changes else ""
         yield f"Friction falls from {static} at rest as it begins to slide, about a speed of {speed}{line}."
@@ -287,10 +288,10 @@ def _of_breakaway(breakaway: Breakaway, when: str) -> Iterator[str]:
 
 
 def _of_contact(stiffness: Estimate, damping: Estimate | None) -> str:
-    damped = f" and a damping of {value_of(damping)}" if damping is not None else ""
-    return (
-        f"While it holds the contact has a stiffness of {value_of(stiffness)} (95 %: {interval_of(stiffness)}){damped}."
-    )
+    told = f"While it holds the contact has a stiffness of {value_of(stiffness)} (95 %: {interval_of(stiffness)})"
+    if not stands(stiffness.status):
+        return f"{told}, which is not to be trusted ({stiffness.status})."
+    return f"{told} and a damping of {value_of(damping)}." if damping is not None else f"{told}."
 
 
 def _of_presliding(presliding: Presliding) -> Iterator[str]:
