@@ -80,9 +80,9 @@ UNLIKE = 1.15  # times what noise explains, by which x may stray from its twin b
 # below which the numbers of dry friction alone stand: nobody knows a spring to a ten thousandth, and of a quiet record
 # x asks for less. Those of a part that acts briefly or weakly do not, since as small a force may pass for all of it: of
 # ten rigs with textbook bristles by tests/stepped.py two told static friction 1.3 and 2.3 times as large as it is,
-# beside a misfit of 0.3 %. Nor do any beside a curve or a contact that gives way: with gains and constants off
-# by half a per cent these took that up, and sliding friction was 1.1 and 1.5 % off beside as small a force.
-SLIGHT = 0.01
+# beside a misfit of 0.3 %. Beside a curve or a contact that gives way it has to be FINER: with gains and constants off
+# by half a per cent these took that up, and sliding friction was 1.1 and 1.5 % off beside a force of 0.2 and 0.3 %.
+SLIGHT, FINER = 0.01, 0.001
 BRIEF = (FALL, *STATIC, GIVES)
 RICHER = {SPEED, GIVE, RATE}
 RATIOS = {SPRING, MASS, GAIN}  # by how much they are off stands as a logarithm
@@ -276,8 +276,9 @@ class _Misfit:
         """That of a belief's record, with what else as well as its slip would be one."""
         slip, feigned = " or ".join(r.slip for r in belief.slips.values()), _feigned(belief)
         share = max((abs(math.expm1(belief.values[name])) for name in _off(belief) if name in RATIOS), default=0.0)
-        little = feigned < SLIGHT * belief.kinetic and share < SLIGHT
-        slight = little and strays <= UNLIKE and belief.left <= LOST and not RICHER & belief.values.keys()
+        most = FINER if RICHER & belief.values.keys() else SLIGHT
+        little = feigned < most * belief.kinetic and share < most
+        slight = little and strays <= UNLIKE and belief.left <= LOST
         return cls(strays, repeats, belief.strain, belief.left, slip, feigned, share, bool(slight))
 
     @property
