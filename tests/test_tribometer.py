@@ -356,6 +356,12 @@ def test_where_no_static_coefficient_shows_the_reason_is_told(record, why) -> No
 
 
 @pytest.mark.figures
+def test_no_friction_at_all_has_no_coefficient_by_its_work() -> None:
+    x = STROKE * np.sin(2 * np.pi * np.arange(4000) / FS)
+    told = friction_coefficients(ss.Record.of({"x": x, "friction": 0.0 * x}, fs=FS), normal=LOAD)
+    assert told.by_energy.interval == (0.0, 0.0)
+
+
 def test_command(tmp_path, monkeypatch) -> None:
     monkeypatch.chdir(tmp_path)
     for number, level in enumerate((0.3, 0.31)):

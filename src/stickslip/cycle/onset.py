@@ -490,8 +490,9 @@ def _by_peak(record: Record, strokes: Strokes) -> _Borne:
     stray = (RINGS if unknown else 1.0) * float(np.median(strays))
     level = float(np.median([stroke.level for stroke in chosen]))
     if stray > NOTHING * level:
+        unit = record.channels["friction"].unit
         raise EstimateError(
-            f"the friction strays by {stray / level:.2g} times its level after each slip",
+            f"the friction strays by {stray:.2g} {unit} after each slip, from a level of {level:.2g} {unit}",
             f"static friction is told where it strays by less than {100 * NOTHING:.0f} % of its level",
             unknown or "give a record with less noise",
         )

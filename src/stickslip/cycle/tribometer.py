@@ -304,7 +304,8 @@ def _unsure_work(friction: Array, motion: Motion) -> float:
     way, change = np.diff(motion.displacement), np.diff(friction)
     middle = (friction[1:] + friction[:-1]) / 2
     turns = friction[1:] * friction[:-1] < 0
-    return float(np.sum(np.abs(change * way)[turns]) / 4 / np.sum(np.abs(middle * way)))
+    work = float(np.sum(np.abs(middle * way)))
+    return float(np.sum(np.abs(change * way)[turns])) / (4 * work) if work else 0.0
 
 
 def _mean_magnitudes(friction: Array, label: Rows) -> Array:

@@ -282,10 +282,10 @@ def _corrected(findings: Findings, slip: Slip, question: str, options: Sequence[
     if not all(cured.values()):
         return ""
     if slip.unsure:
-        sure = f"± {100 * slip.unsure:g} %"
-        cured |= {name: f"{split_gain(channels[name])[0].strip()} {sure}" for name in MOVED_BY if name in channels}
-        sd = {name: slip.unsure * settings[name] for name in ("mass", "stiffness") if settings.get(name)}
-        settings["sd"] = {**(settings.get("sd") or {}), **sd}
+        cured |= {name: _unsure(channels[name], slip.unsure) for name in MOVED_BY if name in channels}
+        sd = dict(settings.get("sd") or {})
+        least = {name: slip.unsure * settings[name] for name in ("mass", "stiffness") if settings.get(name)}
+        settings["sd"] = sd | {name: max(spread, sd.get(name, 0.0)) for name, spread in least.items()}
     if cured:
         read["channels"] = {**channels, **cured}
     if slip.clock != 1:
@@ -295,6 +295,18 @@ def _corrected(findings: Findings, slip: Slip, question: str, options: Sequence[
     for name, late in slip.delays.items():
         sensors.setdefault(name, {})["delay"] = late
     return _again(findings, question, read, {**settings, "sensors": sensors}, options)
+
+
+def _unsure(spec: str, share: float) -> str:
+    """A channel's column with a gain that is unsure by a share at least.
+
+    Examples
+    --------
+    >>> _unsure("disp [mm]", 0.01), _unsure("disp [mm] ± 5 %", 0.01)
+    ('disp [mm] ± 1 %', 'disp [mm] ± 5 %')
+    """
+    column, stated = split_gain(spec)
+    return f"{column.strip()} ± {100 * max(share, stated):g} %"
 
 
 def completed(findings: Findings, question: str = "analyze", options: Sequence[str] = ()) -> list[str]:

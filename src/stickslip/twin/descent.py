@@ -132,16 +132,16 @@ def linearised(belief: Belief) -> Belief:
         and name != belief.held
         and not belief.pinned(name, float(slope @ residual))
         # a stick feels an excess of none by its square alone: along a slope of rounding it was drawn to 4e8 N
-        and not (name == EXCESS and not belief.values[name] and _deviation(belief, slope) > belief.size(name))
+        and not (name == EXCESS and not belief.values[name] and _is_unseen(belief, name, slope))
     )
     if not names:
         raise EstimateError("a displacement that nothing moves", f"{QUESTION} moves as its law does", "see the record")
     return _fitted(belief, names, levelled(np.column_stack([slopes[name] for name in names])))
 
 
-def _deviation(belief: Belief, slope: Array) -> float:
-    """Standard deviation of a value that alone would be unknown, by its slope."""
-    return belief.noise / float(np.linalg.norm(levelled(slope)))
+def _is_unseen(belief: Belief, name: str, slope: Array) -> bool:
+    """Whether a value as large as any moves x by less than its noise, by its slope."""
+    return belief.size(name) * float(np.linalg.norm(levelled(slope))) < belief.noise
 
 
 def _fitted(belief: Belief, names: tuple[str, ...], jacobian: Array) -> Belief:
