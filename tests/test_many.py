@@ -14,7 +14,7 @@ from click.testing import CliRunner, Result
 import stickslip as ss
 from motions import free_decay
 from stickslip.answers.many import Batch, Kept, Row
-from stickslip.cli import many
+from stickslip.cli import option, records
 from stickslip.cli.program import main
 
 COUNT = 7
@@ -25,7 +25,7 @@ TIME = np.arange(1500) / 250
 def elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("COLUMNS", "80")
-    monkeypatch.setattr(many, "MANY", 5)
+    monkeypatch.setattr(option, "MANY", 5)
 
 
 def written(count: int = COUNT) -> None:
@@ -100,15 +100,15 @@ def test_a_cluster_answers_as_this_machine_does() -> None:
 def test_a_run_that_was_killed_goes_on(monkeypatch: pytest.MonkeyPatch) -> None:
     written()
     asked: list[str] = []
-    real = many.answered
+    real = records.answered
 
-    def watched(task: many.Task) -> Row:
+    def watched(task: records.Task) -> Row:
         if len(asked) == 3:
             raise KeyboardInterrupt
         asked.append(task.names[0])
         return real(task)
 
-    monkeypatch.setattr(many, "answered", watched)
+    monkeypatch.setattr(records, "answered", watched)
     words = ("analyze", "run_*.csv", "--workers", "1", "--output", "out")
     assert ask(*words).exit_code == 130
     kept = Path("out.rows")
@@ -117,7 +117,7 @@ def test_a_run_that_was_killed_goes_on(monkeypatch: pytest.MonkeyPatch) -> None:
         file.write('{"name": "run_')
     first = list(asked)
     asked[:] = [""]  # counts from here
-    monkeypatch.setattr(many, "answered", lambda task: (asked.append(task.names[0]), real(task))[1])
+    monkeypatch.setattr(records, "answered", lambda task: (asked.append(task.names[0]), real(task))[1])
     result = ask(*words)
     assert result.exit_code == 0, result.output
     assert not set(first) & set(asked)

@@ -12,25 +12,22 @@ from typing import TYPE_CHECKING, Any
 import click
 
 import stickslip as ss
-from stickslip.cli.many import Places, answer_many, many_options
+from stickslip.cli import option
 from stickslip.cli.records import (
     RIG_FILE,
-    all_option,
+    Places,
+    answer_many,
     answer_together,
     answers,
-    constants_options,
     default_folder,
     files_of,
     folder_after,
     groups_of,
     name_left_out,
-    normal_option,
-    reading_options,
+    on_twins,
     require_described,
     require_fits,
-    result_options,
     rig_of,
-    usable,
     with_left_out,
 )
 from stickslip.cli.terminal import Output, complain, progress, publish
@@ -57,26 +54,18 @@ twins_option = click.option(
 
 @click.command()
 @click.argument("files", nargs=-1, required=True, metavar="FILES...")
-@constants_options()
-@normal_option
-@click.option(
+@option.constants()
+@option.normal
+@option.choice(
     "--method",
-    type=click.Choice(["auto", "fusion", "motion", "load", "smoother", "five-point", "F", "F1", "F2"]),
-    default="auto",
-    show_default=True,
-    help="How the friction is found: by all sensors together (fusion), by some, or by derivatives; auto says why.",
+    ["auto", "fusion", "motion", "load", "smoother", "five-point", "F", "F1", "F2"],
+    "How the friction is found: by all sensors together (fusion), by some, or by derivatives; auto says why.",
 )
 @twins_option
-@many_options
-@result_options("FILE-stickslip")
-@reading_options
-def analyze(
-    files: tuple[str, ...],
-    output: Output,
-    method: str,
-    twins: int,
-    **options: Any,
-) -> None:
+@option.many
+@option.results("FILE-stickslip")
+@option.reading
+def analyze(files: tuple[str, ...], output: Output, method: str, twins: int, **options: Any) -> None:
     """Find the friction in one record or several.
 
     FILES that belong to one record are joined with +, as in x.mat+z.mat. A quoted pattern ("run_*.csv") stands for
@@ -155,27 +144,21 @@ def _tried(findings: Findings, twins: int, tell: Callable[..., None]) -> Finding
     def show_share(share: float) -> None:
         tell(f"trying the answers of {findings.name} on twins, {100 * share:.0f} %")
 
-    if findings.contradiction:  # the rig that it would be tried on is not the one that wrote the record
-        return findings
     show_share(0.0)
-    try:
-        return ss.tried(findings, twins=twins, processes=processors(), progress=show_share)
-    except ss.errors.EstimateError as error:
-        return replace(findings, notes=(*findings.notes, f"Twins: {error}"))
+    return on_twins(findings, twins, processes=processors(), progress=show_share)
 
 
 @click.command()
-@click.option(
+@option.path(
     "--output",
-    type=click.Path(path_type=Path),
-    callback=usable,
+    "DIR",
+    "Folder for the results.",
+    callback=option.usable,
     default=Path("stickslip-demo"),
     show_default=True,
-    metavar="DIR",
-    help="Folder for the results.",
 )
-@click.option("--json", "as_json", is_flag=True, help="Print the results as JSON and nothing else.")
-@all_option
+@option.json()
+@option.everything
 @twins_option
 def demo(output: Path, as_json: bool, everything: bool, twins: int) -> None:
     """Analyse the bundled record of a simulated rig, with the true answers beside the estimates."""
@@ -191,8 +174,8 @@ def demo(output: Path, as_json: bool, everything: bool, twins: int) -> None:
 @click.command()
 @click.argument("file")
 @click.option("--mass", metavar="VALUE", help="Moving mass in kg, which tells the contact's mode from the mounts'.")
-@result_options("FILE-impact")
-@reading_options
+@option.results("FILE-impact")
+@option.reading
 def impact(file: str, output: Output, **options: Any) -> None:
     """Which resonances does a hammer tap excite, and which sensor's mount are they?
 
@@ -218,12 +201,11 @@ CURVES = (
 
 @click.command()
 @click.argument("files", nargs=-1, required=True, metavar="FILES...")
-@constants_options()
-@click.option(
+@option.constants()
+@option.path(
     "--system",
-    type=click.Path(path_type=Path),
-    metavar="SYSTEM.TOML",
-    help="File of the oscillator, as stickslip simulate reads it: its constants, and the drive where z is not recorded "
+    "SYSTEM.TOML",
+    "File of the oscillator, as stickslip simulate reads it: its constants, and the drive where z is not recorded "
     "(a base at a known amplitude and frequency, a belt, a ramp). It starts with the first sample, whatever its time.",
 )
 @click.option(
@@ -241,8 +223,8 @@ CURVES = (
     "jenkins, iwan, maxwell over the displacement, aging, slip after a step of the speed. Friction is measured, or "
     "found from the motion, the force and --mass. The choice where a file holds friction and no displacement.",
 )
-@result_options("FILE-fit")
-@reading_options
+@option.results("FILE-fit")
+@option.reading
 def fit(
     files: tuple[str, ...],
     output: Output,
@@ -344,15 +326,15 @@ def _read(files: Sequence[Path], rig: RigSettings, names: Sequence[str], *, fitt
 @click.command()
 @click.argument("law", type=click.Path(path_type=Path, exists=True), metavar="LAW")
 @click.argument("files", nargs=-1, required=True, metavar="FILES...")
-@constants_options("Oscillating mass in kg; that of LAW unless given.")
+@option.constants("Oscillating mass in kg; that of LAW unless given.")
 @click.option(
     "--plain/--no-plain",
     default=True,
     show_default=True,
     help="Fit Coulomb friction and a damper to each record, to stand beside a richer law.",
 )
-@result_options("FILE-predicted")
-@reading_options
+@option.results("FILE-predicted")
+@option.reading
 def predict(law: Path, files: tuple[str, ...], output: Output, plain: bool, **options: Any) -> None:
     """Simulate a fitted law along other records, and say how much of them it follows.
 

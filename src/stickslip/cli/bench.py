@@ -17,7 +17,8 @@ import click
 
 import stickslip as ss
 import stickslip.bench as bench
-from stickslip.cli.records import all_option, groups_of, pair, usable
+from stickslip.cli import option
+from stickslip.cli.records import groups_of, pair
 from stickslip.cli.terminal import aligned, deliver, print_json, progress, redrawn, say, say_json, wrapped
 from stickslip.errors import ABSENT, INTERRUPTED
 
@@ -37,19 +38,16 @@ Source = Callable[["BenchStep"], "Record | None"]
     metavar="NAME",
     help="What measures: a table [devices.NAME] of the configuration, or a kind of device. sim needs no hardware.",
 )
-@click.option("--config", type=click.Path(path_type=Path), metavar="RIG.TOML", help="What is known of the rig already.")
-@click.option("--step", "steps", multiple=True, metavar="NAME", help="Record only this step. Repeatable.")
-@click.option("--again", multiple=True, metavar="NAME", help="Record this step anew. Repeatable.")
-@click.option("--seed", type=click.IntRange(min=0), default=1, show_default=True, help="Of a simulated rig's noise.")
-@click.option(
-    "--output",
-    type=click.Path(path_type=Path),
-    metavar="DIR",
-    help="Folder of records, rig.toml and report; commission unless given, none where files are named.",
+@option.path("--config", "RIG.TOML", "What is known of the rig already.")
+@option.several("--step", "NAME", "Record only this step. Repeatable.", to="steps")
+@option.several("--again", "NAME", "Record this step anew. Repeatable.")
+@option.count("--seed", 1, "Of a simulated rig's noise.", least=0)
+@option.path(
+    "--output", "DIR", "Folder of records, rig.toml and report; commission unless given, none where files are named."
 )
 @click.option("--list", "listed", is_flag=True, help="Print the steps, and what to do at each.")
-@click.option("--json", "as_json", is_flag=True, help="Print the results as JSON and nothing else.")
-@all_option
+@option.json()
+@option.everything
 def commission(
     files: tuple[str, ...], output: Path | None, as_json: bool, everything: bool, listed: bool, **options: Any
 ) -> None:
@@ -256,46 +254,35 @@ TRIGGER = re.compile(r"\s*(\w+)\s*([<>])\s*(\S+)\s*")
 
 
 @click.command()
-@click.option(
+@option.several(
     "--device",
-    "names",
-    multiple=True,
+    "NAME",
+    "A table [devices.NAME] of the configuration, or a kind of device. Repeatable.",
+    to="names",
     required=True,
-    metavar="NAME",
-    help="A table [devices.NAME] of the configuration, or a kind of device. Repeatable.",
 )
-@click.option("--config", type=click.Path(path_type=Path), metavar="RIG.TOML", help="File of the rig and its devices.")
-@click.option("--seconds", type=click.FloatRange(min=0, min_open=True), help="How long; until Ctrl-C unless given.")
+@option.path("--config", "RIG.TOML", "File of the rig and its devices.")
+@click.option("--seconds", type=option.POSITIVE, help="How long; until Ctrl-C unless given.")
 @click.option(
     "--trigger", metavar='"CHANNEL>LEVEL"', help='Begin where a reading passes a level, in SI: "load>0.5", "x<-1e-3".'
 )
 @click.option("--before", type=click.FloatRange(min=0), metavar="S", help="Time before the trigger that is kept.")
 @click.option(
     "--timeout",
-    type=click.FloatRange(min=0, min_open=True),
+    type=option.POSITIVE,
     metavar="S",
     help="How long the trigger is waited for; until Ctrl-C unless given.",
 )
-@click.option(
-    "--drive",
-    multiple=True,
-    metavar='"OUTPUT=AMPLITUDE@HZ"',
-    help='Move an output by a tone meanwhile, in SI: "base=0.65e-3@2.5". Repeatable.',
+@option.several(
+    "--drive", '"OUTPUT=AMPLITUDE@HZ"', 'Move an output by a tone meanwhile, in SI: "base=0.65e-3@2.5". Repeatable.'
 )
-@click.option(
+@option.path(
     "--runs",
-    type=click.Path(path_type=Path),
-    metavar="RUNS.TOML",
-    help="Record every run of a list, as bench next writes it, each with its own tone; --output names their folder.",
+    "RUNS.TOML",
+    "Record every run of a list, as bench next writes it, each with its own tone; --output names their folder.",
 )
-@click.option(
-    "--output",
-    required=True,
-    type=click.Path(path_type=Path),
-    metavar="FILE",
-    help="The record: .h5, .csv or .parquet; of --runs a folder.",
-)
-@click.option("--json", "as_json", is_flag=True, help="Print what was recorded as JSON and nothing else.")
+@option.path("--output", "FILE", "The record: .h5, .csv or .parquet; of --runs a folder.", required=True)
+@option.json("Print what was recorded as JSON and nothing else.")
 def acquire(names: tuple[str, ...], config: Path | None, output: Path, as_json: bool, **options: Any) -> None:
     """Record from devices into a file.
 
@@ -409,10 +396,8 @@ def _recorded(done: bench.Acquired, *, as_json: bool) -> None:
 
 
 @click.command()
-@click.option(
-    "--config", type=click.Path(path_type=Path), metavar="RIG.TOML", help="List the devices that it names too."
-)
-@click.option("--json", "as_json", is_flag=True, help="Print the list as JSON and nothing else.")
+@option.path("--config", "RIG.TOML", "List the devices that it names too.")
+@option.json("Print the list as JSON and nothing else.")
 def devices(config: Path | None, as_json: bool) -> None:
     """List what can measure here: kinds of devices, what is plugged in, and which package is missing.
 
@@ -444,17 +429,16 @@ def simulated_bench() -> None:
 
 @simulated_bench.command()
 @click.option("--fast", is_flag=True, help="As fast as the computer can, and not in the time that a rig would take.")
-@click.option("--seed", type=click.IntRange(min=0), default=1, show_default=True, help="Draws gains, zeros and noise.")
-@click.option(
+@option.count("--seed", 1, "Draws gains, zeros and noise.", least=0)
+@option.path(
     "--output",
-    type=click.Path(path_type=Path),
+    "DIR",
+    "Folder of records, rig.toml, next.toml and report.",
     default=Path("bench-tour"),
     show_default=True,
-    metavar="DIR",
-    help="Folder of records, rig.toml, next.toml and report.",
 )
-@click.option("--json", "as_json", is_flag=True, help="Print the results as JSON and nothing else.")
-@all_option
+@option.json()
+@option.everything
 def tour(fast: bool, seed: int, output: Path, as_json: bool, everything: bool) -> None:
     """Repeat the thesis's experiment on a simulated bench, from a bare rig to the report.
 
@@ -463,7 +447,7 @@ def tour(fast: bool, seed: int, output: Path, as_json: bool, everything: bool) -
     the true values beside.
     """
     report = output / "report"
-    usable(click.get_current_context(), None, report)  # type: ignore[arg-type]
+    option.usable(click.get_current_context(), None, report)  # type: ignore[arg-type]
     with progress(100) as tell:
         done = bench.tour(output, seed=seed, fast=fast, progress=lambda stage, share: tell(stage, 100 * share))
     deliver(done, report, as_json=as_json, everything=everything)
@@ -471,12 +455,12 @@ def tour(fast: bool, seed: int, output: Path, as_json: bool, everything: bool) -
 
 @simulated_bench.command("next")
 @click.argument("laws", nargs=-1, required=True, metavar="LAW LAW...")
-@click.option("--config", type=click.Path(path_type=Path), metavar="RIG.TOML", help="The rig, its shaker, its sensors.")
-@click.option("--count", type=click.IntRange(min=1), default=3, show_default=True, help="How many runs.")
-@click.option("--seconds", type=click.FloatRange(min=0, min_open=True), default=20.0, show_default=True)
-@click.option("--done", multiple=True, metavar='"AMPLITUDE@HZ"', help='A run made already: "0.65e-3@2.5". Repeatable.')
-@click.option("--output", type=click.Path(path_type=Path), metavar="RUNS.TOML", help="Write the runs, for acquire.")
-@click.option("--json", "as_json", is_flag=True, help="Print the runs as JSON and nothing else.")
+@option.path("--config", "RIG.TOML", "The rig, its shaker, its sensors.")
+@option.count("--count", 3, "How many runs.")
+@click.option("--seconds", type=option.POSITIVE, default=20.0, show_default=True)
+@option.several("--done", '"AMPLITUDE@HZ"', 'A run made already: "0.65e-3@2.5". Repeatable.')
+@option.path("--output", "RUNS.TOML", "Write the runs, for acquire.")
+@option.json("Print the runs as JSON and nothing else.")
 def following(
     laws: tuple[str, ...],
     config: Path | None,

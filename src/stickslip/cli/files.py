@@ -10,17 +10,8 @@ from typing import TYPE_CHECKING, Any
 import click
 
 import stickslip as ss
-from stickslip.cli.records import (
-    RIG_FILE,
-    all_option,
-    collected,
-    constants_options,
-    files_of,
-    groups_of,
-    reading_options,
-    require_described,
-    rig_of,
-)
+from stickslip.cli import option
+from stickslip.cli.records import RIG_FILE, collected, files_of, groups_of, require_described, rig_of
 from stickslip.cli.terminal import aligned, complain, say, spoken, wrapped
 
 if TYPE_CHECKING:
@@ -31,7 +22,7 @@ if TYPE_CHECKING:
 
 @click.command()
 @click.argument("file")
-@reading_options
+@option.reading
 def check(file: str, **options: Any) -> None:
     """Tell what is wrong with a record, with row numbers."""
     rig = rig_of(file, **options)
@@ -58,9 +49,9 @@ def check(file: str, **options: Any) -> None:
 
 @click.command()
 @click.argument("file")
-@click.argument("out", type=click.Path(path_type=Path))
+@click.argument("out", type=option.PATH)
 @click.option("--force", is_flag=True, help="Write over OUT if it is there.")
-@reading_options
+@option.reading
 def convert(file: str, out: Path, force: bool, **options: Any) -> None:
     """Read FILE and write it as OUT: CSV, HDF5 or Parquet by its suffix, with units and history."""
     files = files_of(file, "one is converted at a time")
@@ -74,7 +65,7 @@ def convert(file: str, out: Path, force: bool, **options: Any) -> None:
 
 @click.command()
 @click.argument("name", required=False)
-@all_option
+@option.everything
 def datasets(name: str | None, everything: bool) -> None:
     """List the public record sets, or fetch the one named and tell its columns, units and rig."""
     if name is not None:
@@ -106,18 +97,11 @@ CONSTANTS = {
 
 @click.command()
 @click.argument("files", nargs=-1, required=True, metavar="FILES...")
-@constants_options()
+@option.constants()
 @click.option("--yes", is_flag=True, help="Ask nothing: take what was recognised and what the options say.")
-@click.option(
-    "--output",
-    type=click.Path(path_type=Path),
-    default=Path(RIG_FILE),
-    show_default=True,
-    metavar="FILE",
-    help="The file to write.",
-)
+@option.path("--output", "FILE", "The file to write.", default=Path(RIG_FILE), show_default=True)
 @click.option("--force", is_flag=True, help="Write over it if it is there.")
-@reading_options
+@option.reading
 def init(files: tuple[str, ...], yes: bool, output: Path, force: bool, **options: Any) -> None:
     """Describe a rig once: columns, units and constants go into rig.toml.
 

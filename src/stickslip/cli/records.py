@@ -1,24 +1,26 @@
-"""The options that commands share, and the records that they read by them."""
+"""The records of a command: how they are named and read; one, several and hundreds of them asked."""
 
 from __future__ import annotations
 
 import contextlib
-import dataclasses
 import fnmatch
 import functools
 import glob
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
 import stickslip as ss
+from stickslip.cli import option
 from stickslip.cli.terminal import Output, complain, progress, spoken
 
 if TYPE_CHECKING:
     from stickslip import Record
+    from stickslip.answers import Batch, Findings, Row
     from stickslip.rig import RigSettings
     from stickslip.systems import Case
 
@@ -26,6 +28,8 @@ Answer = TypeVar("Answer")
 Reader = Callable[..., "Record"]
 
 RIG_FILE = "rig.toml"  # of the folder one is in: read where no other is named
+POINTS = 120  # of a small picture
+SHOWN = 3.0  # cycles in it, where there are cycles
 
 
 def rig_of(
@@ -266,7 +270,7 @@ def _say(tell: Callable[[str, float], None], what: str, done: float, state: str)
 def with_left_out(results: Any, refused: Sequence[ss.StickslipError]) -> Any:
     """The results, with a note for each record that is not among them."""
     notes = (*results.notes, *(f"Left out: {error}" for error in refused))
-    return dataclasses.replace(results, notes=notes)
+    return replace(results, notes=notes)
 
 
 def name_left_out(refused: Iterable[ss.StickslipError]) -> None:
@@ -289,145 +293,208 @@ def pair(text: str, option: str) -> tuple[str, str]:
     return name.strip(), value.strip()
 
 
-Decorator = Callable[[Callable[..., None]], Callable[..., None]]
+@dataclass(frozen=True)
+class Places:
+    """Where many records are worked on, and where their table goes."""
+
+    workers: int | None
+    engine: str
+    table: Path | None
+
+    @classmethod
+    def of(cls, options: dict[str, Any]) -> Places:
+        """Taken out of a command's options."""
+        engine = ss.answers.require_engine(options.pop("engine"))
+        return cls(options.pop("workers"), engine, options.pop("table"))
+
+    def wanted(self, groups: Sequence[Sequence[Path]]) -> bool:
+        """Whether the records are so many, or the table is asked for."""
+        return len(groups) > option.MANY or self.table is not None
 
 
-def together(*options: Decorator) -> Decorator:
-    """Several options as one decorator, in the order in which the help lists them."""
+@dataclass(frozen=True)
+class Task:
+    """One record to be asked."""
 
-    def decorate(command: Callable[..., None]) -> Callable[..., None]:
-        for option in reversed(options):
-            command = option(command)
-        return command
-
-    return decorate
-
-
-# How a file is read.
-reading_options = together(
-    click.option(
-        "--channels",
-        multiple=True,
-        metavar='"NAME=COLUMN [UNIT]"',
-        help='What a column is: "x=qm [m]", "force=vir * 35.15 [N]", "a=acc [g] ± 1 %". Repeatable.',
-    ),
-    click.option(
-        "--units",
-        multiple=True,
-        metavar='"COLUMN=UNIT"',
-        help='Unit of a column whose header states none: "x=mm", "#1=ms". Repeatable.',
-    ),
-    click.option(
-        "--sensor",
-        "sensors",
-        multiple=True,
-        metavar='"CHANNEL.NAME=VALUE"',
-        help='What is known of a sensor: "a.delay=3 ms", "a.mount=125 Hz, 0.1", "load.inertia=20 g". Repeatable.',
-    ),
-    click.option("--fs", metavar="HZ", help="Sampling rate, for a file that states none."),
-    click.option("--time", metavar="COLUMN", help="Column that holds the time, where its header does not say."),
-    click.option("--delimiter", metavar="SIGN", help="Delimiter of a text file, where it can not be told."),
-    click.option("--decimal", type=click.Choice([".", ","]), help="Decimal sign of a text file."),
-    click.option("--rows", metavar="FIRST:LAST", help="Rows to keep of each file."),
-    click.option(
-        "--repair",
-        metavar="LIST",
-        help="Repairs after reading, in this order, with commas: clock, gaps, missing, spikes, clipping, drift; "
-        "for one channel alone as in drift:x.",
-    ),
-    click.option(
-        "--config",
-        type=click.Path(path_type=Path),
-        metavar="RIG.TOML",
-        help="The rig's constants and channel map; unless given rig.toml of this folder. Options go before it.",
-    ),
-)
+    question: str
+    files: tuple[Path, ...]
+    names: tuple[str, ...]
+    key: str
+    rig: RigSettings
+    options: Mapping[str, Any]
 
 
-def constants_options(mass: str = 'Oscillating mass in kg, or with its unit ("250 g", "2.42 ± 0.02 kg").') -> Decorator:
-    """The options that state the oscillator; `mass` is the help of the first."""
-    return together(
-        click.option("--mass", metavar="VALUE", help=mass),
-        click.option("--stiffness", metavar="VALUE", help="Spring in N/m, or with its unit."),
-        click.option("--damping", metavar="VALUE", help="Viscous damping of the suspension in N s/m."),
-        click.option("--damper", type=click.Choice(["ground", "base"]), help="What the damper ends on."),
-        contact_option,
+def ask_many(
+    question: str,
+    groups: Sequence[Sequence[Path]],
+    rig: RigSettings,
+    options: Mapping[str, Any],
+    places: Places,
+    *,
+    folder: Path,
+    tell: Callable[..., None],
+) -> Batch:
+    """One row a record; those that an earlier run has kept are not asked again."""
+    if places.table is not None:
+        ss.story.check_table(places.table)
+    tasks = [
+        Task(question, tuple(group), tuple(names), "+".join(map(ss.record.checksum, group)), rig, options)
+        for group, names in zip(groups, names_of(groups), strict=True)
+    ]
+    query = {"question": question, "rig": rig.model_dump(), "options": dict(options), "version": ss.__version__}
+    with ss.answers.Kept(_kept(folder), query) as kept:
+        left = list({task.key: task for task in reversed(tasks) if task.key not in kept.rows}.values())[::-1]
+        answers = ss.answers.spread(answered, tasks=left, engine=places.engine, workers=places.workers)
+        for done, row in enumerate(answers, start=len(tasks) - len(left) + 1):
+            kept.add(row)
+            tell(f"{question}: {row.name}", done)
+    rows = tuple(_rows(tasks, kept.rows))
+    return ss.answers.Batch.of(question, rows, AXES[question], _untried(options))
+
+
+def _kept(folder: Path) -> Path:
+    """Where rows are kept until the folder of results is there."""
+    return folder.with_name(f"{folder.name}.rows")
+
+
+def answer_many(
+    question: str,
+    groups: Sequence[Sequence[Path]],
+    rig: RigSettings,
+    query: Mapping[str, Any],
+    places: Places,
+    *,
+    usual: Path,
+    output: Output,
+) -> None:
+    """Ask all records, show what was found, write it into a folder (not of JSON alone), forget what was kept of it."""
+    folder = output.chosen or usual
+    with progress(len(groups)) as tell:
+        batch = ask_many(question, groups, rig, query, places, folder=folder, tell=tell)
+    output.deliver(batch, output.folder(usual))
+    if places.table is not None:
+        ss.story.write_table(batch, places.table)
+    _kept(folder).unlink(missing_ok=True)
+
+
+def answer_all(
+    question: str,
+    groups: Sequence[Sequence[Path]],
+    rig: RigSettings,
+    query: Mapping[str, Any],
+    places: Places,
+    *,
+    compare: Callable[[Any], Any],
+    usual: Path,
+    output: Output,
+) -> None:
+    """Ask all records: many are a row each, few have each a part of the page, and are compared."""
+    if places.wanted(groups):
+        answer_many(question, groups, rig, query, places, usual=usual, output=output)
+        return
+    answer_together(
+        groups,
+        rig,
+        lambda record: ASK[question](record, rig, **query),
+        together=lambda findings: compare(findings) if len(findings) > 1 else findings[0],
+        folder=output.folder(usual),
+        output=output,
     )
 
 
-contact_option = click.option("--contact", type=click.Choice(["ground", "base"]), help="What the mass slides on.")
-normal_option = click.option(
-    "--normal",
-    multiple=True,
-    metavar='LOAD or "PATTERN=LOAD"',
-    help="Normal load in N, for all files or for those whose name fits. Repeatable.",
-)
-form_option = click.option(
-    "--format",
-    "form",
-    type=click.Choice(["csv", "h5", "parquet"]),
-    default="csv",
-    show_default=True,
-    help="Format of the record.",
-)
+def _rows(tasks: Sequence[Task], kept: Mapping[str, Row]) -> Iterator[Row]:
+    """In the order given, copies after the record that they are copies of."""
+    first: dict[str, str] = {}
+    for task in tasks:
+        name = " + ".join(task.names)
+        yield replace(kept[task.key], name=name, same_as=first.get(task.key, ""))
+        first.setdefault(task.key, name)
 
 
-def usable(context: click.Context, option: click.Parameter, folder: Path | None) -> Path | None:
-    """A folder for results, refused before the work where it may not be written; none may be asked for."""
-    if folder is not None:
-        ss.story.check_folder(folder)
-    return folder
+def _untried(options: Mapping[str, Any]) -> tuple[str, ...]:
+    if options.get("twins") != 0:
+        return ()
+    return ("The answers of so many records are not tried on twins; --twins 40 does that, for some seconds each.",)
 
 
-all_option = click.option(
-    "--all", "everything", is_flag=True, help="Print all quantities, cautions and notes, as the page has them."
-)
+# ---- one of them
 
 
-def result_options(folder: str) -> Decorator:
-    """The options that say where the results go, `folder` unless it is said, and how much of them is printed.
-
-    The command gets them together, as its `output`.
-    """
-    chosen = click.option(
-        "--output",
-        type=click.Path(path_type=Path),
-        callback=usable,
-        metavar="DIR",
-        help=f"Folder for the results; {folder} unless given.",
-    )
-    as_json = click.option(
-        "--json",
-        "as_json",
-        is_flag=True,
-        help="Print the results as JSON and nothing else; a folder is written only with --output.",
-    )
-    return together(chosen, as_json, all_option, _gathered)
+def answered(task: Task) -> Row:
+    """What one record answers; why, where it does not."""
+    name = " + ".join(task.names)
+    try:
+        record = ss.answers.read_mended(task.files, rig=task.rig, names=task.names)
+        findings = ASK[task.question](record, task.rig, **task.options)
+        answer, picture = ss.summary(findings).answer, PICTURES[task.question](findings)
+        quoted, level = findings.quoted, findings.level
+        return ss.answers.Row(name, task.key, answer, quoted, level, findings.normal, picture=picture)
+    except ss.errors.ModelError:
+        raise
+    except ss.StickslipError as error:
+        return ss.answers.Row(name, task.key, refusal=str(error))
 
 
-def _gathered(command: Callable[..., None]) -> Callable[..., None]:
-    @functools.wraps(command)
-    def gathering(*, output: Path | None, as_json: bool, everything: bool, **arguments: Any) -> None:
-        command(output=Output(output, as_json, everything), **arguments)
-
-    return gathering
-
-
-changes_option = click.option(
-    "--set",
-    "changes",
-    multiple=True,
-    metavar='"NAME=VALUE"',
-    help='Another value of a parameter: "kinetic=1.3", "amplitude=0.7 mm", "law.stiffness=2 N/um". Repeatable.',
-)
+def on_twins(findings: Findings, twins: int, **how: Any) -> Findings:
+    """The answers as their twins leave them; with a note of why, where the record has no twin."""
+    if not twins or findings.contradiction:  # the rig that it would be tried on is not the one that wrote the record
+        return findings
+    try:
+        return ss.tried(findings, twins=twins, **how)
+    except ss.errors.EstimateError as error:
+        return replace(findings, notes=(*findings.notes, f"Twins: {error}"))
 
 
-# How long it runs, and what is changed of it.
-case_options = together(
-    click.option("--duration", metavar="TIME", help="Time to simulate in s, or with its unit."),
-    click.option("--cycles", type=click.FloatRange(min=0, min_open=True), help="The same in periods of the drive."),
-    changes_option,
-)
+def _analyzed(record: Record, rig: RigSettings, *, method: str, twins: int) -> Any:
+    return on_twins(ss.analyze(record, rig=rig, method=method), twins)
+
+
+def _decayed(record: Record, rig: RigSettings, **query: Any) -> Any:
+    return ss.analyze_decay(record, **query)
+
+
+def _squeaked(record: Record, rig: RigSettings, **query: Any) -> Any:
+    findings = ss.analyze_squeaks(record, contact=rig.contact, **query)
+    loads = (rig.normal_load(part) for part in (*findings.name.split(" + "), findings.name))
+    return replace(findings, normal=next((load for load in loads if load is not None), findings.normal))
+
+
+ASK: dict[str, Callable[..., Any]] = {"analyze": _analyzed, "decay": _decayed, "squeak": _squeaked}
+
+Picture = tuple[list[float], list[float]]
+
+
+def _loop(findings: Any) -> Picture:
+    """Friction over the displacement, for some cycles of the middle."""
+    record = findings.record
+    if "friction" not in record or "x" not in record:
+        return _trace(findings)
+    count = len(record)
+    if findings.loops is not None:
+        count = min(count, round(SHOWN * record.fs / findings.loops.frequency.value))
+    first = (len(record) - count) // 2
+    return _thinned(record["x"][first : first + count], record["friction"][first : first + count])
+
+
+def _trace(findings: Any) -> Picture:
+    """The channel that was asked over the time."""
+    record = findings.record
+    channel = findings.settings.get("channel") or next(iter(record))
+    return _thinned(record.time, record[channel if channel in record else next(iter(record))])
+
+
+def _thinned(x: Any, y: Any) -> Picture:
+    import numpy as np  # the command line starts without it
+
+    rows = np.linspace(0, len(x) - 1, min(POINTS, len(x))).astype(int)
+    kept = np.isfinite(x[rows]) & np.isfinite(y[rows])
+    return [float(f"{v:.5g}") for v in x[rows][kept]], [float(f"{v:.5g}") for v in y[rows][kept]]
+
+
+PICTURES: dict[str, Callable[[Any], Picture]] = {"analyze": _loop, "decay": _trace, "squeak": _trace}
+AXES = {
+    "analyze": ("displacement", "friction"), "decay": ("time", "displacement"), "squeak": ("time", "sound or motion"),
+}  # fmt: skip
 
 
 def wanted_case(

@@ -11,18 +11,8 @@ from typing import TYPE_CHECKING, Any
 import click
 
 import stickslip as ss
-from stickslip.cli.records import (
-    case_options,
-    folder_after,
-    folder_name,
-    form_option,
-    groups_of,
-    pair,
-    reading_options,
-    result_options,
-    rig_of,
-    wanted_case,
-)
+from stickslip.cli import option
+from stickslip.cli.records import folder_after, folder_name, groups_of, pair, rig_of, wanted_case
 from stickslip.cli.terminal import Output, aligned, progress, say, say_json, wrapped
 
 if TYPE_CHECKING:
@@ -50,52 +40,36 @@ def rig() -> None:
 
 @rig.command("measure")
 @click.argument("case", metavar="SCENARIO|FILE.toml")
-@click.option(
-    "--preset",
-    type=click.Choice(list(PRESETS)),
-    default="air-track",
-    show_default=True,
-    help="The sensors: one of the thesis's two rigs, or sensors without a fault.",
-)
-@click.option(
+@option.choice("--preset", list(PRESETS), "The sensors: one of the thesis's two rigs, or sensors without a fault.")
+@option.several(
     "--sensor",
-    "sensors",
-    multiple=True,
-    metavar='"CHANNEL.NAME=VALUE"',
-    help='Another value of a sensor, in SI: "x.lag=0", "load.limit=20", "a.frequency=2000". Repeatable.',
+    '"CHANNEL.NAME=VALUE"',
+    'Another value of a sensor, in SI: "x.lag=0", "load.limit=20", "a.frequency=2000". Repeatable.',
+    to="sensors",
 )
-@click.option(
+@option.several(
     "--fs",
-    "rates",
-    type=click.FloatRange(min=0, min_open=True),
-    multiple=True,
-    metavar="HZ",
-    help="Sampling rate, 4000 unless given; of a plan 1000, 2000 and 4000. Repeatable in a plan.",
+    "HZ",
+    "Sampling rate, 4000 unless given; of a plan 1000, 2000 and 4000. Repeatable in a plan.",
+    to="rates",
+    type=option.POSITIVE,
 )
 @click.option(
     "--start", type=float, metavar="S", default=0.0, show_default=True, help="Time of the motion when recording begins."
 )
-@click.option("--seed", type=click.IntRange(min=0), default=1, show_default=True, help="The same seed, the same noise.")
+@option.count("--seed", 1, "The same seed, the same noise.", least=0)
 @click.option("--stated", is_flag=True, help="State in the record what a calibration of the sensors would say.")
 @click.option("--plan", is_flag=True, help="Do not keep a record: tell how accurate which sensors and rates would be.")
-@click.option(
-    "--draws", type=click.IntRange(min=1), default=5, show_default=True, help="Records of each rate in a plan."
-)
-@click.option(
+@option.count("--draws", 5, "Records of each rate in a plan.")
+@option.several(
     "--need",
-    multiple=True,
-    metavar='"QUESTION=ERROR"',
-    help='Of a plan, the least that is enough: "contact stiffness=500 N/m", "friction=10 mN". Repeatable.',
+    '"QUESTION=ERROR"',
+    'Of a plan, the least that is enough: "contact stiffness=500 N/m", "friction=10 mN". Repeatable.',
 )
-@click.option(
-    "--config",
-    type=click.Path(path_type=Path),
-    metavar="RIG.TOML",
-    help="Of a plan: its [shaker] has to be able to move the base so.",
-)
-@form_option
-@case_options
-@result_options("NAME-rig, or NAME-plan,")
+@option.path("--config", "RIG.TOML", "Of a plan: its [shaker] has to be able to move the base so.")
+@option.form
+@option.case
+@option.results("NAME-rig, or NAME-plan,")
 def measure(case: str, output: Output, plan: bool, **options: Any) -> None:
     """Measure a simulated motion with a virtual rig, or plan an experiment on it.
 
@@ -165,8 +139,8 @@ def _planned(
 @rig.command("join")
 @click.argument("first")
 @click.argument("second")
-@click.option("--first-channels", multiple=True, metavar='"NAME=COLUMN [UNIT]"', help="Columns of FIRST. Repeatable.")
-@click.option("--second-channels", multiple=True, metavar='"NAME=COLUMN [UNIT]"', help="Columns of SECOND. Repeatable.")
+@option.several("--first-channels", '"NAME=COLUMN [UNIT]"', "Columns of FIRST. Repeatable.")
+@option.several("--second-channels", '"NAME=COLUMN [UNIT]"', "Columns of SECOND. Repeatable.")
 @click.option(
     "--on", metavar='"CHANNEL" or "CHANNEL,CHANNEL"', help="What both recorded of one motion; found unless given."
 )
@@ -174,16 +148,9 @@ def _planned(
     "--offset", metavar="TIME", help="Time to add to SECOND's clock in s, or with its unit; found unless given."
 )
 @click.option("--drift", is_flag=True, help="Find how much faster one clock runs, too.")
-@click.option(
-    "--format",
-    "form",
-    type=click.Choice(["csv", "h5", "parquet"]),
-    default="csv",
-    show_default=True,
-    help="Format of the record.",
-)
-@result_options("FIRST-joined")
-@reading_options
+@option.form
+@option.results("FIRST-joined")
+@option.reading
 def join(first: str, second: str, output: Output, **options: Any) -> None:
     """Make one record of what two recorders wrote of the same run, each on its own clock.
 
@@ -218,7 +185,7 @@ def join(first: str, second: str, output: Output, **options: Any) -> None:
 
 @click.command()
 @click.argument("chapters", nargs=-1, metavar="[CHAPTER]...")
-@result_options("thesis-stickslip")
+@option.results("thesis-stickslip")
 def thesis(chapters: tuple[str, ...], output: Output) -> None:
     """Reproduce the thesis: every printed number beside ours with a verdict, every figure beside its caption.
 

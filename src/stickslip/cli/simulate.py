@@ -14,28 +14,9 @@ from typing import TYPE_CHECKING, Any
 import click
 
 import stickslip as ss
-from stickslip.cli.records import (
-    all_option,
-    case_options,
-    changes_option,
-    folder_name,
-    form_option,
-    number_of,
-    result_options,
-    usable,
-    wanted_case,
-)
-from stickslip.cli.terminal import (
-    Output,
-    print_json,
-    progress,
-    publish,
-    say,
-    say_json,
-    say_report,
-    show,
-    wrapped,
-)
+from stickslip.cli import option
+from stickslip.cli.records import folder_name, number_of, wanted_case
+from stickslip.cli.terminal import Output, print_json, progress, publish, say, say_json, say_report, show, wrapped
 from stickslip.errors import INTERRUPTED
 
 if TYPE_CHECKING:
@@ -47,26 +28,19 @@ LIST_WIDTH = 100
 @click.command()
 @click.argument("case", required=False, metavar="[SCENARIO|FILE.toml]")
 @click.option("--list", "listed", is_flag=True, help="List the scenarios, with what is known of each.")
-@case_options
+@option.case
 @click.option("--fs", metavar="HZ", help="Sampling rate of the record; fine enough for the motion unless given.")
-@form_option
+@option.form
 @click.option("--animate", "animation", type=click.Choice(["gif", "mp4"]), help="Add a moving picture; mp4 by ffmpeg.")
-@click.option(
+@option.path(
     "--fmu",
-    type=click.Path(path_type=Path),
-    metavar="FILE.fmu",
-    help="Also write the mass with its friction as a functional mock-up unit (FMI 3), which a C compiler "
+    "FILE.fmu",
+    "Also write the mass with its friction as a functional mock-up unit (FMI 3), which a C compiler "
     "here compiles; force and z are its inputs.",
 )
 @click.option("--sound", is_flag=True, help="Add what is heard, sound.wav; of a squeak rig its sensors' record too.")
-@result_options("NAME-stickslip")
-def simulate(
-    case: str | None,
-    listed: bool,
-    output: Output,
-    fmu: Path | None,
-    **options: Any,
-) -> None:
+@option.results("NAME-stickslip")
+def simulate(case: str | None, listed: bool, output: Output, fmu: Path | None, **options: Any) -> None:
     """Simulate masses that rub, exactly, event by event.
 
     What to simulate is a named scenario, or a TOML file of a system: masses, friction laws and a drive. Without
@@ -142,7 +116,7 @@ CASE = click.argument("case", metavar="SCENARIO|FILE.toml")
 
 
 @click.command()
-@click.argument("file", type=click.Path(path_type=Path))
+@click.argument("file", type=option.PATH)
 @click.option(
     "--engine",
     default="threads",
@@ -150,21 +124,10 @@ CASE = click.argument("case", metavar="SCENARIO|FILE.toml")
     metavar="NAME",
     help="Where it runs: serial, threads, dask, dask://HOST:PORT or cuda.",
 )
-@click.option(
-    "--store",
-    type=click.Path(path_type=Path),
-    metavar="MAP.ZARR",
-    help="Where what is done is kept, and goes on after an end; FILE.zarr unless given.",
-)
-@click.option(
-    "--output",
-    type=click.Path(path_type=Path),
-    callback=usable,
-    metavar="DIR",
-    help="Folder for the report and its figures; none unless given.",
-)
-@click.option("--json", "as_json", is_flag=True, help="Print the results as JSON and nothing else.")
-@all_option
+@option.path("--store", "MAP.ZARR", "Where what is done is kept, and goes on after an end; FILE.zarr unless given.")
+@option.path("--output", "DIR", "Folder for the report and its figures; none unless given.", callback=option.usable)
+@option.json()
+@option.everything
 def sweep(file: Path, engine: str, store: Path | None, output: Path | None, as_json: bool, everything: bool) -> None:
     """Map what a system does over a grid of its parameters.
 
@@ -204,8 +167,8 @@ def sweep(file: Path, engine: str, store: Path | None, output: Path | None, as_j
 @click.option(
     "--speed", metavar="VALUE", help="Speed of the counter-face in m/s, or with its unit; the belt's unless given."
 )
-@changes_option
-@result_options("NAME-stability")
+@option.changes
+@option.results("NAME-stability")
 def stability(case: str, output: Output, speed: str | None, changes: tuple[str, ...]) -> None:
     """Does steady sliding last, or does it squeal, and what feeds the vibration?
 
@@ -227,17 +190,11 @@ def stability(case: str, output: Output, speed: str | None, changes: tuple[str, 
 @click.argument("parameter")
 @click.option("--from", "low", required=True, metavar="VALUE", help="Least value, in SI or with its unit.")
 @click.option("--to", "high", required=True, metavar="VALUE", help="Largest value.")
-@click.option("--steps", type=click.IntRange(min=2), default=25, show_default=True, help="Number of values.")
-@click.option(
-    "--transient",
-    type=click.IntRange(min=1),
-    default=64,
-    show_default=True,
-    help="Periods before a motion counts as settled.",
-)
+@option.count("--steps", 25, "Number of values.", least=2)
+@option.count("--transient", 64, "Periods before a motion counts as settled.")
 @click.option("--branches", is_flag=True, help="Continue periodic orbits too, the unstable ones between.")
-@changes_option
-@result_options("NAME-bifurcation")
+@option.changes
+@option.results("NAME-bifurcation")
 def bifurcation(case: str, parameter: str, output: Output, **options: Any) -> None:
     """How does the motion change with a PARAMETER, and which motions exist side by side?
 
@@ -253,37 +210,18 @@ def bifurcation(case: str, parameter: str, output: Output, **options: Any) -> No
     last = options["steps"] - 1
     values = [low + (high - low) * place / last for place in range(last + 1)]
     chosen = {key: options[key] for key in ("transient", "branches")}
-    _answer(
-        wanted,
-        "bifurcation",
-        lambda: ss.bifurcation(wanted.system, parameter, values=values, **chosen),
-        output,
-    )
+    _answer(wanted, "bifurcation", lambda: ss.bifurcation(wanted.system, parameter, values=values, **chosen), output)
 
 
 @click.command()
 @CASE
-@click.option(
-    "--frequency",
-    "frequencies",
-    multiple=True,
-    metavar="HZ",
-    help="Of the dither; a fast one unless given. Repeatable.",
-)
-@click.option(
+@option.several("--frequency", "HZ", "Of the dither; a fast one unless given. Repeatable.", to="frequencies")
+@option.choice(
     "--on",
-    type=click.Choice(["face", "base", "force"]),
-    default="face",
-    show_default=True,
-    help="What the dither moves: the counter-face, the spring's end, or the mass by a force.",
+    ["face", "base", "force"],
+    "What the dither moves: the counter-face, the spring's end, or the mass by a force.",
 )
-@click.option(
-    "--cycles",
-    type=click.IntRange(min=1),
-    default=40,
-    show_default=True,
-    help="Length of a run in periods of the slow motion.",
-)
+@option.count("--cycles", 40, "Length of a run in periods of the slow motion.")
 @click.option(
     "--precision",
     type=click.FloatRange(min=0, max=1, min_open=True),
@@ -291,8 +229,8 @@ def bifurcation(case: str, parameter: str, output: Output, **options: Any) -> No
     show_default=True,
     help="Relative width left of the amplitude's range.",
 )
-@changes_option
-@result_options("NAME-dither")
+@option.changes
+@option.results("NAME-dither")
 def dither(case: str, output: Output, **options: Any) -> None:
     """Which is the smallest fast vibration along the contact that removes stick-slip?
 
@@ -308,12 +246,7 @@ def dither(case: str, output: Output, **options: Any) -> None:
         raise click.BadParameter("dither is found for a single mass; give an oscillator", param_hint="CASE")
     tones = [number_of(frequency, "Hz", "--frequency") for frequency in options["frequencies"]] or None
     chosen = {key: options[key] for key in ("on", "cycles", "precision")}
-    _answer(
-        wanted,
-        "dither",
-        lambda: ss.dither(system, frequency=tones, start=wanted.start or None, **chosen),
-        output,
-    )
+    _answer(wanted, "dither", lambda: ss.dither(system, frequency=tones, start=wanted.start or None, **chosen), output)
 
 
 def _case(name: str, changes: Sequence[str]) -> Case:
@@ -335,9 +268,7 @@ PORT = 8723
 @click.option(
     "--port", type=click.IntRange(0, 65535), default=PORT, show_default=True, help="Where it listens; 0: any."
 )
-@click.option(
-    "--config", type=click.Path(path_type=Path), metavar="RIG.TOML", help="The rig whose devices are watched."
-)
+@option.path("--config", "RIG.TOML", "The rig whose devices are watched.")
 @click.option(
     "--records",
     type=click.Path(path_type=Path, file_okay=False, exists=True),

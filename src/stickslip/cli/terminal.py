@@ -253,7 +253,7 @@ def deliver(
 
 @dataclass(frozen=True)
 class Output:
-    """Where the results of a command go, and how much of them is printed: as result_options have it.
+    """Where the results of a command go, and how much of them is printed: as option.results have it.
 
     Attributes
     ----------

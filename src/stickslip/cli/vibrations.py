@@ -10,21 +10,19 @@ from typing import TYPE_CHECKING, Any
 import click
 
 import stickslip as ss
-from stickslip.cli.many import Places, answer_all, many_options
+from stickslip.cli import option
 from stickslip.cli.records import (
+    Places,
+    answer_all,
     answer_together,
-    contact_option,
     default_folder,
     files_of,
     folder_after,
     groups_of,
     name_of,
-    normal_option,
     number_of,
-    reading_options,
     require_described,
     require_fits,
-    result_options,
     rig_of,
 )
 from stickslip.cli.terminal import Output, progress
@@ -58,8 +56,8 @@ BLOCK = 1_000_000  # rows of a part that is mapped: spikes and sticks are asked 
     metavar="FILE",
     help="Write a motion into FILE that would tell what this log does not, within its range and speed.",
 )
-@result_options("LOG-joint")
-@reading_options
+@option.results("LOG-joint")
+@option.reading
 def joint(files: tuple[str, ...], output: Output, propose: Path | None, **options: Any) -> None:
     """How much friction is in this joint of a robot, servo or axis?
 
@@ -111,10 +109,10 @@ def joint(files: tuple[str, ...], output: Output, propose: Path | None, **option
 
 @click.command()
 @click.argument("files", nargs=-1, required=True, metavar="FILES...")
-@normal_option
+@option.normal
 @click.option("--frequency", metavar="HZ", help="Strokes to and fro in a second; found unless given.")
-@result_options("FILE-tribometer")
-@reading_options
+@option.results("FILE-tribometer")
+@option.reading
 def tribometer(files: tuple[str, ...], output: Output, frequency: str | None, **options: Any) -> None:
     """What is the coefficient of friction, by which definition, and how does it wear in?
 
@@ -149,24 +147,16 @@ def tribometer(files: tuple[str, ...], output: Output, frequency: str | None, **
 @click.argument("files", nargs=-1, required=True, metavar="FILES...")
 @click.option("--mass", metavar="VALUE", help="Oscillating mass in kg, for the friction force; of an angle in kg m^2.")
 @click.option("--stiffness", metavar="VALUE", help="Spring in N/m, for the friction force; of an angle in N m/rad.")
-@click.option(
+@option.choice(
     "--method",
-    type=click.Choice(["all", "waveform", "thesis"]),
-    default="all",
-    show_default=True,
-    help="The whole waveform, the decrements of the extremes (the thesis's chapter 6), or both.",
+    ["all", "waveform", "thesis"],
+    "The whole waveform, the decrements of the extremes (the thesis's chapter 6), or both.",
 )
-@click.option(
-    "--restoring",
-    type=click.Choice(["linear", "pendulum"]),
-    default="linear",
-    show_default=True,
-    help="The spring's law; pendulum for an angle that swings far.",
-)
+@option.choice("--restoring", ["linear", "pendulum"], "The spring's law; pendulum for an angle that swings far.")
 @click.option("--channel", metavar="NAME", help="x, theta, v or a; the first of these that the file has unless given.")
-@many_options
-@result_options("FILE-stickslip")
-@reading_options
+@option.many
+@option.results("FILE-stickslip")
+@option.reading
 def decay(files: tuple[str, ...], output: Output, **options: Any) -> None:
     """Tell viscous from dry friction by how a released mass dies away.
 
@@ -202,12 +192,12 @@ def decay(files: tuple[str, ...], output: Output, **options: Any) -> None:
     "--channel", metavar="NAME", help="Where to listen; sound, normal_acceleration, a, friction unless given."
 )
 @click.option("--frequencies", metavar="LOW:HIGH", help="What is listened to in Hz; from 50 Hz up unless given.")
-@contact_option
-@normal_option
+@option.contact
+@option.normal
 @click.option("--lever", metavar="VALUE", help="Distance of the friction from the axis of torsion in m, for its work.")
-@many_options
-@result_options("FILE-squeak")
-@reading_options
+@option.many
+@option.results("FILE-squeak")
+@option.reading
 def squeak(
     files: tuple[str, ...],
     output: Output,
@@ -243,11 +233,11 @@ def squeak(
 @click.option("--channel", metavar="NAME", help="Which channel; a, sound, force, load, friction, v or x unless given.")
 @click.option("--frequencies", metavar="LOW:HIGH", help="Range of the map in Hz; what the record allows unless given.")
 @click.option("--wavelet-frequency", type=float, default=4.5, show_default=True, help="How long a wavelet is.")
-@click.option("--normalisation", type=click.Choice(["energy", "amplitude"]), default="energy", show_default=True)
+@option.choice("--normalisation", ["energy", "amplitude"])
 @click.option("--mass", metavar="VALUE", help="Oscillating mass in kg, or with its unit, for the contact's stiffness.")
 @click.option("--stiffness", metavar="VALUE", help="Spring in N/m, or with its unit, for the same.")
-@result_options("FILE-wavelet")
-@reading_options
+@option.results("FILE-wavelet")
+@option.reading
 def wavelet(file: str, output: Output, frequencies: str | None, **options: Any) -> None:
     """Map a channel over time and frequency, and tell what its sticks are like.
 
