@@ -1,3 +1,21 @@
+#define FRICTION_MODES $modes
+#define FRICTION_EXITS $exits
+#define ON_BASE $on_base
+static const int holds[FRICTION_MODES] = { $holds };
+static const double held_speed[FRICTION_MODES] = { $speeds };
+static const double begins[$count] = { $begins };
+static const double sizes[] = { $sizes };
+
+#define PASSED 1e-12
+static void friction_exits(const friction_state *s, const friction_motion *in, double *z)
+{
+    const double force = friction_force(s, in);
+    (void)force; (void)z;
+    switch (s->mode) {
+$ends    default: break;
+    }
+}
+
 
 /* ---- one mass that rubs, as a functional mock-up unit: model exchange and co-simulation of FMI 3.0
 

@@ -10,9 +10,10 @@ import re
 import shutil
 import subprocess
 import tempfile
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from importlib import resources
 from pathlib import Path
+from string import Template
 from xml.sax.saxutils import quoteattr
 
 from stickslip.errors import ModelError
@@ -34,28 +35,6 @@ SPEEDS = (1e-3, 1e-2, 0.1)  # of the test vector [m/s]
 SOON = 1e-6  # s, in which memory leaves its start for the test vector
 PLACE, HOLD, HOLD_RATE, CARRIED = 1e-5, 0.3, 2.0, 0.7  # of the test vector [m, N, N/s, m/s^2]
 
-HEAD = """\
-/* {formula}
-
-   Friction [N], positive against positive velocity. Motion: x [m] and v [m/s] of the mass against the counter-face;
-   hold [N] and hold_rate [N/s]: the force that keeps the mass at rest, as the rest of the model has it, and its rate;
-   a mode whose friction is hold has v = 0. delayed_speed [m/s]: the speed a lag ago, of a law with a lag.
-   face_acceleration [m/s^2]: of the counter-face, of a contact with a mass.
-
-   friction_state s = friction_start(&motion);
-   each step: while (friction_leave(&s, &motion)) {{}}     (at most as often as there are modes)
-              f = friction_force(&s, &motion);
-              friction_rates(&s, &motion, rate);          (s.memory[i] += dt * rate[i], or better)
-
-   Test: cc -DFRICTION_TEST -o friction_test friction.c -lm && ./friction_test */
-#include <math.h>
-#define ROUNDING 1e-14 /* of the terms of a quantity: what goes above zero by less does not */
-
-#define FRICTION_MEMORY {memory}
-enum {{ {modes} }};
-typedef struct {{ double x, v, hold, hold_rate, delayed_speed, face_acceleration; }} friction_motion;
-typedef struct {{ int mode; unsigned armed; double memory[{size}]; }} friction_state;
-"""
 
 OVER_SPEED = ["back", "stuck", "forward"]  # modes of a law that the speed alone tells
 OTHERS = ("hold", "hold_rate", "delayed_speed", "face_acceleration")  # that a law may ask for beside x and v
@@ -93,36 +72,6 @@ BASES = {  # exponents of SI's base units
     "N.m/rad": "kg='1' m='2' s='-2' rad='-1'", "N.m.s/rad": "kg='1' m='2' s='-1' rad='-1'",
 }  # fmt: skip
 UNITS = [f"    <Unit name='{name}'><BaseUnit {powers}/></Unit>" for name, powers in BASES.items()]
-XML = """\
-<?xml version="1.0" encoding="UTF-8"?>
-<fmiModelDescription fmiVersion="3.0" modelName="{name}" instantiationToken={token} description={about}
-    generationTool="stickslip">
-  <ModelExchange modelIdentifier="{name}" needsCompletedIntegratorStep="true" canGetAndSetFMUState="true"
-    canSerializeFMUState="true"/>
-  <CoSimulation modelIdentifier="{name}" canHandleVariableCommunicationStepSize="true" canGetAndSetFMUState="true"
-    canSerializeFMUState="true"/>
-  <UnitDefinitions>
-{units}
-  </UnitDefinitions>
-  <DefaultExperiment startTime="0" stepSize="1e-3"/>
-  <ModelVariables>
-{variables}
-  </ModelVariables>
-  <ModelStructure>
-{structure}
-  </ModelStructure>
-</fmiModelDescription>
-"""
-BUILD = """\
-<?xml version="1.0" encoding="UTF-8"?>
-<fmiBuildDescription fmiVersion="3.0">
-  <BuildConfiguration modelIdentifier="{name}">
-    <SourceFileSet language="C99">
-      <SourceFile name="{name}.c"/>
-    </SourceFileSet>
-  </BuildConfiguration>
-</fmiBuildDescription>
-"""
 CLASS = """\
 class Friction:
     \"\"\"A contact: contact = Friction(x, v); then its friction is contact.step(x, v, dt, OTHERS) every dt [s].
@@ -179,21 +128,28 @@ def fmu_code(law: Law | CurvedLaw, formula: str, begins: Sequence[float], *, on_
             "export C, or use SmoothStateVariable for a friction that lags",
         )
     exits = max(len(mode.exits) for mode in modes)
-    held = [mode.friction is None for mode in modes]
-    speeds = ", ".join(repr(float(getattr(mode, "speed", 0.0))) for mode in modes)
-    tables = [
-        f"#define FRICTION_MODES {len(modes)}",
-        f"#define FRICTION_EXITS {exits}",
-        f"#define ON_BASE {int(on_base)}",
-        f"static const int holds[FRICTION_MODES] = {{ {', '.join(str(int(mode)) for mode in held)} }};",
-        f"static const double held_speed[FRICTION_MODES] = {{ {speeds} }};",
-        f"static const double begins[{len(begins)}] = {{ {', '.join(repr(float(value)) for value in begins)} }};",
-        f"static const double sizes[] = {{ {', '.join(map(repr, sizes_of(law)))} }};",
-        "",
-    ]
-    friction, names = _friction(law, formula, modes), _names(law)
-    frame = resources.files("stickslip").joinpath("data/fmu.c").read_text("utf-8")
-    return "\n".join([friction, "\n".join(tables), _exits(modes, names), frame]), exits
+    frame = _template(
+        "fmu.c",
+        modes=len(modes),
+        exits=exits,
+        on_base=int(on_base),
+        holds=", ".join(str(int(mode.friction is None)) for mode in modes),
+        speeds=_numbers(getattr(mode, "speed", 0.0) for mode in modes),
+        count=len(begins),
+        begins=_numbers(begins),
+        sizes=_numbers(sizes_of(law)),
+        ends=_ends(modes, _names(law)),
+    )
+    return f"{_friction(law, formula, modes)}\n{frame}", exits
+
+
+def _template(file: str, **fields: object) -> str:
+    """A file of the package's data, with what stands for its $names."""
+    return Template(resources.files("stickslip").joinpath(f"data/{file}").read_text("utf-8")).substitute(fields)
+
+
+def _numbers(values: Iterable[float]) -> str:
+    return ", ".join(repr(float(value)) for value in values)
 
 
 def model_description(
@@ -230,7 +186,8 @@ def model_description(
         *(f'<InitialUnknown valueReference="{number}"/>' for number in (*kept, *range(first, mode + 1))),
         *(f'<EventIndicator valueReference="{number}"/>' for number in ends),
     ]
-    return XML.format(
+    return _template(
+        "modelDescription.xml",
         name=name,
         token=quoteattr(token),
         about=quoteattr(about),
@@ -242,7 +199,7 @@ def model_description(
 
 def build_description(name: str) -> str:
     """How the model's C code is compiled."""
-    return BUILD.format(name=name)
+    return _template("buildDescription.xml", name=name)
 
 
 def variable(name: str, reference: int, kind: str, what: str, unit: str) -> str:
@@ -292,14 +249,33 @@ def _names(law: Law | CurvedLaw) -> dict[str, str]:
 def _friction(law: Law | CurvedLaw, formula: str, modes: Modes) -> str:
     _require_writable(law, modes)
     memory, names = list(law.memory), _names(law)
-    head = HEAD.format(
+    back, still, forward = (_token(name) for name in law.entry)
+    rows, inputs = _vector(law, modes, memory), len(INPUTS)
+    return _template(
+        "friction.c",
         formula=remark(formula),
         memory=len(memory),
         size=max(1, len(memory)),
         modes=", ".join(f"{_token(mode.name)} = {number}" for number, mode in enumerate(modes)),
+        back=back,
+        still=still,
+        forward=forward,
+        starts=_lines(f"    s.memory[{j}] = {_text(form, names)};" for j, form in enumerate(law.memory.values())),
+        forces=_forces(modes, names),
+        rates=_rates(modes, memory, names),
+        exits=_leave(modes, names),
+        inputs=", ".join(INPUTS),
+        vector=",\n".join(rows),
+        rows=len(rows),
+        columns=inputs + len(memory) + 2,
+        motion=", ".join(f"r[{1 + j}]" for j in range(inputs)),
+        first=inputs + 1,
+        last=inputs + len(memory) + 1,
     )
-    parts = [head, _start(law, names), _force(modes, names), _rates(modes, memory, names), _leave(modes, names)]
-    return "\n".join([*parts, _test(law, modes, memory)])
+
+
+def _lines(lines: Iterable[str]) -> str:
+    return "".join(f"{line}\n" for line in lines)
 
 
 def modes_of(law: Law | CurvedLaw) -> Modes:
@@ -338,23 +314,9 @@ def _text(form: Expression | Row, names: Mapping[str, str]) -> str:
     return written(form, names=names, c=True)
 
 
-def _start(law: Law | CurvedLaw, names: Mapping[str, str]) -> str:
-    back, still, forward = (_token(name) for name in law.entry)
-    lines = [f"    s.memory[{j}] = {_text(form, names)};" for j, form in enumerate(law.memory.values())]
-    return "\n".join([
-        "friction_state friction_start(const friction_motion *in)", "{",
-        f"    friction_state s = {{ in->v < 0 ? {back} : in->v > 0 ? {forward} : {still}, 0u, {{0}} }};",
-        *lines, "    return s;", "}", "",
-    ])  # fmt: skip
-
-
-def _force(modes: Modes, names: Mapping[str, str]) -> str:
+def _forces(modes: Modes, names: Mapping[str, str]) -> str:
     friction = {mode.name: "in->hold" if mode.friction is None else _text(mode.friction, names) for mode in modes}
-    cases = [f"    case {_token(name)}: return {text};" for name, text in friction.items()]
-    return "\n".join([
-        "double friction_force(const friction_state *s, const friction_motion *in)", "{", "    (void)in;",
-        "    switch (s->mode) {", *cases, "    }", "    return 0.0;", "}", "",
-    ])  # fmt: skip
+    return _lines(f"    case {_token(name)}: return {text};" for name, text in friction.items())
 
 
 def _rates(modes: Modes, memory: list[str], names: Mapping[str, str]) -> str:
@@ -363,49 +325,36 @@ def _rates(modes: Modes, memory: list[str], names: Mapping[str, str]) -> str:
         mode.name: " ".join(f"rate[{memory.index(name)}] = {_text(form, named)};" for name, form in mode.rates.items())
         for mode in modes
     }
-    cases = [f"    case {_token(name)}: {move} break;" for name, move in moves.items() if move]
-    return "\n".join([
-        "void friction_rates(const friction_state *s, const friction_motion *in, double *rate)", "{",
-        "    int i;", "    (void)in;", "    for (i = 0; i < FRICTION_MEMORY; i++) rate[i] = 0.0;",
-        "    switch (s->mode) {", *cases, "    default: break;", "    }", "}", "",
-    ])  # fmt: skip
+    return _lines(f"    case {_token(name)}: {move} break;" for name, move in moves.items() if move)
 
 
 def _leave(modes: Modes, names: Mapping[str, str]) -> str:
-    named = {**names, "f": "force", "df": "in->hold_rate"}
     lines: list[str] = []
     for mode in modes:
         if mode.exits:
-            lines.append(f"    case {_token(mode.name)}:")
-            own = {**named, **levels_of(mode, lambda form: _text(form, named))}
-            lines += [_exit(number, exit_, own) for number, exit_ in enumerate(mode.exits)]
-            lines.append("        break;")
-    return "\n".join([
-        "/* Whether the mode ends here; then the next one is set, with what it remembers. */",
-        "int friction_leave(friction_state *s, const friction_motion *in)", "{",
-        "    const double force = friction_force(s, in);", "    const friction_state before = *s;",
-        "    (void)force; (void)before;",
-        "    switch (s->mode) {", *lines, "    default: break;", "    }", "    return 0;", "}", "",
-    ])  # fmt: skip
+            own = _speaking(mode, names)
+            exits = [_exit(number, exit_, own) for number, exit_ in enumerate(mode.exits)]
+            lines += [f"    case {_token(mode.name)}:", *exits, "        break;"]
+    return _lines(lines)
 
 
-def _exits(modes: Modes, names: Mapping[str, str]) -> str:
+def _ends(modes: Modes, names: Mapping[str, str]) -> str:
     """What ends a mode where it rises above zero, less so little that it is above zero where this is found to be."""
-    named = {**names, "f": "force", "df": "in->hold_rate"}
     lines: list[str] = []
     for mode in modes:
-        own = {**named, **levels_of(mode, lambda form: _text(form, named))}
-        lines.append(f"    case {_token(mode.name)}:")
-        for number, exit_ in enumerate(mode.exits):
-            size = _size(exit_, own)
-            lines.append(f"        z[{number}] = {_text(exit_.quantity, own)} - PASSED * (1.0 + {size});")
-        lines.append("        break;")
-    return "\n".join([
-        "#define PASSED 1e-12",
-        "static void friction_exits(const friction_state *s, const friction_motion *in, double *z)", "{",
-        "    const double force = friction_force(s, in);", "    (void)force; (void)z;",
-        "    switch (s->mode) {", *lines, "    default: break;", "    }", "}", "",
-    ])  # fmt: skip
+        own = _speaking(mode, names)
+        exits = [
+            f"        z[{number}] = {_text(exit_.quantity, own)} - PASSED * (1.0 + {_size(exit_, own)});"
+            for number, exit_ in enumerate(mode.exits)
+        ]
+        lines += [f"    case {_token(mode.name)}:", *exits, "        break;"]
+    return _lines(lines)
+
+
+def _speaking(mode: Mode | CurvedMode, names: Mapping[str, str]) -> dict[str, str]:
+    """What a mode's exits speak of, as C calls it."""
+    named = {**names, "f": "force", "df": "in->hold_rate"}
+    return {**named, **levels_of(mode, lambda form: _text(form, named))}
 
 
 def _size(exit_: Exit, names: Mapping[str, str]) -> str:
@@ -426,7 +375,7 @@ def _exit(number: int, exit_: Exit, names: Mapping[str, str]) -> str:
     return f"{first}        if ({due}) {{ {body} }}"
 
 
-def _test(law: Law | CurvedLaw, modes: Modes, memory: list[str]) -> str:
+def _vector(law: Law | CurvedLaw, modes: Modes, memory: list[str]) -> list[str]:
     """States in every mode with the friction that Python finds there."""
     rows = []
     for mode in modes:
@@ -438,23 +387,8 @@ def _test(law: Law | CurvedLaw, modes: Modes, memory: list[str]) -> str:
             values |= moved
             force = HOLD if mode.friction is None else at(mode.friction, values)
             state = [values[name] for name in (*INPUTS, *memory)] + [force]
-            rows.append(f"    {{ {_token(mode.name)}, {', '.join(repr(float(value)) for value in state)} }}")
-    inputs = len(INPUTS)
-    return "\n".join([
-        "#ifdef FRICTION_TEST", "#include <stdio.h>",
-        f"/* mode, {', '.join(INPUTS)}, memory, friction */",
-        f"static const double vector[{len(rows)}][{inputs + len(memory) + 2}] = {{", ",\n".join(rows), "};",
-        "int main(void)", "{", "    int i, j, wrong = 0;",
-        f"    for (i = 0; i < {len(rows)}; i++) {{",
-        "        const double *r = vector[i];",
-        f"        friction_motion in = {{ {', '.join(f'r[{1 + j}]' for j in range(inputs))} }};",
-        "        friction_state s = { (int)r[0], 0u, {0} };",
-        f"        const double wanted = r[{inputs + len(memory) + 1}];",
-        f"        for (j = 0; j < FRICTION_MEMORY; j++) s.memory[j] = r[{inputs + 1} + j];",
-        "        wrong += !(fabs(friction_force(&s, &in) - wanted) <= 1e-9 * (1e-6 + fabs(wanted)));",
-        "    }",
-        f'    printf("%d of {len(rows)} wrong\\n", wrong);', "    return wrong != 0;", "}", "#endif", "",
-    ])  # fmt: skip
+            rows.append(f"    {{ {_token(mode.name)}, {_numbers(state)} }}")
+    return rows
 
 
 def at(form: Expression | Row, values: Mapping[str, float]) -> float:
