@@ -65,6 +65,7 @@ WAYS = ((1.0, "forward"), (-1.0, "back"))
 # Kinds of doubt.
 NOISY, CONFOUNDED, SHIFTED = "noisy", "confounded", "shifted"
 BARELY = 0.5  # of a value: an interval that is wider on either side hardly tells it
+PERHAPS = ("load", "sine", "cosine", "damping", "warming", "thinning")  # terms that not every log tells
 RICHER = {"load", "uneven", *WARM}  # what Coulomb and viscous friction of both directions alike do not have
 
 
@@ -383,6 +384,7 @@ def _answer(
     if "uneven" in terms:
         ways = [tell.sum({"viscous": 1, "uneven": by}, f"viscous friction {way}") for by, way in WAYS]
     inertia = replace(data.stated["inertia"], name="inertia") if "inertia" in data.stated else known["inertia"]
+    perhaps: dict[str, Any] = {name: known.get(name) for name in PERHAPS}
     damped = known["damping"].value * _error_rate(data) if "damping" in known else np.zeros(len(data.raw))
     return JointFriction(
         level=level.within(0.0),
@@ -391,13 +393,8 @@ def _answer(
         viscous=known["viscous"],
         viscous_forward=ways[0],
         viscous_back=ways[1],
-        load=known.get("load"),
+        **perhaps,
         inertia=inertia.within(0.0),
-        sine=known.get("sine"),
-        cosine=known.get("cosine"),
-        damping=known.get("damping"),
-        warming=known.get("warming"),
-        thinning=known.get("thinning"),
         temperature=data.logs[0].about if "warming" in known else None,
         torque=data.raw + damped,
         gain=data.stated["kp"].value if data.source == "reference" else 0.0,

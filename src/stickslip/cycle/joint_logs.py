@@ -7,12 +7,13 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from statistics import NormalDist
+from typing import Any
 
 import numpy as np
 
 from stickslip.arrays import Array, stretches
 from stickslip.balance.motion import away_from
-from stickslip.cycle.joint import RICHER, JointFriction, Telling, delay_of
+from stickslip.cycle.joint import PERHAPS, RICHER, JointFriction, Telling, delay_of
 from stickslip.cycle.joint_fall import bends, misfits, possible
 from stickslip.cycle.joint_fit import (
     JointData,
@@ -499,6 +500,7 @@ def regress_joint_logs(
     beside = misfits(pooled(data), fit, terms, bends(pooled(slow), fit, terms, pull), turning(records[0]), delay)
     tell = Telling(pooled(data), fit, terms, turning(records[0]), "ok", beside)
     known = {term: tell.one(term) for term in terms if term not in ("uneven", *COGS)}
+    perhaps: dict[str, Any] = {name: known.get(name) for name in PERHAPS}
     predictions = [
         _predicted(log, pooled(data[:place] + data[place + 1 :]), record)
         for place, (log, record) in enumerate(zip(data, records, strict=True))
@@ -506,13 +508,8 @@ def regress_joint_logs(
     return JointLogs(
         *tell.ways(),
         known["viscous"],
-        load=known.get("load"),
         inertia=known.get("inertia"),
-        sine=known.get("sine"),
-        cosine=known.get("cosine"),
-        damping=known.get("damping"),
-        warming=known.get("warming"),
-        thinning=known.get("thinning"),
+        **perhaps,
         predictions=tuple(predictions),
         left_out=left_out,
         delay=possible(delay, data[0].source),

@@ -265,6 +265,7 @@ UNITS = {"inertia": "kg", "viscous": "N s/m", "coulomb": "N", "offset": "N", "st
 TURNING = {"inertia": "kg m^2", "viscous": "N m s/rad", "coulomb": "N m", "offset": "N m", "stiffness": "N m/rad"}
 WORDS = {"inertia": "inertia", "viscous": "viscous friction", "coulomb": "Coulomb friction", "offset": "constant force",
          "stiffness": "stiffness"}  # fmt: skip
+PERHAPS = ("offset", "stiffness", "viscous_forward", "viscous_back", "coulomb_forward", "coulomb_back")
 POSITIVE = ("inertia", "coulomb", "stiffness")  # viscous friction may fall with the speed
 
 
@@ -297,12 +298,7 @@ def _answer(
         inertia=known["inertia"],
         viscous=known["viscous"],
         coulomb=known["coulomb"],
-        offset=known.get("offset"),
-        stiffness=known.get("stiffness"),
-        viscous_forward=known.get("viscous_forward"),
-        viscous_back=known.get("viscous_back"),
-        coulomb_forward=known.get("coulomb_forward"),
-        coulomb_back=known.get("coulomb_back"),
+        **{name: known.get(name) for name in PERHAPS},
         residual=float(np.linalg.norm(fit.residual) / np.linalg.norm(force)),
         time=record.start + rows / record.fs,
         measured=force,

@@ -261,35 +261,22 @@ def _frictions(
     ring_down: RingDown, values: Array, spread: Array, scatter: Scatter, status: str, methods: tuple[str, str]
 ) -> tuple[Estimate, Estimate]:
     """Damping ratio and dry friction; a decay that gains energy is refused."""
-    damping_ratio = Estimate.normal(
-        "damping ratio",
-        values[0],
-        sd=spread[0],
-        unit="1",
-        status=status,
-        checks=_quoted(scatter.damping_ratio),
-        method=methods[0],
+    length = "rad" if ring_down.unit.startswith("rad") else "m"
+    named = (
+        ("damping ratio", "1", scatter.damping_ratio),
+        ("dry friction displacement", length, scatter.dry_displacement),
     )
-    _require_loss(damping_ratio)
-    dry_displacement = Estimate.normal(
-        "dry friction displacement",
-        values[1],
-        sd=spread[1],
-        unit="rad" if ring_down.unit.startswith("rad") else "m",
-        status=status,
-        checks=_quoted(scatter.dry_displacement),
-        method=methods[1],
-    ).within(0.0)
-    return damping_ratio, dry_displacement
-
-
-def _require_loss(damping_ratio: Estimate) -> None:
+    damping_ratio, dry_displacement = (
+        Estimate.normal(name, value, sd=sd, unit=unit, status=status, checks=_quoted(single), method=method)
+        for (name, unit, single), value, sd, method in zip(named, values, spread, methods, strict=False)
+    )
     if damping_ratio.value < GAINS and damping_ratio.interval[1] < 0:
         raise EstimateError(
             f"the damping ratio would be {damping_ratio.value:.2g}",
             "a free decay loses energy",
             "something caught or drove the mass: cut the record with record.between(first, last)",
         )
+    return damping_ratio, dry_displacement.within(0.0)
 
 
 def _bias(ring_down: RingDown, form: str, value: float, sd: float, status: str) -> Estimate:

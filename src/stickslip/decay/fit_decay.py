@@ -26,7 +26,7 @@ from stickslip.decay.noise import KINDS, find_noise
 from stickslip.decay.profile import last_swing
 from stickslip.decay.release import CLIPPED, LOST, Releases, RingDown, find_releases
 from stickslip.decay.start import Search, roughness, variance, weights
-from stickslip.decay.which_motion import DecayMotion, beginning, motion_of, named, whichever
+from stickslip.decay.which_motion import NO_REST, DecayMotion, beginning, motion_of, named, static_in, whichever
 from stickslip.errors import EstimateError
 from stickslip.estimate import Constant, Doubt, Estimate, Status
 from stickslip.record.record import Record, Step, require_record
@@ -351,7 +351,7 @@ def _misfit(releases: list[Release], fitted: list[Array]) -> tuple[Doubt, ...]:
 
 def _static(ring_downs: list[RingDown], releases: list[Release], motion: _Motion, doubts: Status) -> Estimate:
     """Static friction lies between where the mass stayed and where it last turned, in every release."""
-    low, high, rested, method = 0.0, math.inf, False, "between where it stayed and where it last turned"
+    low, high, rested = 0.0, math.inf, False
     for number, (ring_down, release) in enumerate(zip(ring_downs, releases, strict=True)):
         stayed, turned = [], []
         for (half_cycles, share), motions in zip(motion.candidates, motion.motions, strict=True):
@@ -369,9 +369,7 @@ def _static(ring_downs: list[RingDown], releases: list[Release], motion: _Motion
             turned.append(float(swing + p[2]) + error)
             rested |= rests
         low, high = max(low, min(stayed)), min(high, max(*turned, 0.0))
-    status = "" if rested else "the mass does not come to rest in the record: only an upper bound"
+    status = "" if rested else NO_REST
     if low > high:
         low, high, status = high, low, "the releases disagree on it: it changes, or the model does not hold"
-    middle, sd = (low + high) / 2, (high - low) / math.sqrt(12)
-    unit = "rad" if ring_downs[0].channel == "theta" else "m"
-    return Estimate("static friction displacement", middle, (low, high), sd, unit, method, Status(status, doubts))
+    return static_in(low, high, "rad" if ring_downs[0].channel == "theta" else "m", Status(status, doubts))

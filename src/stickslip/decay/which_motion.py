@@ -24,6 +24,7 @@ SWING = 2.5  # rad, above which a pendulum lingers near its top and its phase ca
 COARSE = 0.5  # of a digitiser's step: less noise than this, the counts' own included, does not blur it
 TAIL = 2.0  # periods at rest that are kept
 SURE = 3.0  # standard deviations of the noise by which a bracket is widened
+NO_REST = "the mass does not come to rest in the record: only an upper bound"
 TERMS = {
     "damping_ratio": ("damping ratio", "1"),
     "dry_displacement": ("dry friction displacement", "{}"),
@@ -297,11 +298,15 @@ def static_between(candidate: Candidate, ring_down: RingDown) -> Estimate:
     error = SURE * candidate.level / math.sqrt(max(1.0, ring_down.fs / ring_down.frequency / 2))
     low = max(_pull(fitted, fitted.half_cycles) - error, 0.0) if ring_down.stopped else 0.0
     high = _pull(fitted, fitted.half_cycles - 1) + error
-    status = "" if ring_down.stopped else "the mass does not come to rest in the record: only an upper bound"
+    status = "" if ring_down.stopped else NO_REST
+    return static_in(low, high, ring_down.unit, Status(status, lack_of_fit(candidate)))
+
+
+def static_in(low: float, high: float, unit: str, status: str) -> Estimate:
+    """Static friction that is anywhere between two displacements alike."""
     middle, sd = (low + high) / 2, (high - low) / math.sqrt(12)
     method = "between where it stayed and where it last turned"
-    status = Status(status, lack_of_fit(candidate))
-    return Estimate("static friction displacement", middle, (low, high), sd, ring_down.unit, method, status)
+    return Estimate("static friction displacement", middle, (low, high), sd, unit, method, status)
 
 
 def _pull(fitted: Fitted, half_cycles: int) -> float:

@@ -71,14 +71,8 @@ class Mode:
         yield 0, before, self
 
 
-class Law(Protocol):
-    """What the solver asks of a friction law.
-
-    What others ask, its class says where it has an answer: `label` and `formula` (how it is called and written),
-    `hypotheses` (how records are asked for it), `loads` (by which parameters of a Contact it may be pressed: all its
-    forces are proportional to them), `chosen` (numbers that are not fitted), `between` (where those of them that are
-    fitted without values lie), `memory_units`.
-    """
+class Remembering(Protocol):
+    """What any law says of what it remembers, and of where motion starts."""
 
     @property
     def memory(self) -> Mapping[str, Row]:
@@ -86,11 +80,21 @@ class Law(Protocol):
 
     @property
     def places(self) -> tuple[str, ...]:
-        """Memory that is a place on the counter-face [m] and moves with it."""
+        """Memory that is a place on the counter-face [m] and moves with it; curved laws have none."""
 
     @property
     def entry(self) -> tuple[str, str, str]:
         """Names of the modes in which motion starts: with v < 0, v = 0 and v > 0."""
+
+
+class Law(Remembering, Protocol):
+    """What the solver asks of a friction law.
+
+    What others ask, its class says where it has an answer: `label` and `formula` (how it is called and written),
+    `hypotheses` (how records are asked for it), `loads` (by which parameters of a Contact it may be pressed: all its
+    forces are proportional to them), `chosen` (numbers that are not fitted), `between` (where those of them that are
+    fitted without values lie), `memory_units`.
+    """
 
     def modes(self) -> tuple[Mode, ...]:
         """The table."""

@@ -10,7 +10,7 @@ from functools import lru_cache
 from typing import Any, Protocol, TypeVar, runtime_checkable
 
 from stickslip.errors import ModelError
-from stickslip.laws.base import Exit, Mode, Rigid, Row
+from stickslip.laws.base import Exit, Mode, Remembering, Rigid, Row
 
 FUNCTIONS = ("exp", "log", "tanh", "asinh", "sqrt")
 
@@ -248,20 +248,8 @@ class CurvedMode:
 
 
 @runtime_checkable
-class CurvedLaw(Protocol):
+class CurvedLaw(Remembering, Protocol):
     """What the numeric solver asks of a friction law."""
-
-    @property
-    def memory(self) -> Mapping[str, Row]:
-        """The law's own state, with its value at the start as a linear form of "x", "v" and "1"."""
-
-    @property
-    def places(self) -> tuple[str, ...]:
-        """Memory that is a place on the counter-face [m]; curved laws have none."""
-
-    @property
-    def entry(self) -> tuple[str, str, str]:
-        """Names of the modes in which motion starts: with v < 0, v = 0 and v > 0."""
 
     def rates(self) -> tuple[CurvedMode, ...]:
         """The modes."""
