@@ -7,8 +7,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from stickslip.files.rosbag import Decode, Message, decoder, joined, streams_of
-from stickslip.files.table import Options, Table, optional, reading
+from stickslip.files.rosbag import Decode, Heard, decoder, table_of
+from stickslip.files.table import Options, Table, optional
 
 NAME = "MCAP"
 SUFFIXES = (".mcap",)
@@ -21,22 +21,16 @@ def recognise(path: Path, head: bytes) -> bool:
 
 def read(path: Path, options: Options) -> Table:
     """The numbers of the topics; what other topics say is read as last heard."""
-    left_out: dict[str, str] = {}
-    with reading(path, NAME):
-        streams = streams_of(path, _messages(path, left_out))
-    return joined(path, streams, [f"{topic} ({reason}) is left out" for topic, reason in left_out.items()])
+    return table_of(path, NAME, _messages(path))
 
 
-def _messages(path: Path, left_out: dict[str, str]) -> Iterator[Message]:
+def _messages(path: Path) -> Iterator[Heard]:
     known: dict[int, Decode | None] = {}
     with path.open("rb") as file:
         for schema, channel, message in optional("mcap.reader", extra="logs").make_reader(file).iter_messages():
             if channel.id not in known:
                 known[channel.id] = _decoder(channel.message_encoding, schema)
-            if decode := known[channel.id]:
-                yield channel.topic, message.log_time, decode(message.data)
-            else:
-                left_out[channel.topic] = channel.message_encoding
+            yield channel.topic, channel.message_encoding, known[channel.id], message.log_time, message.data
 
 
 def _decoder(encoding: str, schema: Any) -> Decode | None:

@@ -23,13 +23,13 @@ from stickslip.files.table import LISTED, Budget, Column, Options, Table, option
 NAMES = ("name", "joint_names")  # of a message whose lists have one number for each joint
 LATE = 0.1  # of the clock: a topic that is silent for longer at its beginning would cost these rows
 
-Message = tuple[str, int, Any]  # topic, when it was heard [ns], what it says: fields of numbers, lists, fields
 NAME = "ROS bag"
 SUFFIXES = (".bag", ".db3")
 FIRST, SECOND = b"#ROSBAG V2.0", b"SQLite format 3\0"  # as files of ROS 1 and of ROS 2 begin
 DEFINED = "SELECT topic_type, encoded_message_definition FROM message_definitions WHERE encoding = 'ros2msg'"
 
 Decode = Callable[[bytes], Any]
+Heard = tuple[str, str, Decode | None, int, bytes]  # topic, type, what reads it, when it was heard [ns], its bytes
 
 
 @dataclass(frozen=True)
@@ -60,12 +60,16 @@ class Stream:
     units: Mapping[str, str] = dataclasses.field(default_factory=dict)
 
 
-def streams_of(path: Path, messages: Iterable[Message]) -> list[Stream]:
-    """The streams of messages, one for each topic and each set of numbers that it sends."""
+def _streams(path: Path, messages: Iterable[Heard]) -> tuple[list[Stream], dict[str, str]]:
+    """The streams of messages, one for each topic and each set of numbers that it sends; and the types not read."""
     budget, cells = Budget.of(path), 0
     rows: dict[tuple[str, tuple[str, ...]], list[tuple[int, int, list[float]]]] = {}
-    named = set()
-    for topic, heard, message in messages:
+    named, left_out = set(), dict[str, str]()
+    for topic, kind, decode, heard, data in messages:
+        if decode is None:
+            left_out[topic] = kind
+            continue
+        message = decode(data)
         numbers = dict(_numbers(message))
         key = topic, tuple(numbers)
         rows.setdefault(key, []).append((heard, _stamp(message), list(numbers.values())))
@@ -81,7 +85,7 @@ def streams_of(path: Path, messages: Iterable[Message]) -> list[Stream]:
         own = _seconds(stamps - stamps[0]) if np.all(stamps > 0) else None
         columns = dict(zip(names, values.T, strict=True))
         streams.append(Stream(topic.strip("/"), times, columns, own, (topic, names) in named))
-    return streams
+    return streams, left_out
 
 
 def joined(path: Path, streams: Sequence[Stream], notes: Sequence[str] = ()) -> Table:
@@ -169,11 +173,13 @@ def recognise(path: Path, head: bytes) -> bool:
 
 def read(path: Path, options: Options) -> Table:
     """The numbers of the topics; what other topics say is read as last heard."""
-    left_out: dict[str, str] = {}
-    with reading(path, NAME):
-        with path.open("rb") as file:
-            first = file.read(len(FIRST)) == FIRST
-        streams = streams_of(path, (_first if first else _second)(path, left_out))
+    return table_of(path, NAME, _messages(path))
+
+
+def table_of(path: Path, name: str, messages: Iterable[Heard]) -> Table:
+    """The numbers of the topics of a log of that format."""
+    with reading(path, name):
+        streams, left_out = _streams(path, messages)
     return joined(path, streams, [f"{topic} ({reason}) is left out" for topic, reason in left_out.items()])
 
 
@@ -195,18 +201,21 @@ def decoder(kind: str, definition: str | None, *, first: bool = False) -> Decode
     return lambda data: decode(data, kind)
 
 
-def _first(path: Path, left_out: dict[str, str]) -> Iterator[Message]:
+def _messages(path: Path) -> Iterator[Heard]:
+    with path.open("rb") as file:
+        first = file.read(len(FIRST)) == FIRST
+    return (_first if first else _second)(path)
+
+
+def _first(path: Path) -> Iterator[Heard]:
     """The messages of a bag of ROS 1."""
     with optional("rosbags.rosbag1", extra="logs").Reader(path) as bag:
         known = {one.id: decoder(one.msgtype, one.msgdef.data, first=True) for one in bag.connections}
         for connection, heard, data in bag.messages():
-            if decode := known[connection.id]:
-                yield connection.topic, heard, decode(data)
-            else:
-                left_out[connection.topic] = connection.msgtype
+            yield connection.topic, connection.msgtype, known[connection.id], heard, data
 
 
-def _second(path: Path, left_out: dict[str, str]) -> Iterator[Message]:
+def _second(path: Path) -> Iterator[Heard]:
     """The messages of a bag of ROS 2, opened so that nothing beside it is read or written."""
     address = f"file:{quote(str(path.absolute()))}?mode=ro&immutable=1"
     with closing(sqlite3.connect(address, uri=True)) as bag:
@@ -216,7 +225,4 @@ def _second(path: Path, left_out: dict[str, str]) -> Iterator[Message]:
         known = {number: decoder(kind, defined.get(kind)) for number, (_, kind) in topics.items()}
         for number, heard, data in bag.execute("SELECT topic_id, timestamp, data FROM messages ORDER BY timestamp"):
             topic, kind = topics[number]
-            if decode := known[number]:
-                yield topic, heard, decode(data)
-            else:
-                left_out[topic] = kind
+            yield topic, kind, known[number], heard, data
