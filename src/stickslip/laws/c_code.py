@@ -72,25 +72,6 @@ BASES = {  # exponents of SI's base units
     "N.m/rad": "kg='1' m='2' s='-2' rad='-1'", "N.m.s/rad": "kg='1' m='2' s='-1' rad='-1'",
 }  # fmt: skip
 UNITS = [f"    <Unit name='{name}'><BaseUnit {powers}/></Unit>" for name, powers in BASES.items()]
-CLASS = """\
-class Friction:
-    \"\"\"A contact: contact = Friction(x, v); then its friction is contact.step(x, v, dt, OTHERS) every dt [s].
-
-    Let dt be short against the times in which the contact gives way.
-    \"\"\"
-
-    def __init__(self, x=0.0, v=0.0):
-        self.mode = {start}
-        self.armed = set()
-{memory}
-    def step(self, x, v, dt, OTHERS):
-        \"\"\"Friction at x and v; what the contact remembers then goes on by dt.\"\"\"
-        for _ in range({most}):
-            if not self.leave(x, v, OTHERS):
-                break
-        force = self.force(x, v, OTHERS)
-{go_on}        return force
-"""
 GO_ON = """\
         for name, rate in self.rates(x, v, OTHERS).items():
             setattr(self, name, getattr(self, name) + dt * rate)
@@ -435,7 +416,7 @@ def _class(law: Law | CurvedLaw, modes: Modes) -> str:
     start = repr(still) if back == still == forward else f"{back!r} if v < 0 else {forward!r} if v > 0 else {still!r}"
     rates = _python_rates(modes, names) if any(mode.rates for mode in modes) else []
     memory = "".join(f"        self.{name} = {written(form)}\n" for name, form in law.memory.items())
-    head = CLASS.format(start=start, memory=memory, most=len(modes), go_on=GO_ON if rates else "")
+    head = _template("friction.py.txt", start=start, memory=memory, most=len(modes), go_on=GO_ON if rates else "")
     return "\n".join([head, *_python_force(modes, names), *rates, *_python_leave(modes, names)]).rstrip()
 
 
