@@ -42,6 +42,15 @@ VOCABULARY: dict[str, Quantity] = {
     "torsion_velocity": Quantity("angular velocity in torsion", ("rad/s",)),
 }
 
+RULES = {  # of a channel's details: what each is, and what to pass
+    "delay": ("a delay is a finite time in seconds", "pass a number"),
+    "noise": ("noise is a standard deviation in {unit}, zero or more", "pass a number, or None where it is not known"),
+    "gain_sd": ("the standard deviation of a gain is a part of it, from 0 to 1", "pass a number: 0.01 is 1 %"),
+    "mount": ("a mount is a resonance in Hz and a damping ratio", "pass two numbers: (125.0, 0.1)"),
+    "inertia": ("an inertia is a mass in kg", "pass a number"),
+    "discharge": ("a discharge is a positive time constant in seconds", "pass a number, or None"),
+}
+
 
 @dataclass(frozen=True)
 class Channel:
@@ -105,47 +114,24 @@ class Channel:
                 raise RecordError(
                     f"{detail} = {value!r} of channel {self.name}", f"the {detail} is stated in words", "pass a text"
                 )
-        if not _is_finite(self.delay):
-            raise RecordError(
-                f"delay = {self.delay!r} of channel {self.name}", "a delay is a finite time in seconds", "pass a number"
-            )
-        if self.noise is not None and not (_is_finite(self.noise) and self.noise >= 0):
-            raise RecordError(
-                f"noise = {self.noise!r} of channel {self.name}",
-                f"noise is a standard deviation in {self.unit}, zero or more",
-                "pass a number, or None where it is not known",
-            )
-        if not (_is_finite(self.gain_sd) and 0 <= self.gain_sd < 1):
-            raise RecordError(
-                f"gain_sd = {self.gain_sd!r} of channel {self.name}",
-                "the standard deviation of a gain is a part of it, from 0 to 1",
-                "pass a number: 0.01 is 1 %",
-            )
-        self._check_dynamics()
+        fine = {
+            "delay": _is_finite(self.delay),
+            "noise": self.noise is None or (_is_finite(self.noise) and self.noise >= 0),
+            "gain_sd": _is_finite(self.gain_sd) and 0 <= self.gain_sd < 1,
+            "mount": self.mount is None or _is_mount(self.mount),
+            "inertia": _is_finite(self.inertia),
+            "discharge": self.discharge is None or (_is_finite(self.discharge) and self.discharge > 0),
+        }
+        for detail, (rule, step) in RULES.items():
+            if not fine[detail]:
+                value = f"{detail} = {getattr(self, detail)!r} of channel {self.name}"
+                raise RecordError(value, rule.format(unit=self.unit), step)
 
-    def _check_dynamics(self) -> None:
-        if self.mount is not None and not (
-            isinstance(self.mount, tuple)
-            and len(self.mount) == 2
-            and all(map(_is_finite, self.mount))
-            and self.mount[0] > 0
-            and self.mount[1] >= 0
-        ):
-            raise RecordError(
-                f"mount = {self.mount!r} of channel {self.name}",
-                "a mount is a resonance in Hz and a damping ratio",
-                "pass two numbers: (125.0, 0.1)",
-            )
-        if not _is_finite(self.inertia):
-            raise RecordError(
-                f"inertia = {self.inertia!r} of channel {self.name}", "an inertia is a mass in kg", "pass a number"
-            )
-        if self.discharge is not None and not (_is_finite(self.discharge) and self.discharge > 0):
-            raise RecordError(
-                f"discharge = {self.discharge!r} of channel {self.name}",
-                "a discharge is a positive time constant in seconds",
-                "pass a number, or None",
-            )
+
+def _is_mount(value: object) -> bool:
+    if not (isinstance(value, tuple) and len(value) == 2 and all(map(_is_finite, value))):
+        return False
+    return bool(value[0] > 0 and value[1] >= 0)
 
 
 def _is_finite(value: object) -> bool:
