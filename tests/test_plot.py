@@ -21,9 +21,10 @@ from stickslip.cycle.sticks import StickEvent
 from stickslip.figures.contact import plot_sticks, plot_velocity_loop
 from stickslip.figures.friction import plot_load_dependence
 from stickslip.figures.squeak import plot_squeaks
-from stickslip.figures.style import COLUMNS, STYLE, Plate, envelope, prefixed, thinned
+from stickslip.figures.style import COLUMNS, STYLE, Plate, envelope, thinned
 from stickslip.figures.traces import close_up, force_balance, plot_force_balance, plot_traces
 from stickslip.story.story import summary
+from stickslip.units import prefixed
 
 FS = 500.0
 

@@ -9,27 +9,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from stickslip.errors import ModelError
+from stickslip.figures import style
 from stickslip.figures.maps import den_hartog
-from stickslip.figures.style import (
-    BLUE,
-    FAINT,
-    GREEN,
-    INK,
-    ORANGE,
-    PURPLE,
-    SHADE,
-    SKY,
-    axes_of,
-    axis_label,
-    coloured,
-    empty_figure,
-    legend_above,
-    new_figure,
-    plain_decades,
-    prefixed,
-    spelled,
-    styled,
-)
+from stickslip.figures.style import BLUE, FAINT, GREEN, INK, ORANGE, PURPLE, SHADE, SKY
 from stickslip.maps.basins import Attractor, Basins
 from stickslip.maps.bifurcation import Bifurcation
 from stickslip.maps.boundaries import Boundary
@@ -37,6 +19,7 @@ from stickslip.maps.dither import Dither, dithered_friction
 from stickslip.oscillator import Oscillator
 from stickslip.parameters import unit as unit_of
 from stickslip.solve.tables import System
+from stickslip.units import prefixed, spelled
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -55,7 +38,7 @@ COLOURS = (BLUE, ORANGE, GREEN, PURPLE, SKY, INK, FAINT, SHADE)
 MOST_NAMED = 8  # attractors in a legend
 
 
-@styled
+@style.styled
 def plot_limit_cycles(branches: CycleBranches, *, label: str = "parameter") -> Figure:
     """The amplitude and the frequency of the limit cycle over the parameter, both ways, and what the contacts do.
 
@@ -81,17 +64,17 @@ def plot_limit_cycles(branches: CycleBranches, *, label: str = "parameter") -> F
     >>> [axes.get_ylabel() for axes in drawn.axes]
     ['amplitude of sliding [mm]', 'frequency [Hz]', 'share of the time']
     """
-    figure, (top, middle, below) = new_figure(3, height=5.6, heights=[2, 1, 1])
+    figure, (top, middle, below) = style.new_figure(3, height=5.6, heights=[2, 1, 1])
     sizes = np.concatenate([branches.amplitudes(way) for way in ("up", "down")])
     factor, unit = prefixed(sizes, "m")
     looks = {"up": (BLUE, ">", "going up", 5), "down": (ORANGE, "<", "going down", 8)}
     for way, (colour, marker, text, size) in reversed(looks.items()):
         cycles = branches.up if way == "up" else branches.down
         face = colour if way == "up" else "none"
-        style = {"color": colour, "marker": marker, "markersize": size, "markerfacecolor": face, "linewidth": 1.0}
-        top.plot(branches.values, factor * branches.amplitudes(way), label=text, **style)
+        look = {"color": colour, "marker": marker, "markersize": size, "markerfacecolor": face, "linewidth": 1.0}
+        top.plot(branches.values, factor * branches.amplitudes(way), label=text, **look)
         frequencies = [cycle.frequency if cycle.vibrates else np.nan for cycle in cycles]
-        middle.plot(branches.values, frequencies, **style)
+        middle.plot(branches.values, frequencies, **look)
     separating = branches.amplitudes("between")
     if np.isfinite(separating).any():
         top.plot(branches.values, factor * separating, color=INK, linestyle=":", marker="x", label="unstable, between")
@@ -108,9 +91,9 @@ def plot_limit_cycles(branches: CycleBranches, *, label: str = "parameter") -> F
         top.plot([], [], color=INK, linewidth=0.9, linestyle="--", label=text)
     if branches.both is not None and branches.both[0] < branches.both[1]:
         top.axvspan(*branches.both, color=SHADE, alpha=0.5, linewidth=0, label="either may last")
-    top.set_ylabel(axis_label("amplitude of sliding", unit))
+    top.set_ylabel(style.axis_label("amplitude of sliding", unit))
     top.set_ylim(bottom=-0.04 * factor * max(float(sizes.max()), 1e-300))
-    legend_above(top, columns=2)
+    style.legend_above(top, columns=2)
     middle.set_ylabel("frequency [Hz]")
     below.set(xlabel=label, ylabel="share of the time", ylim=(-0.05, 1.05))
     below.legend(loc="upper right", ncols=2)
@@ -118,7 +101,7 @@ def plot_limit_cycles(branches: CycleBranches, *, label: str = "parameter") -> F
     return figure
 
 
-@styled
+@style.styled
 def plot_stability(stability: xr.Dataset, *, labels: tuple[str, str] | None = None) -> Figure:
     """Over two parameters: where steady sliding lasts, and what ends it elsewhere.
 
@@ -159,12 +142,12 @@ def plot_stability(stability: xr.Dataset, *, labels: tuple[str, str] | None = No
             "a figure has two parameters of two values or more",
             "choose the others' values with .sel()",
         )
-    figure, axes = new_figure(height=4.2)
+    figure, axes = style.new_figure(height=4.2)
     known = list(STATES)
     places = np.vectorize(known.index)(stability.mechanism.values)
     y, x = (stability[name].values for name in names)
     options: Any = {"cmap": ListedColormap(list(STATES.values())), "vmin": -0.5, "vmax": len(known) - 0.5}
-    coloured(axes, x, y, places, alpha=FILLED, **options)
+    style.coloured(axes, x, y, places, alpha=FILLED, **options)
     growth = stability.growth.values
     if growth.min() < 0 < growth.max():
         axes.contour(x, y, growth, levels=[0.0], colors=INK, linewidths=1.2)
@@ -175,11 +158,11 @@ def plot_stability(stability: xr.Dataset, *, labels: tuple[str, str] | None = No
     axes.set(xlabel=second, ylabel=first)
     seen = [known[k] for k in np.unique(places)]
     shown = [Patch(facecolor=STATES[name], alpha=FILLED, edgecolor=FAINT, label=name) for name in seen]
-    legend_above(axes, handles=shown, columns=2)
+    style.legend_above(axes, handles=shown, columns=2)
     return figure
 
 
-@styled
+@style.styled
 def plot_bifurcation(diagram: Bifurcation) -> Figure:
     """The diagram: where the motion is once in each period of the drive, followed up and down, with every change.
 
@@ -200,7 +183,7 @@ def plot_bifurcation(diagram: Bifurcation) -> Figure:
     >>> len(plot_bifurcation(diagram).axes)
     2
     """
-    figure, (top, bottom) = new_figure(2, height=4.6, heights=(3, 1))
+    figure, (top, bottom) = style.new_figure(2, height=4.6, heights=(3, 1))
     motion = diagram.up[0].orbit.orbit
     points = [attractor.points[:, 0] for attractor in (*diagram.up, *diagram.down)]
     factor, unit = prefixed(np.concatenate(points), motion.units("x")[0])
@@ -215,9 +198,9 @@ def plot_bifurcation(diagram: Bifurcation) -> Figure:
     bottom.axhline(1.0, color=INK, linewidth=0.8)
     bottom.set_ylim(0, 1.15)
     bottom.set_ylabel("largest\nmultiplier")
-    top.set_ylabel(axis_label("displacement at phase zero", unit))
+    top.set_ylabel(style.axis_label("displacement at phase zero", unit))
     bottom.set_xlabel(_named(motion.system, diagram.parameter))
-    legend_above(top, columns=4, markerscale=3 if crowded else 1)
+    style.legend_above(top, columns=4, markerscale=3 if crowded else 1)
     return figure
 
 
@@ -272,10 +255,10 @@ def _name_regimes(ax: Axes, diagram: Bifurcation) -> None:
 
 
 def _named(system: System, parameter: str) -> str:
-    return axis_label(parameter.replace(".", " ").replace("_", " "), unit_of(system, parameter))
+    return style.axis_label(parameter.replace(".", " ").replace("_", " "), unit_of(system, parameter))
 
 
-@styled
+@style.styled
 def plot_basins(basins: Basins, *, ax: Axes | None = None) -> Axes:
     """The map of starts, each in the colour of the motion it leads to; crosses where the motion is at phase zero.
 
@@ -301,7 +284,7 @@ def plot_basins(basins: Basins, *, ax: Axes | None = None) -> Axes:
     from matplotlib.colors import ListedColormap
     from matplotlib.patches import Patch
 
-    ax = axes_of(ax, height=4.2)
+    ax = style.axes_of(ax, height=4.2)
     (down, across), (rows, columns) = basins.names, basins.axes
     motion = basins.attractors[0].orbit.orbit
     units = dict(zip(motion.table.names, (*motion.units("x"), *motion.units("v")), strict=False))  # rad if it turns
@@ -311,7 +294,7 @@ def plot_basins(basins: Basins, *, ax: Axes | None = None) -> Axes:
     colours = [COLOURS[j % len(COLOURS)] for j in range(count)]
     known = np.ma.masked_less(basins.which.T, 0)
     options: Any = {"cmap": ListedColormap(colours), "vmin": -0.5, "vmax": count - 0.5, "alpha": 0.55}
-    coloured(ax, across_factor * rows, down_factor * columns, known, **options)
+    style.coloured(ax, across_factor * rows, down_factor * columns, known, **options)
     handles = []
     for j, (attractor, share) in enumerate(zip(basins.attractors, basins.shares, strict=True)):
         table = attractor.orbit.orbit.table
@@ -324,13 +307,13 @@ def plot_basins(basins: Basins, *, ax: Axes | None = None) -> Axes:
         low, high = share.interval
         label = f"{attractor.regime}: {100 * share.value:.1f} % ({100 * low:.1f} to {100 * high:.1f})"
         handles.append(Patch(color=colours[j], alpha=0.55, label=label))
-    legend_above(ax, handles=handles[:MOST_NAMED], columns=2)
-    ax.set_xlabel(axis_label(down, across_unit))
-    ax.set_ylabel(axis_label(across, down_unit))
+    style.legend_above(ax, handles=handles[:MOST_NAMED], columns=2)
+    ax.set_xlabel(style.axis_label(down, across_unit))
+    ax.set_ylabel(style.axis_label(across, down_unit))
     return ax
 
 
-@styled
+@style.styled
 def plot_boundary(boundary: Boundary, *, ax: Axes | None = None) -> Axes:
     """The boundary as a curve, with Den Hartog's closed form over it where it applies.
 
@@ -354,7 +337,7 @@ def plot_boundary(boundary: Boundary, *, ax: Axes | None = None) -> Axes:
     >>> plot_boundary(border).get_lines()[1].get_label()
     'Den Hartog (1931)'
     """
-    ax = axes_of(ax)
+    ax = style.axes_of(ax)
     system = next(motion for motion in boundary.low if motion is not None).orbit.orbit.system
     free = np.array([motion is not None and motion.status == "not unique" for motion in boundary.low])
     sides = ((~free, BLUE, "bisection of exact runs"), (free, "none", "of a family, from one start"))
@@ -376,11 +359,11 @@ def plot_boundary(boundary: Boundary, *, ax: Axes | None = None) -> Axes:
         ax.text(0.98, place, str(kind), transform=ax.transAxes, ha="right", va="top" if place > 0.5 else "bottom")
     ax.set_xlabel(_named(system, boundary.along) if boundary.along else "place")
     ax.set_ylabel(_named(system, boundary.parameter))
-    legend_above(ax, columns=2)
+    style.legend_above(ax, columns=2)
     return ax
 
 
-@styled
+@style.styled
 def plot_dither(dither: Dither) -> Figure:
     """How the longest stick goes down with the dither, and what the dither makes of the friction.
 
@@ -402,7 +385,7 @@ def plot_dither(dither: Dither) -> Figure:
     >>> len(plot_dither(ss.dither(slider, frequency=5.0)).axes)
     2
     """
-    figure = empty_figure(4.8)
+    figure = style.empty_figure(4.8)
     top, bottom = figure.subplots(2, 1)
     factor, unit = prefixed(dither.scan[:, 0], dither.amplitude.unit)
     sticks = dither.scan[:, 1] * dither.frequency
@@ -410,16 +393,16 @@ def plot_dither(dither: Dither) -> Figure:
     known = np.where(np.isfinite(sticks), np.maximum(sticks, least), np.nan)
     top.loglog(factor * dither.scan[:, 0], known, ".", color=BLUE, label="exact runs")
     for axis in (top.xaxis, top.yaxis):
-        plain_decades(axis)
+        style.plain_decades(axis)
     top.axhline(1.0, color=INK, linewidth=0.8)
     smallest = factor * dither.amplitude.value
     label = f"smallest that does it: {smallest:.3g} {spelled(unit)}"
     top.axvline(smallest, color=ORANGE, linestyle="--", label=label)
     if np.any(sticks == 0):
         top.text(0.99, 0.04, "lowest row: no stick at all", transform=top.transAxes, ha="right", fontsize=7)
-    top.set_xlabel(axis_label(f"dither of {dither.frequency:.4g} Hz on the {dither.on}", unit))
+    top.set_xlabel(style.axis_label(f"dither of {dither.frequency:.4g} Hz on the {dither.on}", unit))
     top.set_ylabel("longest stick\n[periods of the dither]")
-    legend_above(top, columns=2)
+    style.legend_above(top, columns=2)
     shares = np.linspace(0, 1, 200)
     bottom.plot(shares, dithered_friction(shares, speed=1.0), color=ORANGE, label="(2/pi) asin(v/aw)")
     for column, colour, text in ((2, BLUE, "exact runs with this dither"), (3, GREEN, "with ten times as much")):
@@ -427,6 +410,6 @@ def plot_dither(dither: Dither) -> Figure:
     bottom.axhline(1.0, color=FAINT, linewidth=0.8)
     bottom.set_xlabel("sliding speed over that of the dither, v/aw")
     bottom.set_ylabel("mean friction\nover sliding friction")
-    legend_above(bottom, columns=3)
+    style.legend_above(bottom, columns=3)
     figure.align_ylabels([top, bottom])
     return figure

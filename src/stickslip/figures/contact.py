@@ -12,31 +12,12 @@ import numpy as np
 
 from stickslip.arrays import Array
 from stickslip.balance.motion import contact_motion
-from stickslip.figures.style import (
-    BARS,
-    BLUE,
-    FAINT,
-    GREEN,
-    INK,
-    ORANGE,
-    PURPLE,
-    SHADE,
-    SKY,
-    Plate,
-    axes_of,
-    axis_label,
-    captioned,
-    empty_figure,
-    envelope,
-    legend_above,
-    new_figure,
-    prefixed,
-    styled,
-    thinned,
-)
+from stickslip.figures import style
+from stickslip.figures.style import BARS, BLUE, FAINT, GREEN, INK, ORANGE, PURPLE, SHADE, SKY
 from stickslip.law.fit_curve import CurveFit
 from stickslip.law.law import LawFit
 from stickslip.law.verdict import LawComparison
+from stickslip.units import prefixed
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -54,16 +35,16 @@ POINTS_A_CYCLE = 300
 COLOURS = {"plateau": BLUE, "by_stroke": ORANGE, "by_cycle": GREEN, "by_energy": INK}
 
 
-@styled
+@style.styled
 def plot_displacement_loop(findings: Findings, *, ax: Axes | None = None) -> Axes:
     """Friction against displacement: the cycles thin, their mean with a band of one standard deviation."""
-    return _loop(findings, "displacement", axes_of(ax))
+    return _loop(findings, "displacement", style.axes_of(ax))
 
 
-@styled
+@style.styled
 def plot_velocity_loop(findings: Findings, *, ax: Axes | None = None) -> Axes:
     """Friction against velocity: the cycles thin, their mean, and the binned curve with 95 % intervals."""
-    ax = _loop(findings, "velocity", axes_of(ax, height=4.2))
+    ax = _loop(findings, "velocity", style.axes_of(ax, height=4.2))
     loops = findings.loops
     assert loops is not None
     x_factor, _ = prefixed(loops.velocity, f"{loops.unit}/s")
@@ -75,11 +56,11 @@ def plot_velocity_loop(findings: Findings, *, ax: Axes | None = None) -> Axes:
     ax.errorbar(x_factor * curve.velocity, y_factor * curve.friction, yerr=away, label=label, **look)
     for value in (loops.forward.value, -loops.back.value):
         ax.axhline(y_factor * value, color=INK, linewidth=0.9, linestyle=":", zorder=1)
-    legend_above(ax, columns=3)
+    style.legend_above(ax, columns=3)
     return ax
 
 
-@styled
+@style.styled
 def plot_sticks(findings: Findings) -> Figure:
     """How long the contact stuck and slipped, over the record's time, and how often each duration occurred.
 
@@ -87,7 +68,7 @@ def plot_sticks(findings: Findings) -> Figure:
     """
     assert findings.sticks is not None
     events = [event for event in findings.sticks.events if event.whole]
-    figure = empty_figure(3.0)
+    figure = style.empty_figure(3.0)
     left, right = figure.subplots(1, 2, sharey=True, width_ratios=(1, 0.3))
     factor, unit = prefixed(np.array([event.duration for event in events]), "s")
     bins = np.linspace(0, factor * max(event.duration for event in events), 40).tolist()
@@ -95,17 +76,17 @@ def plot_sticks(findings: Findings) -> Figure:
         chosen = [event for event in events if event.kind == kind]
         if chosen:
             durations = factor * np.array([event.duration for event in chosen])
-            some = thinned(len(chosen), 1500)
+            some = style.thinned(len(chosen), 1500)
             times = np.array([event.time for event in chosen])
             left.plot(times[some], durations[some], marker, color=colour, markersize=4, linestyle="none", label=kind)
             right.hist(durations, bins=bins, color=colour, alpha=0.75, orientation="horizontal")
-    left.set(xlabel="time [s]", ylabel=axis_label("duration", unit), ylim=(0, None))
-    legend_above(left, columns=2)
+    left.set(xlabel="time [s]", ylabel=style.axis_label("duration", unit), ylim=(0, None))
+    style.legend_above(left, columns=2)
     right.set(xlabel="how many")
     return figure
 
 
-@styled
+@style.styled
 def plot_transition_speed(transition: TransitionSpeed, *, ax: Axes | None = None) -> Axes:
     """At which speed does sliding begin after a turn? The mean curve of friction against velocity, and each method.
 
@@ -131,7 +112,7 @@ def plot_transition_speed(transition: TransitionSpeed, *, ax: Axes | None = None
     >>> plot_transition_speed(ss.contact.transition_speed(record)).get_ylabel()
     'friction [N]'
     """
-    ax = axes_of(ax)
+    ax = style.axes_of(ax)
     x_factor, x_unit = prefixed(transition.velocity, "m/s")
     y_factor, y_unit = prefixed(transition.friction, transition.level.unit)
     x, y = x_factor * transition.velocity, y_factor * transition.friction
@@ -148,8 +129,8 @@ def plot_transition_speed(transition: TransitionSpeed, *, ax: Axes | None = None
         ax.plot(ends, heights, "--", color=ORANGE, marker="o", markersize=4, markevery=[1], label="carried on")
     for side, label in ((-1, None), (1, "sliding friction")):
         ax.axhline(side * y_factor * transition.level.value, color=FAINT, linewidth=1.0, label=label)
-    ax.set(xlabel=axis_label("velocity after the turn", x_unit), ylabel=axis_label("friction", y_unit))
-    legend_above(ax, columns=3)
+    ax.set(xlabel=style.axis_label("velocity after the turn", x_unit), ylabel=style.axis_label("friction", y_unit))
+    style.legend_above(ax, columns=3)
     return ax
 
 
@@ -172,8 +153,8 @@ def _loop(findings: Findings, abscissa: str, ax: Axes) -> Axes:
     ax.axhline(0, color=FAINT, linewidth=0.8)
     ax.axvline(0, color=FAINT, linewidth=0.8)
     text = f"{abscissa} of the contact"
-    ax.set(xlabel=axis_label(text, x_unit), ylabel=axis_label("friction", y_unit))
-    legend_above(ax, columns=3)
+    ax.set(xlabel=style.axis_label(text, x_unit), ylabel=style.axis_label("friction", y_unit))
+    style.legend_above(ax, columns=3)
     return ax
 
 
@@ -183,10 +164,10 @@ def _cycles(findings: Findings, abscissa: str) -> list[tuple[Array, Array]]:
     assert loops is not None
     moved = across(findings, abscissa)
     rows = round(record.fs / loops.frequency.value)
-    for start in np.asarray(loops.cycles)[thinned(len(loops.cycles), MOST_CYCLES)]:
+    for start in np.asarray(loops.cycles)[style.thinned(len(loops.cycles), MOST_CYCLES)]:
         first = round((float(start) - record.start) * record.fs)
         part = slice(max(first, 0), first + rows + 1)
-        some = thinned(len(moved[part]), POINTS_A_CYCLE)
+        some = style.thinned(len(moved[part]), POINTS_A_CYCLE)
         if len(some):
             drawn.append((moved[part][some], record["friction"][part][some]))
     return drawn
@@ -202,7 +183,7 @@ def across(findings: Findings, abscissa: str) -> Array:
     return moved
 
 
-@styled
+@style.styled
 def plot_micro_slips(findings: Findings) -> Figure:
     """Does the contact hold all the time that it sticks? One stick, with the micro-slips in it shaded."""
     assert findings.sticks is not None
@@ -214,7 +195,7 @@ def plot_micro_slips(findings: Findings) -> Figure:
     margin = MARGIN * stick.duration
     rows = np.flatnonzero(np.abs(record.time - stick.time - stick.duration / 2) < stick.duration / 2 + margin)
     time = record.time[rows]
-    figure, axes = new_figure(2, height=3.8)
+    figure, axes = style.new_figure(2, height=3.8)
     speed = contact_motion(record, contact=findings.settings.get("contact"), question="the figure").velocity
     for ax, values, quantity, unit in (
         (axes[0], record["friction"], "friction", record.channels["friction"].unit),
@@ -226,19 +207,19 @@ def plot_micro_slips(findings: Findings) -> Figure:
         for number, event in enumerate(e for e in inside if stick.time <= e.time < stick.time + stick.duration):
             label = "micro-slip" if number == 0 else None
             ax.axvspan(event.time, event.time + event.duration, color=ORANGE, alpha=0.4, linewidth=0, label=label)
-        ax.set_ylabel(axis_label(quantity, text))
+        ax.set_ylabel(style.axis_label(quantity, text))
     axes[1].set(xlabel="time [s]", xlim=(float(time[0]), float(time[-1])))
-    legend_above(axes[0], columns=3)
+    style.legend_above(axes[0], columns=3)
     return figure
 
 
-@styled
+@style.styled
 def plot_breakaway(findings: Findings, *, ax: Axes | None = None) -> Axes:
     """What the contact bears just before it slips against what it bears while it slides, in each direction."""
     loops, breakaway = findings.loops, findings.breakaway
     assert loops is not None
     assert breakaway is not None
-    ax = axes_of(ax, height=2.4)
+    ax = style.axes_of(ax, height=2.4)
     pairs = {
         "sliding": (loops.forward, loops.back, BLUE, "o"),
         "before it slips": (breakaway.forward, breakaway.back, ORANGE, "^"),
@@ -251,37 +232,37 @@ def plot_breakaway(findings: Findings, *, ax: Axes | None = None) -> Axes:
         places = [place for _, place in drawn]
         look: Any = {**BARS, "fmt": marker, "color": colour, "label": label if drawn else None}
         ax.errorbar(values, places, xerr=np.abs(ends - values[:, None]).T, linestyle="none", **look)
-    ax.set(yticks=[0, 1], yticklabels=["back", "forward"], ylim=(-0.5, 1.5), xlabel=axis_label("friction", unit))
-    legend_above(ax, columns=3)
+    ax.set(yticks=[0, 1], yticklabels=["back", "forward"], ylim=(-0.5, 1.5), xlabel=style.axis_label("friction", unit))
+    style.legend_above(ax, columns=3)
     return ax
 
 
-def tribometer_plates(coefficients: Coefficients) -> list[Plate]:
+def tribometer_plates(coefficients: Coefficients) -> list[style.Plate]:
     """The figures of a tribometer's test, in reading order."""
     return [
-        captioned("tribometer", "coefficient", partial(plot_coefficients, coefficients)),
-        captioned("tribometer", "triboscopy", partial(plot_triboscopy, coefficients)),
+        style.captioned("tribometer", "coefficient", partial(plot_coefficients, coefficients)),
+        style.captioned("tribometer", "triboscopy", partial(plot_triboscopy, coefficients)),
     ]
 
 
-@styled
+@style.styled
 def plot_coefficients(coefficients: Coefficients, *, ax: Axes | None = None) -> Axes:
     """The coefficient of every cycle by each definition, and how it wears in."""
-    ax = axes_of(ax)
+    ax = style.axes_of(ax)
     for name, values in coefficients.of_cycles.items():
         ax.plot(np.arange(1, len(values) + 1), values, color=COLOURS[name], linewidth=1.0, label=name.replace("_", " "))
     if coefficients.wear_in is not None:
         cycle = np.arange(1, len(coefficients.wear_in.fitted) + 1)
         ax.plot(cycle, coefficients.wear_in.fitted, color=INK, linewidth=1.0, linestyle="--", label="wear-in")
     ax.set(xlabel="cycle", ylabel="friction over load")
-    legend_above(ax, columns=5)
+    style.legend_above(ax, columns=5)
     return ax
 
 
-@styled
+@style.styled
 def plot_triboscopy(coefficients: Coefficients, *, ax: Axes | None = None) -> Axes:
     """Friction over load at each place of the stroke, cycle after cycle, the mean of both directions."""
-    ax = axes_of(ax)
+    ax = style.axes_of(ax)
     both = (coefficients.forward + coefficients.back) / 2
     factor, unit = (1e3, "mm") if coefficients.unit == "m" else (1.0, coefficients.unit)
     low, high = np.nanquantile(both, [0.02, 0.98])
@@ -310,30 +291,32 @@ CURVE = 200  # points of a line over the speed
 SHOWN = 0.4  # s of a record that are drawn: more can not be told apart on a page
 
 
-def plates_of(joint: JointFriction) -> list[Plate]:
+def plates_of(joint: JointFriction) -> list[style.Plate]:
     """The figures of one joint, in reading order."""
     traces = joint.time, joint.measured, joint.explained
     return [
-        captioned("joint", "joint-friction", partial(plot_joint, joint)),
-        captioned("joint", "joint-torque", partial(plot_torque, *traces, unit=joint.level.unit)),
+        style.captioned("joint", "joint-friction", partial(plot_joint, joint)),
+        style.captioned("joint", "joint-torque", partial(plot_torque, *traces, unit=joint.level.unit)),
     ]
 
 
-def plates_together(logs: Sequence[tuple[Findings, JointPrediction]]) -> list[Plate]:
+def plates_together(logs: Sequence[tuple[Findings, JointPrediction]]) -> list[style.Plate]:
     """The torque of the log that the others predict worst, and of the one that they predict best."""
     ordered = sorted(logs, key=lambda pair: pair[1].error)
     plates = []
     for place, (log, one) in (("worst", ordered[-1]), ("best", ordered[0])):
         traces, unit = (one.time, one.measured, one.predicted), log.joint.level.unit
-        plate = captioned("joint", "joint-predicted", partial(plot_torque, *traces, unit=unit, label="by the others"))
+        plate = style.captioned(
+            "joint", "joint-predicted", partial(plot_torque, *traces, unit=unit, label="by the others")
+        )
         plates.append(replace(plate, name=f"{plate.name}-{place}", title=f"{plate.title} {place}: {log.name}"))
     return plates
 
 
-@styled
+@style.styled
 def plot_joint(joint: JointFriction, *, ax: Axes | None = None) -> Axes:
     """Friction over speed while the joint slides, and what is made of it."""
-    ax, unit = axes_of(ax), joint.level.unit
+    ax, unit = style.axes_of(ax), joint.level.unit
     ax.plot(joint.speed, joint.friction, ".", color=BLUE, markersize=3, alpha=0.5, label="while it slides")
     under_load = joint.load.value * joint.carried if joint.load is not None and joint.load.known else 0.0
     ways = ((-1, joint.back, joint.viscous_back), (1, joint.forward, joint.viscous_forward))
@@ -346,30 +329,30 @@ def plot_joint(joint: JointFriction, *, ax: Axes | None = None) -> Axes:
         ax.plot(speed, friction, color=ORANGE, linewidth=1.6, label="under the mean load" if side > 0 else None)
     ax.axhline(0.0, color=INK, linewidth=0.6)
     ax.set(xlabel=f"speed [{'rad/s' if unit == 'N m' else 'm/s'}]", ylabel=f"friction [{unit}]")
-    legend_above(ax, columns=2)
+    style.legend_above(ax, columns=2)
     return ax
 
 
-@styled
+@style.styled
 def plot_torque(
     time: Array, measured: Array, model: Array, *, unit: str, label: str = "explained", ax: Axes | None = None
 ) -> Axes:
     """The torque while the joint slides, and what is made of it."""
-    ax, what = axes_of(ax), "torque" if unit == "N m" else "force"
+    ax, what = style.axes_of(ax), "torque" if unit == "N m" else "force"
     ax.plot(time, measured, ".", color=BLUE, markersize=3, label=f"{what}, smoothed")
     ax.plot(time, model, ".", color=ORANGE, markersize=2, label=label)
     ax.set(xlabel="time [s]", ylabel=f"{what} [{unit}]")
-    legend_above(ax, columns=2)
+    style.legend_above(ax, columns=2)
     return ax
 
 
-@styled
+@style.styled
 def plot_laws(comparison: LawComparison, *, ax: Axes | None = None) -> Axes:
     """The misfit of each law over the least that any law leaves, and which laws are rejected."""
     from matplotlib.ticker import NullFormatter
 
     standings = [candidate.standing for candidate in comparison.candidates]
-    ax, places = axes_of(ax, height=1.3 + 0.32 * len(standings)), np.arange(len(standings))
+    ax, places = style.axes_of(ax, height=1.3 + 0.32 * len(standings)), np.arange(len(standings))
     for kept, colour, label in ((True, BLUE, "not rejected"), (False, FAINT, "rejected")):
         rows = [j for j, standing in enumerate(standings) if standing.kept == kept]
         if rows:
@@ -380,42 +363,44 @@ def plot_laws(comparison: LawComparison, *, ax: Axes | None = None) -> Axes:
     ax.set_yticks(places, [law.name for law in standings])
     ax.set_ylim(len(standings) - 0.4, -0.6)
     ax.set_xlabel("misfit, over the least that any law leaves")
-    legend_above(ax, columns=2)
+    style.legend_above(ax, columns=2)
     return ax
 
 
-@styled
+@style.styled
 def plot_fit(result: LawComparison | LawFit, *, record: int = 0) -> Figure:
     """What was measured, what the fitted or best law predicts, and what is left, over the first part of a record."""
     fit = result.fit if isinstance(result, LawComparison) else result
     name_of_law = result.best.name if isinstance(result, LawComparison) else type(fit.law).__name__
     traces = fit.traces[record]
     names = list(traces.measured)
-    figure, axes = new_figure(len(names) + 1, height=1.6 * len(names) + 1.8)
+    figure, axes = style.new_figure(len(names) + 1, height=1.6 * len(names) + 1.8)
     below = axes[-1]
     for ax, name, colour in zip(axes, names, OF_LAWS, strict=False):
         time, measured, fitted = traces.time[name], traces.measured[name], traces.fitted[name]
         near = time <= time[0] + SHOWN
         quantity, unit = WORDS.get(name, (name, ""))
         factor, unit = prefixed(measured[near] - measured[near].mean(), unit)
-        ax.plot(*envelope(time[near], factor * measured[near]), color=INK, linewidth=1.4, label="measured")
+        ax.plot(*style.envelope(time[near], factor * measured[near]), color=INK, linewidth=1.4, label="measured")
         label = f"fitted: {name_of_law}"
-        ax.plot(*envelope(time[near], factor * fitted[near]), color=ORANGE, linewidth=1.0, linestyle="--", label=label)
-        ax.set_ylabel(axis_label(quantity, unit, "\n"))
+        ax.plot(
+            *style.envelope(time[near], factor * fitted[near]), color=ORANGE, linewidth=1.0, linestyle="--", label=label
+        )
+        ax.set_ylabel(style.axis_label(quantity, unit, "\n"))
         residual = (measured - fitted)[near] / fit.noise[name]
-        below.plot(*envelope(time[near], residual), color=colour, linewidth=0.8, label=quantity)
-    legend_above(axes[0], columns=2)
+        below.plot(*style.envelope(time[near], residual), color=colour, linewidth=0.8, label=quantity)
+    style.legend_above(axes[0], columns=2)
     below.axhline(0, color=FAINT, linewidth=0.8)
     below.set(xlabel="time [s]", ylabel="left over,\ntimes the noise")
-    legend_above(below, columns=len(names), borderaxespad=0.1)
+    style.legend_above(below, columns=len(names), borderaxespad=0.1)
     figure.align_ylabels(list(axes))
     return figure
 
 
-@styled
+@style.styled
 def plot_curve(fit: CurveFit, *, ax: Axes | None = None) -> Axes:
     """A measured friction and the fitted curve."""
-    ax = axes_of(ax)
+    ax = style.axes_of(ax)
     label, unit = ALONG[fit.along]
     factor, unit = prefixed(fit.at, unit)
     order = np.argsort(fit.at, kind="stable") if fit.along == "v" else np.arange(len(fit.at))
@@ -427,20 +412,20 @@ def plot_curve(fit: CurveFit, *, ax: Axes | None = None) -> Axes:
         at, fitted = np.insert(at, middle, 0.0), np.insert(fitted, middle, np.nan)
     ax.plot(at, fitted, color=ORANGE, linewidth=1.4, label=f"fitted: {fit.curve}")
     quantity = "coefficient of friction" if fit.unit == "1" else "friction"
-    ax.set(xlabel=axis_label(label, unit), ylabel=axis_label(quantity, force_unit))
-    legend_above(ax, columns=2)
+    ax.set(xlabel=style.axis_label(label, unit), ylabel=style.axis_label(quantity, force_unit))
+    style.legend_above(ax, columns=2)
     return ax
 
 
-def law_plates(result: LawComparison | LawFit | CurveFit) -> list[Plate]:
+def law_plates(result: LawComparison | LawFit | CurveFit) -> list[style.Plate]:
     """The figures of a fit, in reading order."""
     if isinstance(result, CurveFit):
-        return [captioned("law", "curve", partial(plot_curve, result))]
+        return [style.captioned("law", "curve", partial(plot_curve, result))]
     plates = []
     if isinstance(result, LawComparison) and len(result.candidates) > 1:
-        plates.append(captioned("law", "laws", partial(plot_laws, result)))
+        plates.append(style.captioned("law", "laws", partial(plot_laws, result)))
     count = len(result.fit.traces if isinstance(result, LawComparison) else result.traces)
     for record in range(count):
         draw, of = partial(plot_fit, result, record=record), f", record {record + 1} of {count}" if count > 1 else ""
-        plates.append(captioned("law", "fit", draw, name=f"fit-{record + 1}", of=of))
+        plates.append(style.captioned("law", "fit", draw, name=f"fit-{record + 1}", of=of))
     return plates

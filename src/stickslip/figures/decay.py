@@ -10,25 +10,9 @@ import numpy as np
 
 from stickslip.arrays import Array
 from stickslip.decay import extremes as ex
-from stickslip.figures.style import (
-    BLUE,
-    FAINT,
-    GREEN,
-    INK,
-    ORANGE,
-    PURPLE,
-    SHADE,
-    Plate,
-    axes_of,
-    axis_label,
-    captioned,
-    envelope,
-    legend_above,
-    named_intervals,
-    new_figure,
-    prefixed,
-    styled,
-)
+from stickslip.figures import style
+from stickslip.figures.style import BLUE, FAINT, GREEN, INK, ORANGE, PURPLE, SHADE
+from stickslip.units import prefixed
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -45,13 +29,13 @@ MARGIN = 0.04  # of the motion's length, shown before and after it
 POINTS = 600  # of a smooth curve
 
 
-@styled
+@style.styled
 def plot_decay(decay: Decay, *, release: int = 0, ax: Axes | None = None) -> Axes:
     """The response within the envelopes that either friction alone would give (thesis, Figure 6.1)."""
-    ax, ring = axes_of(ax), decay.releases.ring_downs[release]
+    ax, ring = style.axes_of(ax), decay.releases.ring_downs[release]
     factor, unit = prefixed(ring.samples - ring.rest, ring.unit)
     rows = _shown(ring)
-    ax.plot(*envelope(ring.time[rows], factor * ring.samples[rows]), color=INK, linewidth=1.0, label="recorded")
+    ax.plot(*style.envelope(ring.time[rows], factor * ring.samples[rows]), color=INK, linewidth=1.0, label="recorded")
     rest = decay.rest
     time, viscous, dry = _envelopes(decay, ring)
     alone = ((viscous, BLUE, "viscous friction alone"), (dry, ORANGE, "dry friction alone"))
@@ -61,12 +45,12 @@ def plot_decay(decay: Decay, *, release: int = 0, ax: Axes | None = None) -> Axe
             ax.plot(time, factor * (rest + side * curve), color=colour, linestyle="--", linewidth=1.1, label=label)
     ax.axhline(factor * rest, color=FAINT, linewidth=0.8)
     _shade_rest(ax, ring, rows)
-    ax.set(xlabel="time [s]", ylabel=axis_label(WORDS[ring.channel], unit))
-    legend_above(ax, columns=3)
+    ax.set(xlabel="time [s]", ylabel=style.axis_label(WORDS[ring.channel], unit))
+    style.legend_above(ax, columns=3)
     return ax
 
 
-@styled
+@style.styled
 def plot_identified(decay: Decay, *, release: int = 0) -> Figure:
     """Recorded and identified response over each other, and what is left between them (thesis, Figure 6.10).
 
@@ -75,24 +59,24 @@ def plot_identified(decay: Decay, *, release: int = 0) -> Figure:
     time, measured, fitted, label = _identified(decay, release)
     ring = decay.releases.ring_downs[release]
     factor, unit = prefixed(measured - decay.rest, ring.unit)
-    figure, (above, below) = new_figure(2, height=4.6, heights=[2, 1])
-    above.plot(*envelope(time, factor * measured), color=INK, linewidth=1.6, label="recorded")
-    above.plot(*envelope(time, factor * fitted), color=ORANGE, linewidth=1.0, linestyle="--", label=label)
-    above.set_ylabel(axis_label(WORDS[ring.channel], unit))
-    legend_above(above, columns=2)
+    figure, (above, below) = style.new_figure(2, height=4.6, heights=[2, 1])
+    above.plot(*style.envelope(time, factor * measured), color=INK, linewidth=1.6, label="recorded")
+    above.plot(*style.envelope(time, factor * fitted), color=ORANGE, linewidth=1.0, linestyle="--", label=label)
+    above.set_ylabel(style.axis_label(WORDS[ring.channel], unit))
+    style.legend_above(above, columns=2)
     residual = measured - fitted
     small, small_unit = prefixed(residual, ring.unit)
-    below.plot(*envelope(time, small * residual), color=PURPLE, linewidth=0.8)
+    below.plot(*style.envelope(time, small * residual), color=PURPLE, linewidth=0.8)
     below.axhline(0, color=FAINT, linewidth=0.8)
-    below.set(xlabel="time [s]", ylabel=axis_label("left over", small_unit))
+    below.set(xlabel="time [s]", ylabel=style.axis_label("left over", small_unit))
     figure.align_ylabels([above, below])
     return figure
 
 
-@styled
+@style.styled
 def plot_differences(decrement: Decrement, *, ax: Axes | None = None) -> Axes:
     """The amplitude differences on the exponential that viscous friction alone makes of them (thesis, Figure 6.2)."""
-    ax = axes_of(ax)
+    ax = style.axes_of(ax)
     factor, unit = prefixed(decrement.differences, decrement.ring_down.unit)
     # 2: differences of extremes two apart; 1: sums of neighbours
     apart = len(decrement.sd) - len(decrement.differences)
@@ -111,20 +95,21 @@ def plot_differences(decrement: Decrement, *, ax: Axes | None = None) -> Axes:
     ax.errorbar(number, factor * decrement.differences, yerr=1.96 * factor * spread, **look)
     ax.axhline(0, color=FAINT, linewidth=0.8)
     label = "X(i+1) - X(i-1)" if apart == 2 else "X(i-1) + X(i)"
-    ax.set(xlabel="number i of the extreme", ylabel=axis_label(label, unit))
-    legend_above(ax, columns=2)
+    ax.set(xlabel="number i of the extreme", ylabel=style.axis_label(label, unit))
+    style.legend_above(ax, columns=2)
     return ax
 
 
-@styled
+@style.styled
 def plot_bounds(decrement: Decrement) -> Figure:
     """The viscous rate and the dry friction against the number m of half cycles, each with its worst case."""
     bounds = decrement.bounds
     factor, unit = prefixed(bounds.dry, decrement.dry_displacement.unit)
-    figure, axes = new_figure(2, height=4.6)
+    figure, axes = style.new_figure(2, height=4.6)
+    length = style.axis_label("x_k", unit)
     rows = (
         (bounds.rate, bounds.rate_first_order, bounds.rate_worst, "viscous rate β"),
-        (factor * bounds.dry, factor * bounds.dry_first_order, factor * bounds.dry_worst, axis_label("x_k", unit)),
+        (factor * bounds.dry, factor * bounds.dry_first_order, factor * bounds.dry_worst, length),
     )
     for ax, (value, first_order, worst, label) in zip(axes, rows, strict=True):
         look: Any = {"color": ORANGE, "alpha": 0.2, "linewidth": 0, "label": "exact worst case"}
@@ -136,7 +121,7 @@ def plot_bounds(decrement: Decrement) -> Figure:
         ax.axvline(bounds.best, color=GREEN, linewidth=0.9, linestyle=":")
         _within_reach(ax, value, worst, first_order)
         ax.set_ylabel(label)
-    legend_above(axes[0], columns=3)
+    style.legend_above(axes[0], columns=3)
     axes[1].set_xlabel("half cycles m between the two differences")
     figure.align_ylabels(list(axes))
     return figure
@@ -150,22 +135,22 @@ def _within_reach(ax: Axes, value: Array, *errors: Array) -> None:
         ax.set_ylim(middle - reach, middle + reach)
 
 
-@styled
+@style.styled
 def plot_records(comparison: Comparison, *, quantity: str = "damping_ratio", ax: Axes | None = None) -> Axes:
     """A quantity of each record with its 95 % interval, and the band that holds for all."""
     estimates = [getattr(findings.decay.best, quantity) for findings in comparison.findings]
     names, label = [findings.name for findings in comparison.findings], "each record, 95 %"
-    ax, factor, unit = named_intervals(names, estimates, ax=ax, label=label)
+    ax, factor, unit = style.named_intervals(names, estimates, ax=ax, label=label)
     for shared in (estimate for estimate in comparison.estimates if estimate.name == estimates[0].name):
         low, high = (factor * end for end in shared.interval)
         ax.axvspan(low, high, color=ORANGE, alpha=0.25, linewidth=0, label="all records, 95 %")
         ax.axvline(factor * shared.value, color=ORANGE, linewidth=1.0)
-    ax.set_xlabel(axis_label(estimates[0].name, unit))
-    legend_above(ax, columns=2)
+    ax.set_xlabel(style.axis_label(estimates[0].name, unit))
+    style.legend_above(ax, columns=2)
     return ax
 
 
-def plates_together(comparison: Comparison) -> list[Plate]:
+def plates_together(comparison: Comparison) -> list[style.Plate]:
     """The figures of several decays."""
     sentence = (
         "The records differ by more than their own intervals allow: something changed between them that no single one "
@@ -174,7 +159,7 @@ def plates_together(comparison: Comparison) -> list[Plate]:
         else "The band is what all records give together; each by itself agrees with it."
     )
     return [
-        captioned(
+        style.captioned(
             "decay",
             quantity.replace("_", "-"),
             partial(plot_records, comparison, quantity=quantity),
@@ -184,7 +169,7 @@ def plates_together(comparison: Comparison) -> list[Plate]:
     ]
 
 
-def plates_of(decay: Decay) -> list[Plate]:
+def plates_of(decay: Decay) -> list[style.Plate]:
     """The figures of a decay, in reading order."""
     ring, thesis = decay.releases.ring_downs[0], decay.thesis
     several = len(decay.releases.ring_downs)
@@ -197,19 +182,19 @@ def plates_of(decay: Decay) -> list[Plate]:
         "grey": "Grey: at rest before the release or after." if ring.held or ring.stopped else "",
         "several": f" The first of {several} releases; the others are below." if several > 1 else "",
     }
-    plates = [captioned("decay", "decay", partial(plot_decay, decay), **filled)]
+    plates = [style.captioned("decay", "decay", partial(plot_decay, decay), **filled)]
     if decay.waveform is not None or (ring.order == 0 and decay.best in (decay.motion, thesis)):
-        plates.append(captioned("decay", "identified", partial(plot_identified, decay)))
+        plates.append(style.captioned("decay", "identified", partial(plot_identified, decay)))
     fitted = 0 if decay.waveform is None or decay.best is decay.motion else len(decay.waveform.time)
     for release in range(1, several):
         kind, plot = ("identified", plot_identified) if release < fitted else ("decay", plot_decay)
         draw, number = partial(plot, decay, release=release), release + 1
         values = {"number": number, "several": several, "envelopes": envelopes.strip()}
-        plates.append(captioned("decay", f"next-{kind}", draw, name=f"{kind}-{number}", **values))
+        plates.append(style.captioned("decay", f"next-{kind}", draw, name=f"{kind}-{number}", **values))
     if thesis is not None:
-        plates.append(captioned("decay", "differences", partial(plot_differences, thesis)))
+        plates.append(style.captioned("decay", "differences", partial(plot_differences, thesis)))
         if len(thesis.bounds.m) > 2:
-            plates.append(captioned("decay", "bounds", partial(plot_bounds, thesis), error=_length(thesis)))
+            plates.append(style.captioned("decay", "bounds", partial(plot_bounds, thesis), error=_length(thesis)))
     return plates
 
 

@@ -11,20 +11,9 @@ import numpy as np
 
 from stickslip.errors import ModelError
 from stickslip.estimate import Estimate, Result
-from stickslip.figures.style import (
-    BARS,
-    BLUE,
-    INK,
-    ORANGE,
-    axes_of,
-    axis_label,
-    envelope,
-    known_to_pyplot,
-    named_intervals,
-    new_figure,
-    prefixed,
-    styled,
-)
+from stickslip.figures import style
+from stickslip.figures.style import BARS, BLUE, INK, ORANGE
+from stickslip.units import prefixed
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -92,7 +81,7 @@ def plot(thing: Any, *, ax: Axes | None = None, **options: Any) -> Axes:
         raise ModelError(
             f"a {type(thing).__name__} drawn on given axes", "it needs several panels of its own", "leave out ax="
         )
-    with known_to_pyplot():
+    with style.known_to_pyplot():
         drawn = draw(thing, **options)
     panels: Any = drawn.axes  # of a figure all of its axes, of axes themselves
     first: Any = panels[0] if isinstance(panels, list) else drawn
@@ -117,7 +106,7 @@ def _named(place: str) -> Callable[..., Figure | Axes]:
     return draw
 
 
-@styled
+@style.styled
 def of_record(record: Record, *, ax: Axes | None = None, channels: Sequence[str] | None = None) -> Figure | Axes:
     """The channels over time, one under the other; on given axes those that share the first one's unit."""
     names = list(channels or record)
@@ -126,15 +115,15 @@ def of_record(record: Record, *, ax: Axes | None = None, channels: Sequence[str]
         names = [name for name in names if record.channels[name].unit == unit]
         factor, spelled = prefixed(np.concatenate([record[name] for name in names]), unit)
         for name in names:
-            times, values = envelope(record.time, factor * record[name])
+            times, values = style.envelope(record.time, factor * record[name])
             ax.plot(times, values, label=name)
-        ax.set(xlabel="time [s]", ylabel=axis_label(", ".join(names), spelled))
+        ax.set(xlabel="time [s]", ylabel=style.axis_label(", ".join(names), spelled))
         return ax
-    figure, axes = new_figure(len(names), height=0.8 + 1.2 * len(names))
+    figure, axes = style.new_figure(len(names), height=0.8 + 1.2 * len(names))
     for name, panel in zip(names, np.atleast_1d(axes), strict=True):
         factor, spelled = prefixed(record[name], record.channels[name].unit)
-        panel.plot(*envelope(record.time, factor * record[name]), color=BLUE, linewidth=1.0)
-        panel.set_ylabel(axis_label(name, spelled, between="\n"))
+        panel.plot(*style.envelope(record.time, factor * record[name]), color=BLUE, linewidth=1.0)
+        panel.set_ylabel(style.axis_label(name, spelled, between="\n"))
     panel.set_xlabel("time [s]")
     return figure
 
@@ -161,10 +150,10 @@ def of_comparison(comparison: Comparison, *, ax: Axes | None = None) -> Figure |
     return _named("decay.plot_records" if "decay" in kinds else "friction.plot_levels")(comparison, ax=ax)
 
 
-@styled
+@style.styled
 def of_loops(loops: Loops, *, ax: Axes | None = None, against: str = "displacement") -> Axes:
     """The mean cycle of friction, with a band of one standard deviation between cycles."""
-    ax = axes_of(ax)
+    ax = style.axes_of(ax)
     moved = getattr(loops, against)
     across, unit = prefixed(moved, loops.unit if against == "displacement" else f"{loops.unit}/s")
     up, force = prefixed(loops.friction, loops.level.unit)
@@ -172,7 +161,7 @@ def of_loops(loops: Loops, *, ax: Axes | None = None, against: str = "displaceme
     ring = np.concatenate([f + band, (f - band)[::-1]])
     ax.fill(np.concatenate([x, x[::-1]]), ring, color=ORANGE, alpha=0.2, linewidth=0)
     ax.plot(x, f, color=ORANGE)
-    ax.set(xlabel=axis_label(f"{against} of the contact", unit), ylabel=axis_label("friction", force))
+    ax.set(xlabel=style.axis_label(f"{against} of the contact", unit), ylabel=style.axis_label("friction", force))
     return ax
 
 
@@ -183,7 +172,7 @@ def of_frequencies(findings: TimeFrequency) -> Figure | Axes:
 
 def of_decay(fit: DecayFit, *, ax: Axes | None = None) -> Axes:
     """A free decay as it was measured, and as it was fitted."""
-    ax = axes_of(ax)
+    ax = style.axes_of(ax)
     for number, (time, measured, fitted) in enumerate(zip(fit.time, fit.measured, fit.fitted, strict=True)):
         ax.plot(time, measured, color=BLUE, label=None if number else "measured")
         ax.plot(time, fitted, color=ORANGE, linestyle="--", label=None if number else "fitted")
@@ -199,7 +188,7 @@ def of_dataset(data: Any, *, ax: Axes | None = None, **options: Any) -> Figure |
     return _named("maps.plot_map")(data, ax=ax, **options)
 
 
-@styled
+@style.styled
 def of_estimates(estimates: Estimate | Sequence[Estimate], *, ax: Axes | None = None) -> Axes:
     """Estimates of one unit with their 95 % intervals; of several units each against its own value."""
     rows = [estimates] if isinstance(estimates, Estimate) else list(estimates)
@@ -207,10 +196,10 @@ def of_estimates(estimates: Estimate | Sequence[Estimate], *, ax: Axes | None = 
         raise ModelError(f"a plot of {', '.join(strangers)}", "a sequence that is drawn holds estimates", "pass these")
     rows = [row for row in rows if row.known] or rows
     if len({row.unit for row in rows}) == 1:
-        ax, _, unit = named_intervals([row.name for row in rows], rows, ax=ax)
+        ax, _, unit = style.named_intervals([row.name for row in rows], rows, ax=ax)
         ax.set_xlabel("" if unit == "1" else f"[{unit}]")
         return ax
-    ax = axes_of(ax, height=1.3 + 0.32 * len(rows))
+    ax = style.axes_of(ax, height=1.3 + 0.32 * len(rows))
     for place, row in enumerate(rows):
         size = abs(row.value) or 1.0
         away = np.abs(np.array(row.interval)[:, None] - row.value) / size * 100

@@ -18,6 +18,7 @@ from stickslip.answers.many import Batch, Row
 from stickslip.balance.force import FUSIONS
 from stickslip.consistent.checks import APART
 from stickslip.estimate import UNSTATED, Estimate, kinds
+from stickslip.figures import style
 from stickslip.figures.contact import (
     plot_breakaway,
     plot_displacement_loop,
@@ -26,26 +27,7 @@ from stickslip.figures.contact import (
     plot_transition_speed,
     plot_velocity_loop,
 )
-from stickslip.figures.style import (
-    BARS,
-    BLUE,
-    FAINT,
-    INK,
-    ORANGE,
-    PURPLE,
-    SKY,
-    Plate,
-    axes_of,
-    axis_label,
-    captioned,
-    empty_figure,
-    envelope,
-    legend_above,
-    named_intervals,
-    new_figure,
-    prefixed,
-    styled,
-)
+from stickslip.figures.style import BARS, BLUE, FAINT, INK, ORANGE, PURPLE, SKY
 from stickslip.figures.traces import (
     MOST_SHADES,
     close_up,
@@ -55,6 +37,7 @@ from stickslip.figures.traces import (
     plot_traces,
     plot_twin,
 )
+from stickslip.units import prefixed
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -65,7 +48,7 @@ if TYPE_CHECKING:
 COLOURS = {"holds": BLUE, "fails": ORANGE, "can not be told": FAINT}
 
 
-def plates_of(findings: Findings) -> list[Plate]:
+def plates_of(findings: Findings) -> list[style.Plate]:
     """The figures of one record, in reading order."""
     findings = findings.drawn
     events = findings.sticks.events if findings.sticks is not None else ()
@@ -73,7 +56,7 @@ def plates_of(findings: Findings) -> list[Plate]:
     plates = [*_of_friction(findings), *_over_time(findings, sticks=len(sticks)), *_of_contact(findings)]
     if any(event.whole for event in sticks):
         uncorrected = _before_twins(findings)
-        plates.append(captioned("friction", "sticks", partial(plot_sticks, findings), uncorrected=uncorrected))
+        plates.append(style.captioned("friction", "sticks", partial(plot_sticks, findings), uncorrected=uncorrected))
     return plates
 
 
@@ -86,52 +69,52 @@ def _before_twins(findings: Findings) -> str:
     return f", as read off the record: {share:.0f} % of the time, not yet corrected by twins"
 
 
-def _of_friction(findings: Findings) -> list[Plate]:
+def _of_friction(findings: Findings) -> list[style.Plate]:
     """Friction over the cycle, and the force that the regression explains."""
     plates = []
     if findings.loops is not None:
         plates += [
-            captioned("friction", "friction-velocity", partial(plot_velocity_loop, findings)),
-            captioned("friction", "friction-displacement", partial(plot_displacement_loop, findings)),
+            style.captioned("friction", "friction-velocity", partial(plot_velocity_loop, findings)),
+            style.captioned("friction", "friction-displacement", partial(plot_displacement_loop, findings)),
         ]
     if findings.regression is not None:
-        plates.append(captioned("friction", "regression", partial(plot_regression, findings)))
+        plates.append(style.captioned("friction", "regression", partial(plot_regression, findings)))
     return plates
 
 
-def _over_time(findings: Findings, *, sticks: int) -> list[Plate]:
+def _over_time(findings: Findings, *, sticks: int) -> list[style.Plate]:
     """The record as a whole, some cycles of it, and the force balance in them."""
     near = close_up(findings)
     stuck = f" Grey: the contact sticks{_before_twins(findings)}." if sticks else ""
     shaded = stuck if sticks <= MOST_SHADES else ""
-    plates = [captioned("friction", "record", partial(plot_traces, findings), stuck=shaded)]
+    plates = [style.captioned("friction", "record", partial(plot_traces, findings), stuck=shaded)]
     if near is not None:
-        plates.append(captioned("friction", "close-up", partial(plot_traces, findings, record=near), stuck=stuck))
+        plates.append(style.captioned("friction", "close-up", partial(plot_traces, findings, record=near), stuck=stuck))
     if force_balance(findings.record) is not None:
         kind = "force-balance-fused" if _is_fused(findings) else "force-balance"
         draw = partial(plot_force_balance, findings, record=near)
-        plates.append(captioned("friction", kind, draw, name="force-balance", stuck=stuck))
+        plates.append(style.captioned("friction", kind, draw, name="force-balance", stuck=stuck))
     return plates
 
 
-def _of_contact(findings: Findings) -> list[Plate]:
+def _of_contact(findings: Findings) -> list[style.Plate]:
     """What the contact does at a turn and before it slips, and what the sensors say of each other."""
     plates, breakaway = [], findings.breakaway
     if breakaway is not None and findings.loops is not None and UNSTATED not in kinds(breakaway.ratio.status):
-        plates.append(captioned("friction", "breakaway", partial(plot_breakaway, findings)))
+        plates.append(style.captioned("friction", "breakaway", partial(plot_breakaway, findings)))
     if findings.transition is not None:
-        plates.append(captioned("friction", "transition", partial(plot_transition_speed, findings.transition)))
+        plates.append(style.captioned("friction", "transition", partial(plot_transition_speed, findings.transition)))
     events = findings.sticks.events if findings.sticks is not None else ()
     if any(event.kind == "microslip" for event in events):
-        plates.append(captioned("friction", "micro-slips", partial(plot_micro_slips, findings)))
+        plates.append(style.captioned("friction", "micro-slips", partial(plot_micro_slips, findings)))
     compared = findings.comparison
     if compared is not None and (_is_fused(findings) or compared.unlike):
-        plates.append(captioned("friction", "force-comparison", partial(plot_force_comparison, compared)))
+        plates.append(style.captioned("friction", "force-comparison", partial(plot_force_comparison, compared)))
     if findings.trial is not None:
         draw = partial(plot_twin, findings.trial, record=close_up(findings))
-        plates.append(captioned("friction", "twin", draw))
+        plates.append(style.captioned("friction", "twin", draw))
     if findings.consistency is not None and findings.consistency.failed:
-        plates.append(captioned("friction", "consistency", partial(plot_consistency, findings.consistency)))
+        plates.append(style.captioned("friction", "consistency", partial(plot_consistency, findings.consistency)))
     return plates
 
 
@@ -139,31 +122,31 @@ def _is_fused(findings: Findings) -> bool:
     return findings.settings.get("differentiation") in FUSIONS
 
 
-def plates_together(comparison: Comparison) -> list[Plate]:
+def plates_together(comparison: Comparison) -> list[style.Plate]:
     """The figures of several records."""
     plates = []
     if comparison.coefficient is not None:
-        plates.append(captioned("friction", "friction-load", partial(plot_load_dependence, comparison)))
+        plates.append(style.captioned("friction", "friction-load", partial(plot_load_dependence, comparison)))
     if any(findings.level is not None for findings in comparison.findings):
-        plates.append(captioned("friction", "levels", partial(plot_levels, comparison)))
+        plates.append(style.captioned("friction", "levels", partial(plot_levels, comparison)))
     return plates
 
 
-@styled
+@style.styled
 def plot_regression(findings: Findings) -> Figure:
     """The measured force, the force that the regression explains, and the rest, over time."""
     regression = findings.regression
     assert regression is not None
     factor, unit = prefixed(regression.measured, regression.coulomb.unit)
-    figure, (above, below) = new_figure(2, height=4.4, heights=[2, 1])
+    figure, (above, below) = style.new_figure(2, height=4.4, heights=[2, 1])
     time = regression.time
-    above.plot(*envelope(time, factor * regression.measured), color=PURPLE, linewidth=1.0, label="measured")
-    above.plot(*envelope(time, factor * regression.explained), color=ORANGE, linewidth=1.0, label="explained")
-    above.set_ylabel(axis_label("force", unit))
-    legend_above(above, columns=2)
-    below.plot(*envelope(time, factor * (regression.measured - regression.explained)), color=INK, linewidth=0.8)
+    above.plot(*style.envelope(time, factor * regression.measured), color=PURPLE, linewidth=1.0, label="measured")
+    above.plot(*style.envelope(time, factor * regression.explained), color=ORANGE, linewidth=1.0, label="explained")
+    above.set_ylabel(style.axis_label("force", unit))
+    style.legend_above(above, columns=2)
+    below.plot(*style.envelope(time, factor * (regression.measured - regression.explained)), color=INK, linewidth=0.8)
     below.axhline(0, color=FAINT, linewidth=0.8)
-    below.set(xlabel="time [s]", ylabel=axis_label("left over", unit))
+    below.set(xlabel="time [s]", ylabel=style.axis_label("left over", unit))
     span = 1.05 * factor * float(np.nanmax(np.abs(regression.measured)))
     below.set_ylim(-span / 2, span / 2)
     figure.align_ylabels([above, below])
@@ -173,7 +156,7 @@ def plot_regression(findings: Findings) -> Figure:
 LEAST, MOST = 0.1, 1e3  # standard deviations between which the bars are drawn
 
 
-@styled
+@style.styled
 def plot_consistency(consistency: Consistency, *, ax: Axes | None = None) -> Axes:
     """How far are the two sides of each check apart? In standard deviations; from three on they are not one.
 
@@ -197,7 +180,7 @@ def plot_consistency(consistency: Consistency, *, ax: Axes | None = None) -> Axe
     'energy'
     """
     checks = consistency.checks
-    ax = axes_of(ax, height=0.8 + 0.26 * len(checks))
+    ax = style.axes_of(ax, height=0.8 + 0.26 * len(checks))
     for place, check in enumerate(checks):
         apart = check.discrepancy if not math.isnan(check.discrepancy) else 0.0
         known, colour = check.verdict != "can not be told", COLOURS[check.verdict]
@@ -214,20 +197,20 @@ def plot_consistency(consistency: Consistency, *, ax: Axes | None = None) -> Axe
     return ax
 
 
-@styled
+@style.styled
 def plot_levels(comparison: Comparison, *, ax: Axes | None = None) -> Axes:
     """The friction level of each record with its 95 % interval."""
     levels = {findings.name: findings.level for findings in comparison.findings if findings.level is not None}
-    ax, _, unit = named_intervals(list(levels), list(levels.values()), ax=ax)
-    ax.set(xlabel=axis_label("sliding friction, 95 %", unit))
+    ax, _, unit = style.named_intervals(list(levels), list(levels.values()), ax=ax)
+    ax.set(xlabel=style.axis_label("sliding friction, 95 %", unit))
     ax.margins(x=0.08)
     return ax
 
 
-@styled
+@style.styled
 def plot_load_dependence(comparison: Comparison, *, ax: Axes | None = None) -> Axes:
     """Friction against normal load, with the line through the origin and its 95 % band."""
-    ax = axes_of(ax)
+    ax = style.axes_of(ax)
     known = [(f.normal.value, f.level) for f in comparison.findings if f.normal is not None and f.level is not None]
     loads = np.array([load for load, _ in known])
     values = np.array([level.value for _, level in known])
@@ -242,7 +225,7 @@ def plot_load_dependence(comparison: Comparison, *, ax: Axes | None = None) -> A
         ax.plot(x_factor * reach, y_factor * value * reach, color=ORANGE, label=label)
     away = y_factor * np.abs(ends - values[:, None]).T
     ax.errorbar(x_factor * loads, y_factor * values, yerr=away, color=INK, label="records, 95 %", **BARS)
-    ax.set(xlabel=axis_label("normal load", x_unit), ylabel=axis_label("sliding friction", y_unit))
+    ax.set(xlabel=style.axis_label("normal load", x_unit), ylabel=style.axis_label("sliding friction", y_unit))
     ax.set_xlim(left=0)
     ax.set_ylim(0, 1.4 * y_factor * float(ends.max()))
     ax.legend(loc="upper left")
@@ -256,23 +239,21 @@ QUANTITIES = 3  # that are drawn over the records
 FULL = 40  # letters of a name over a small picture that is read without being cut
 
 
-def plates_of_batch(batch: Batch) -> list[Plate]:
+def plates_of_batch(batch: Batch) -> list[style.Plate]:
     """The quantities that most records have, then the small pictures."""
     quantities = [_over_records(batch, name) for name in batch.names[:QUANTITIES] if batch.known(name)]
     return [*quantities, *_pictures(batch)]
 
 
-def _over_records(batch: Batch, name: str) -> Plate:
-    draw = partial(plot_over_records, batch.known(name))
-    title = f"{name[:1].upper()}{name[1:]} of each record"
-    caption = "The records in the order given, each with its 95 % interval; copies of others are left out."
-    return Plate("over-records-" + "-".join(name.split()), draw, title, caption)
+def _over_records(batch: Batch, name: str) -> style.Plate:
+    draw, quantity = partial(plot_over_records, batch.known(name)), f"{name[:1].upper()}{name[1:]}"
+    return style.captioned("records", "over-records", draw, name=f"over-records-{name}", quantity=quantity)
 
 
-@styled
+@style.styled
 def plot_over_records(estimates: Sequence[Estimate], *, ax: Axes | None = None) -> Axes:
     """A quantity of each record with its interval."""
-    ax = axes_of(ax)
+    ax = style.axes_of(ax)
     values = np.array([estimate.value for estimate in estimates])
     factor, unit = prefixed(values, estimates[0].unit)
     ends = np.array([estimate.interval for estimate in estimates])
@@ -281,25 +262,25 @@ def plot_over_records(estimates: Sequence[Estimate], *, ax: Axes | None = None) 
     look["elinewidth"] = 0.6 if len(estimates) < CROWD else 0.2
     ax.errorbar(np.arange(1, len(estimates) + 1), factor * values, factor * lengths, **look)
     ax.set_xlabel("record")
-    ax.set_ylabel(axis_label(estimates[0].name, unit))
+    ax.set_ylabel(style.axis_label(estimates[0].name, unit))
     return ax
 
 
-def _pictures(batch: Batch) -> Iterator[Plate]:
+def _pictures(batch: Batch) -> Iterator[style.Plate]:
     drawn = [row for row in batch.rows if row.counts and len(row.picture[0])]
     for number in range(min(MOST_PAGES, math.ceil(len(drawn) / EACH))):
         part = drawn[number * EACH : (number + 1) * EACH]
         span = f"records {number * EACH + 1} to {number * EACH + len(part)} of {len(drawn)}"
         x, y = batch.axes
-        caption = f"{y[:1].upper()}{y[1:]} over {x}, each on its own scales: look for shapes unlike the others."
-        yield Plate(f"records-{number + 1}", partial(plot_small, part), f"Side by side, {span}", caption)
+        words = {"span": span, "quantity": f"{y[:1].upper()}{y[1:]}", "abscissa": x}
+        yield style.captioned("records", "records", partial(plot_small, part), name=f"records-{number + 1}", **words)
 
 
-@styled
+@style.styled
 def plot_small(rows: Sequence[Row]) -> Figure:
     """Small pictures side by side, without axes: their shapes are what is compared."""
     down = math.ceil(len(rows) / ACROSS)
-    figure = empty_figure(0.95 * down + 0.3)
+    figure = style.empty_figure(0.95 * down + 0.3)
     places = figure.subplots(down, ACROSS, squeeze=False)
     for place in places.flat:
         place.set_axis_off()

@@ -30,7 +30,6 @@ from stickslip.figures.style import (
     legend_above,
     plain_decades,
     plate,
-    prefixed,
     strongest,
     styled,
 )
@@ -40,6 +39,7 @@ from stickslip.oscillator import Oscillator
 from stickslip.signals.pieces import RING
 from stickslip.signals.wavelet import CENTRE, ends, wavelet_map
 from stickslip.solve.tables import System
+from stickslip.units import prefixed
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -12,30 +12,11 @@ import numpy as np
 
 from stickslip.arrays import Array
 from stickslip.estimate import decimals
+from stickslip.figures import style
 from stickslip.figures.contact import plot_displacement_loop, plot_velocity_loop
-from stickslip.figures.style import (
-    BARS,
-    BLUE,
-    FAINT,
-    GREEN,
-    INK,
-    ORANGE,
-    PURPLE,
-    Plate,
-    axis_label,
-    captioned,
-    coloured,
-    empty_figure,
-    envelope,
-    legend_above,
-    new_figure,
-    prefixed,
-    shortened,
-    spelled,
-    strongest,
-    styled,
-)
+from stickslip.figures.style import BARS, BLUE, FAINT, GREEN, INK, ORANGE, PURPLE
 from stickslip.squeak.bursts import ForcedMotion
+from stickslip.units import prefixed, spelled
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -68,7 +49,7 @@ MOST_NUMBERS = 30
 MOST_ROWS = 6
 
 
-@styled
+@style.styled
 def plot_squeaks(squeaks: Squeaks) -> Figure:
     """The sound over time with its bursts shaded, and its spectrogram with their dominant frequencies.
 
@@ -84,7 +65,7 @@ def plot_squeaks(squeaks: Squeaks) -> Figure:
     from matplotlib.patches import Patch
 
     record, name = squeaks.record, squeaks.channel
-    figure, (above, below) = new_figure(2, height=4.8, heights=(1, 2.2))
+    figure, (above, below) = style.new_figure(2, height=4.8, heights=(1, 2.2))
     _trace(above, record, name)
     drawn = _spectrogram(below, squeaks)
     numbered = len(squeaks.bursts) <= MOST_NUMBERS
@@ -107,7 +88,7 @@ def plot_squeaks(squeaks: Squeaks) -> Figure:
     return figure
 
 
-@styled
+@style.styled
 def plot_burst_spectra(spectra: BurstSpectra, *, channel: str, record: Record) -> Figure:
     """Power spectra of each channel, in the bursts and outside of them."""
     from matplotlib.ticker import LogLocator, NullLocator
@@ -126,13 +107,13 @@ def plot_burst_spectra(spectra: BurstSpectra, *, channel: str, record: Record) -
         ax.yaxis.set_minor_locator(NullLocator())
         power = "1/Hz" if unit == "1" else f"({unit})²/Hz" if "/" in unit else f"{unit}²/Hz"
         ax.set_ylabel(f"{_quantity(record, name)}\n[{power}]")
-    legend_above(axes[0], columns=2)
+    style.legend_above(axes[0], columns=2)
     axes[-1].set(xlabel="frequency [Hz]", xlim=(0, float(spectra.frequency[last - 1])))
     figure.align_ylabels(axes)
     return figure
 
 
-@styled
+@style.styled
 def plot_coherence(spectra: BurstSpectra, *, channel: str, record: Record) -> Figure:
     """Coherence of every channel with the one in which the bursts were heard, in the bursts and outside of them."""
     pairs = [pair for pair in spectra.coherence if channel in pair] or list(spectra.coherence)
@@ -148,20 +129,20 @@ def plot_coherence(spectra: BurstSpectra, *, channel: str, record: Record) -> Fi
             ax.axhline(spectra.significant_outside, color=BLUE, linestyle=":", linewidth=0.9)
         other = pair[0] if pair[1] == channel else pair[1]
         ax.set(ylim=(0, 1.02), ylabel=_quantity(record, other))
-    legend_above(axes[0], columns=2)
+    style.legend_above(axes[0], columns=2)
     axes[-1].set(xlabel="frequency [Hz]", xlim=(0, float(shown[-1])))
     figure.align_ylabels(axes)
     return figure
 
 
-@styled
+@style.styled
 def plot_forcing_cycle(squeaks: Squeaks) -> Figure:
     """Where in the forcing cycle, and at which sliding velocity, the bursts come."""
     record, motion = squeaks.record, ForcedMotion.of(squeaks.record)
     assert motion.velocity is not None
     assert motion.phase is not None
     factor, unit = prefixed(motion.velocity, "m/s")
-    figure, (above, below) = new_figure(2, height=4.2, heights=[1.4, 1])
+    figure, (above, below) = style.new_figure(2, height=4.2, heights=[1.4, 1])
     bins = np.linspace(0, 1, PHASES + 1)
     edge = round(record.fs / motion.frequency / 2)  # half a cycle, within which the phase at an end is not known
     known = slice(edge, len(record) - edge)
@@ -181,8 +162,8 @@ def plot_forcing_cycle(squeaks: Squeaks) -> Figure:
             for begin, end in _within_one(float(turn[0]), float(turn[-1])):
                 below.plot([begin, end], [number + 1] * 2, color=colour, linewidth=thick * wide, solid_capstyle="butt")
         below.plot(burst.phase, number + 1, "o", color=INK, markersize=2.5)
-    legend_above(above)
-    above.set_ylabel(axis_label("velocity", unit))
+    style.legend_above(above)
+    above.set_ylabel(style.axis_label("velocity", unit))
     below.set(xlabel="phase of the forcing cycle, 0 at the largest displacement", ylabel="burst", xlim=(0, 1))
     below.set_ylim(len(squeaks.bursts) + 0.7, 0.3)
     below.yaxis.get_major_locator().set_params(integer=True)
@@ -190,7 +171,7 @@ def plot_forcing_cycle(squeaks: Squeaks) -> Figure:
     return figure
 
 
-@styled
+@style.styled
 def plot_burst(findings: Findings, *, burst: Squeak) -> Figure:
     """Every channel about one burst."""
     around = min(0.5 * burst.duration, 0.1)
@@ -205,7 +186,7 @@ def plot_burst(findings: Findings, *, burst: Squeak) -> Figure:
     return figure
 
 
-@styled
+@style.styled
 def plot_conditions(comparison: Comparison) -> Figure:
     """Friction and its slope against speed in each condition, with their 95 % intervals; where it squeaks is orange.
 
@@ -213,7 +194,7 @@ def plot_conditions(comparison: Comparison) -> Figure:
     """
 
     conditions = [condition for condition in comparison.conditions if condition.level is not None]
-    figure = empty_figure(1.5 + 0.34 * len(conditions))
+    figure = style.empty_figure(1.5 + 0.34 * len(conditions))
     left, right = figure.subplots(1, 2, sharey=True)
     over_load = all(condition.coefficient is not None for condition in conditions)
     drawn = (
@@ -229,8 +210,8 @@ def plot_conditions(comparison: Comparison) -> Figure:
             look = {**BARS, "fmt": marker, "color": colour, "label": condition.answer}
             ax.errorbar(estimate.value, place, xerr=away, **look)
         ax.axvline(0, color=INK, linewidth=0.8)
-        ax.set_xlabel(axis_label(f"{label}, 95 %", getattr(conditions[0], name).unit, between="\n"))
-    left.set_yticks(range(len(conditions)), [shortened(condition.name, 30) for condition in conditions])
+        ax.set_xlabel(style.axis_label(f"{label}, 95 %", getattr(conditions[0], name).unit, between="\n"))
+    left.set_yticks(range(len(conditions)), [style.shortened(condition.name, 30) for condition in conditions])
     left.set_ylim(len(conditions) - 0.4, -0.6)
     handles, labels = left.get_legend_handles_labels()
     both = dict(zip(labels, handles, strict=True))
@@ -238,12 +219,12 @@ def plot_conditions(comparison: Comparison) -> Figure:
     return figure
 
 
-@styled
+@style.styled
 def plot_condition_loops(comparison: Comparison) -> Figure:
     """Friction against displacement and velocity, a row for each condition, as the thesis's figures 7.3 and 7.6."""
 
     rows = [findings for findings in comparison.findings if findings.loops is not None][:MOST_ROWS]
-    figure = empty_figure(0.4 + 2.1 * len(rows))
+    figure = style.empty_figure(0.4 + 2.1 * len(rows))
     axes = figure.subplots(len(rows), 2, sharey="row", squeeze=False)
     for (left, right), condition in zip(axes, rows, strict=True):
         assert condition.loops is not None
@@ -253,64 +234,64 @@ def plot_condition_loops(comparison: Comparison) -> Figure:
         right.set_ylabel("")
         slope = condition.loops.slope
         low, high = slope.interval
-        left.set_title(shortened(condition.name, 30), loc="left")
+        left.set_title(style.shortened(condition.name, 30), loc="left")
         digits = decimals(slope.spread, slope.value)
         text = f"{slope.value:.{digits}f} ({low:.{digits}f} to {high:.{digits}f}) {spelled(slope.unit)}"
         right.set_title(text, loc="right", fontsize=8)
     return figure
 
 
-def plates_of(findings: Findings) -> list[Plate]:
+def plates_of(findings: Findings) -> list[style.Plate]:
     """The figures of one record."""
-    plates = [captioned("squeak", "spectrogram", partial(plot_squeaks, findings.squeaks))]
+    plates = [style.captioned("squeak", "spectrogram", partial(plot_squeaks, findings.squeaks))]
     if findings.squeaks.loudest is not None:
         plates += [*_of_spectra(findings), *_of_bursts(findings, findings.squeaks.loudest)]
     return plates
 
 
-def _of_spectra(findings: Findings) -> list[Plate]:
+def _of_spectra(findings: Findings) -> list[style.Plate]:
     """What sounds in the bursts, and which frequencies the motions share."""
     record, spectra, channel = findings.record, findings.spectra, findings.squeaks.channel
     if spectra is None:
         return []
     draw = partial(plot_burst_spectra, spectra, channel=channel, record=record)
-    plates = [captioned("squeak", "spectra", draw, compared=spectra.compared)]
+    plates = [style.captioned("squeak", "spectra", draw, compared=spectra.compared)]
     if spectra.coherence:
         draw = partial(plot_coherence, spectra, channel=channel, record=record)
-        plates.append(captioned("squeak", "coherence", draw, channel=_quantity(record, channel)))
+        plates.append(style.captioned("squeak", "coherence", draw, channel=_quantity(record, channel)))
     return plates
 
 
-def _of_bursts(findings: Findings, loudest: Squeak) -> list[Plate]:
+def _of_bursts(findings: Findings, loudest: Squeak) -> list[style.Plate]:
     """Where in the cycle it sounds, the loudest burst, and the friction that feeds it."""
     squeaks, plates = findings.squeaks, []
     if not math.isnan(squeaks.forcing):
-        plates.append(captioned("squeak", "forcing-cycle", partial(plot_forcing_cycle, squeaks)))
+        plates.append(style.captioned("squeak", "forcing-cycle", partial(plot_forcing_cycle, squeaks)))
     if len(findings.record) > 1:
         number = squeaks.bursts.index(loudest) + 1
-        plates.append(captioned("squeak", "burst", partial(plot_burst, findings, burst=loudest), number=number))
+        plates.append(style.captioned("squeak", "burst", partial(plot_burst, findings, burst=loudest), number=number))
     if findings.loops is not None:
-        plates.append(captioned("squeak", "friction-velocity", partial(plot_velocity_loop, findings)))
+        plates.append(style.captioned("squeak", "friction-velocity", partial(plot_velocity_loop, findings)))
     return plates
 
 
-def plates_together(comparison: Comparison) -> list[Plate]:
+def plates_together(comparison: Comparison) -> list[style.Plate]:
     """The figures of several records side by side."""
     if all(findings.loops is None for findings in comparison.findings):
         return []
     draws = {"conditions": plot_conditions, "loops": plot_condition_loops}
-    return [captioned("squeak", kind, partial(draw, comparison)) for kind, draw in draws.items()]
+    return [style.captioned("squeak", kind, partial(draw, comparison)) for kind, draw in draws.items()]
 
 
 def _panels(count: int) -> tuple[Figure, Any]:
-    figure, axes = new_figure(count, height=1.0 + 1.15 * count)
+    figure, axes = style.new_figure(count, height=1.0 + 1.15 * count)
     return figure, np.atleast_1d(axes)
 
 
 def _trace(ax: Axes, record: Record, name: str) -> None:
     factor, unit = prefixed(record[name], record.channels[name].unit)
-    ax.plot(*envelope(record.time, factor * record[name]), color=TRACED.get(name, BLUE), linewidth=0.8)
-    ax.set_ylabel(axis_label(_quantity(record, name), unit, between="\n"))
+    ax.plot(*style.envelope(record.time, factor * record[name]), color=TRACED.get(name, BLUE), linewidth=0.8)
+    ax.set_ylabel(style.axis_label(_quantity(record, name), unit, between="\n"))
 
 
 def _spectrogram(ax: Axes, squeaks: Squeaks) -> Any:
@@ -322,13 +303,13 @@ def _spectrogram(ax: Axes, squeaks: Squeaks) -> Any:
     size = min(len(values), max(64, 2 ** round(math.log2(WINDOW * record.fs))))
     frequencies, times, waves = stft(values, record.fs, nperseg=size, noverlap=size - max(1, size // 8))
     power = np.abs(waves) ** 2
-    power, times = strongest(power, times, COLUMNS)
+    power, times = style.strongest(power, times, COLUMNS)
     inside = (frequencies >= squeaks.band[0] / 2) & (frequencies <= squeaks.band[1])
     last = _highest(frequencies[inside], {squeaks.channel: power[inside].sum(axis=1)}, squeaks.channel)
     shown = power[inside][:last]
     level = 10 * np.log10(np.maximum(shown / max(float(shown.max()), np.finfo(float).tiny), 1e-30))
     colours: Any = {"cmap": "cividis", "vmin": -SPAN, "vmax": 0}
-    return coloured(ax, record.start + times, frequencies[inside][:last], np.maximum(level, -SPAN), **colours)
+    return style.coloured(ax, record.start + times, frequencies[inside][:last], np.maximum(level, -SPAN), **colours)
 
 
 def _frame(ax: Axes, burst: Squeak) -> None:

@@ -18,8 +18,7 @@ import numpy as np
 from stickslip.arrays import Array, Index, Rows
 from stickslip.errors import StickslipError
 from stickslip.estimate import Estimate
-from stickslip.units import prefixed as prefixed
-from stickslip.units import spelled as spelled
+from stickslip.units import prefixed, spelled
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -10,27 +10,11 @@ import numpy as np
 
 from stickslip.arrays import Array
 from stickslip.balance.motion import is_measured
-from stickslip.figures.style import (
-    BLUE,
-    FAINT,
-    GREEN,
-    INK,
-    ORANGE,
-    PURPLE,
-    SHADE,
-    SKY,
-    axes_of,
-    axis_label,
-    empty_figure,
-    envelope,
-    legend_above,
-    new_figure,
-    plain_decades,
-    prefixed,
-    styled,
-)
+from stickslip.figures import style
+from stickslip.figures.style import BLUE, FAINT, GREEN, INK, ORANGE, PURPLE, SHADE, SKY
 from stickslip.signals.derivatives import differentiate
 from stickslip.statistics import follows
+from stickslip.units import prefixed
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -58,7 +42,7 @@ _METHODS = {"direct": "load cell", "indirect": "from the motion", "difference": 
 _CYCLES = 3.0  # of the lowest line that are drawn
 
 
-@styled
+@style.styled
 def plot_traces(findings: Findings, *, record: Record | None = None, most: int = 5) -> Figure:
     """The channels over time, one under the other, with the times of sticking shaded.
 
@@ -70,7 +54,7 @@ def plot_traces(findings: Findings, *, record: Record | None = None, most: int =
         panels = [names for names in panels if names != ("a",)][:most]
     if not panels:
         panels = [(name,) for name in list(record)[:most]]
-    figure, axes = new_figure(len(panels), height=1.0 + 1.25 * len(panels))
+    figure, axes = style.new_figure(len(panels), height=1.0 + 1.25 * len(panels))
     axes = np.atleast_1d(axes)
     for ax, names in zip(axes, panels, strict=True):
         _trace(ax, record, [name for name in names if name in record])
@@ -133,10 +117,10 @@ def force_balance(record: Record) -> dict[str, Array] | None:
     return {**terms, "friction": record["friction"]}
 
 
-@styled
+@style.styled
 def plot_force_balance(findings: Findings, *, record: Record | None = None, ax: Axes | None = None) -> Axes:
     """The terms of the force balance: spring, inertia, damper, applied force, and the friction that they leave."""
-    ax = axes_of(ax)
+    ax = style.axes_of(ax)
     whole = findings.record
     record = whole if record is None else record
     terms = force_balance(whole)
@@ -146,10 +130,10 @@ def plot_force_balance(findings: Findings, *, record: Record | None = None, ax: 
     factor, unit = prefixed(np.concatenate(list(parts.values())), "N")
     for term, values in parts.items():
         colour, line = _TERMS[term]
-        ax.plot(*envelope(record.time, factor * values), line, color=colour, label=term)
+        ax.plot(*style.envelope(record.time, factor * values), line, color=colour, label=term)
     shade_sticks(ax, findings, record)
     ax.axhline(0, color=FAINT, linewidth=0.8)
-    ax.set(xlabel="time [s]", ylabel=axis_label("force on the mass", unit))
+    ax.set(xlabel="time [s]", ylabel=style.axis_label("force on the mass", unit))
     ax.set_xlim(float(record.time[0]), float(record.time[-1]))
     ax.legend(ncols=len(terms), loc="lower center", bbox_to_anchor=(0.5, 1.0))
     return ax
@@ -159,7 +143,7 @@ def _trace(ax: Axes, record: Record, names: Sequence[str]) -> None:
     peak = np.array([np.nanmax(np.abs(record[n])) if np.isfinite(record[n]).any() else 0.0 for n in names])
     factor, unit = prefixed(peak, record.channels[names[0]].unit)
     for name in names:
-        ax.plot(*envelope(record.time, factor * record[name]), color=_COLOURS.get(name, INK), label=name)
+        ax.plot(*style.envelope(record.time, factor * record[name]), color=_COLOURS.get(name, INK), label=name)
     quantities = {
         "x": "displacement",
         "theta": "angle",
@@ -167,7 +151,7 @@ def _trace(ax: Axes, record: Record, names: Sequence[str]) -> None:
         "a": "acceleration",
         "v": "velocity",
     }
-    ax.set_ylabel(axis_label(quantities.get(names[0], names[0]), unit, between="\n"))
+    ax.set_ylabel(style.axis_label(quantities.get(names[0], names[0]), unit, between="\n"))
     if len(names) > 1:
         labels = {"x": "mass (x)", "z": "base (z)"}
         for line in ax.get_lines():
@@ -175,7 +159,7 @@ def _trace(ax: Axes, record: Record, names: Sequence[str]) -> None:
         ax.legend(ncols=2, loc="lower right", bbox_to_anchor=(1.0, 0.97))
 
 
-@styled
+@style.styled
 def plot_force_comparison(comparison: ForceComparison) -> Figure:
     """Where do the load cell and the motion tell the same friction?
 
@@ -202,7 +186,7 @@ def plot_force_comparison(comparison: ForceComparison) -> Figure:
     3
     """
 
-    figure = empty_figure(6.6)
+    figure = style.empty_figure(6.6)
     above, middle, below = figure.subplots(3, 1)
     _over_time(comparison, above)
     _sizes(comparison, middle)
@@ -217,8 +201,8 @@ def _over_time(comparison: ForceComparison, ax: Axes) -> None:
     for name, colour in (("indirect", ORANGE), ("direct", BLUE)):
         values = factor * getattr(comparison, name)[shown]
         ax.plot(comparison.time[shown], values, color=colour, linewidth=1.0, label=_METHODS[name])
-    ax.set(xlabel="time [s]", ylabel=axis_label("friction", unit))
-    legend_above(ax, columns=2)
+    ax.set(xlabel="time [s]", ylabel=style.axis_label("friction", unit))
+    style.legend_above(ax, columns=2)
 
 
 def _middle(comparison: ForceComparison) -> Array:
@@ -232,7 +216,7 @@ def _sizes(comparison: ForceComparison, ax: Axes) -> None:
     ax.set(ylabel="rms in the band [N]")
     ax.xaxis.set_major_formatter("{x:g}")
     ax.yaxis.set_major_formatter("{x:g}")
-    legend_above(ax, columns=3)
+    style.legend_above(ax, columns=3)
 
 
 def _ratio(comparison: ForceComparison, ax: Axes) -> None:
@@ -256,10 +240,10 @@ def _ratio(comparison: ForceComparison, ax: Axes) -> None:
     top = max(2.0, 1.1 * float(gain[heard].max(initial=0.0)))
     ax.set(xscale="log", ylim=(0, min(top, 10.0)), xlabel="frequency [Hz]", ylabel="ratio, coherence")
     ax.xaxis.set_major_formatter("{x:g}")
-    legend_above(ax, columns=3)
+    style.legend_above(ax, columns=3)
 
 
-@styled
+@style.styled
 def plot_twin(trial: Trial, *, record: Record | None = None) -> Figure:
     """Does the rig that the record is believed to come from move as the record did?
 
@@ -273,24 +257,24 @@ def plot_twin(trial: Trial, *, record: Record | None = None) -> Figure:
     rated = follows(whole["x"], moved)
     stretch = whole if record is None else record
     shown = (whole.time >= stretch.time[0]) & (whole.time <= stretch.time[-1])
-    figure, (above, below) = new_figure(2, height=4.4, heights=(2, 1))
+    figure, (above, below) = style.new_figure(2, height=4.4, heights=(2, 1))
     factor, unit = prefixed(whole["x"][shown], "m")
     above.plot(whole.time[shown], factor * whole["x"][shown], color=BLUE, label="measured")
     above.plot(whole.time[shown], factor * moved[shown], color=ORANGE, ls="--", label=f"twin, follows {rated:.2f} %")
-    above.set_ylabel(axis_label("x", unit))
-    legend_above(above, columns=2)
+    above.set_ylabel(style.axis_label("x", unit))
+    style.legend_above(above, columns=2)
     factor, unit = prefixed(residual[shown], "m")
     below.plot(whole.time[shown], factor * residual[shown], color=INK, lw=0.8)
     below.axhline(0.0, color=FAINT, lw=0.8, zorder=0)
-    below.set_ylabel(axis_label("left", unit))
-    below.set_xlabel(axis_label("time", "s"))
+    below.set_ylabel(style.axis_label("left", unit))
+    below.set_xlabel(style.axis_label("time", "s"))
     return figure
 
 
 COLOURS, MARKS = (BLUE, ORANGE, GREEN, PURPLE), ("o", "s", "^", "D")
 
 
-@styled
+@style.styled
 def plot_calibrations(calibrations: Mapping[str, Calibration]) -> Figure:
     """How far each sensor is off the straight line through its levels, as a part of its range.
 
@@ -302,20 +286,20 @@ def plot_calibrations(calibrations: Mapping[str, Calibration]) -> Figure:
     >>> len(plot_calibrations({"load": calibration}).axes)
     1
     """
-    figure, ax = new_figure(height=3.0)
+    figure, ax = style.new_figure(height=3.0)
     for number, (name, calibration) in enumerate(calibrations.items()):
         line = calibration.gain.value * calibration.reference
         off = calibration.levels - line
         off = 100 * (off - off.mean()) / np.ptp(line)
-        style: Any = {"color": COLOURS[number % 4], "marker": MARKS[number % 4], "linestyle": "none"}
-        ax.plot(np.arange(1, len(off) + 1) + 0.08 * number, off, label=name, **style)
+        look: Any = {"color": COLOURS[number % 4], "marker": MARKS[number % 4], "linestyle": "none"}
+        ax.plot(np.arange(1, len(off) + 1) + 0.08 * number, off, label=name, **look)
     ax.axhline(0.0, color=INK, linewidth=0.8)
-    ax.set(xlabel="level, in the order of the record", ylabel=axis_label("off the line", "% of range"))
+    ax.set(xlabel="level, in the order of the record", ylabel=style.axis_label("off the line", "% of range"))
     ax.legend(ncols=4, loc="lower left", bbox_to_anchor=(0, 1))
     return figure
 
 
-@styled
+@style.styled
 def plot_response(fit: ModalFit) -> Figure:
     """The frequency response: H1, H2, the fitted oscillator, and the coherence.
 
@@ -328,22 +312,22 @@ def plot_response(fit: ModalFit) -> Figure:
     """
     response = fit.response
     assert response is not None
-    figure, (above, below) = new_figure(2, height=4.2, heights=[3, 1])
+    figure, (above, below) = style.new_figure(2, height=4.2, heights=[3, 1])
     f = response.frequency
     above.plot(f, np.abs(response.h1), color=BLUE, label="H1, averaged")
     above.plot(f, np.abs(response.h2), color=ORANGE, linestyle=":", label="H2, averaged")
     above.plot(f, np.abs(fit.model(f)), color=INK, linewidth=0.9, label="fitted oscillator")
     above.set_yscale("log")
-    plain_decades(above.yaxis)
+    style.plain_decades(above.yaxis)
     unit = "1" if response.channels[0] == "z" else "m/N"
-    above.set_ylabel(axis_label(f"{response.channels[1]} over {response.channels[0]}", unit))
+    above.set_ylabel(style.axis_label(f"{response.channels[1]} over {response.channels[0]}", unit))
     above.legend(ncols=3, loc="lower left", bbox_to_anchor=(0, 1))
     below.plot(f, response.coherence, color=GREEN)
-    below.set(ylim=(0, 1.05), ylabel="coherence", xlabel=axis_label("frequency", "Hz"))
+    below.set(ylim=(0, 1.05), ylabel="coherence", xlabel=style.axis_label("frequency", "Hz"))
     return figure
 
 
-@styled
+@style.styled
 def plot_plan(plan: ExperimentPlan) -> Figure:
     """What each sampling rate and choice of sensors can tell, one panel a question.
 
@@ -367,23 +351,23 @@ def plot_plan(plan: ExperimentPlan) -> Figure:
     """
     from matplotlib.ticker import NullFormatter
 
-    figure, panels = new_figure(len(plan.questions), height=0.6 + 1.5 * len(plan.questions))
+    figure, panels = style.new_figure(len(plan.questions), height=0.6 + 1.5 * len(plan.questions))
     choices = list(dict.fromkeys(setup.sensors for setup in plan.setups))
     for panel, question in zip(np.atleast_1d(panels), plan.questions, strict=True):
         unit = plan.setups[0].accuracy[question].unit
         factor, text = prefixed(np.array([setup.accuracy[question].error for setup in plan.setups]), unit)
         for number, sensors in enumerate(choices):
             errors = {s.fs: s.accuracy[question].error for s in plan.setups if s.sensors == sensors}
-            style = {"color": COLOURS[number % 4], "marker": MARKS[number % 4], "markersize": 7 - 1.5 * number}
-            panel.plot(list(errors), factor * np.array(list(errors.values())), label=", ".join(sensors), **style)
-        panel.set(xscale="log", yscale="log", ylabel=axis_label("rms error" if plan.draws > 1 else "error", text))
-        plain_decades(panel.yaxis)
+            look = {"color": COLOURS[number % 4], "marker": MARKS[number % 4], "markersize": 7 - 1.5 * number}
+            panel.plot(list(errors), factor * np.array(list(errors.values())), label=", ".join(sensors), **look)
+        panel.set(xscale="log", yscale="log", ylabel=style.axis_label("rms error" if plan.draws > 1 else "error", text))
+        style.plain_decades(panel.yaxis)
         panel.set_title(question, loc="left")
         panel.grid(visible=True, which="minor", color=FAINT, alpha=0.15)
     panel.set_xticks(sorted({setup.fs for setup in plan.setups}))
     panel.xaxis.set_major_formatter("{x:g}")
     panel.xaxis.set_minor_formatter(NullFormatter())
-    panel.set_xlabel(axis_label("sampling rate", "Hz"))
+    panel.set_xlabel(style.axis_label("sampling rate", "Hz"))
     handles, labels = panel.get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside upper right", ncols=2)
     return figure

@@ -16,26 +16,10 @@ from numpy.typing import NDArray
 from stickslip import arrays
 from stickslip.arrays import Array, Mask
 from stickslip.errors import ModelError, RecordError
-from stickslip.figures.style import (
-    BLUE,
-    FAINT,
-    GREEN,
-    INK,
-    ORANGE,
-    PURPLE,
-    SHADE,
-    SKY,
-    Plate,
-    axes_of,
-    axis_label,
-    captioned,
-    envelope,
-    legend_above,
-    new_figure,
-    prefixed,
-    styled,
-)
+from stickslip.figures import style
+from stickslip.figures.style import BLUE, FAINT, GREEN, INK, ORANGE, PURPLE, SHADE, SKY
 from stickslip.oscillator import Structure
+from stickslip.units import prefixed
 from stickslip.whole import whole_file
 
 if TYPE_CHECKING:
@@ -125,7 +109,7 @@ def curve(run: Trajectory, wanted: Sequence[str | Quantity], *, first: float, la
     count = int(np.clip(A_CYCLE * (last - first) / cycle_of(run), POINTS, MOST_POINTS))
     times = np.linspace(first, last, count)
     if count > POINTS:
-        drawn = [envelope(times, row, columns=POINTS // 2) for row in sampled(run, wanted, times)]
+        drawn = [style.envelope(times, row, columns=POINTS // 2) for row in sampled(run, wanted, times)]
         return drawn[0][0], [row for _, row in drawn]
     ends = run.starts + run.durations
     shown = (ends > first) & (run.starts < last)
@@ -148,7 +132,7 @@ def stretches(run: Trajectory, kind: str, *, first: float, last: float, contact:
     return spans
 
 
-@styled
+@style.styled
 def plot_motion(run: Trajectory, *, first: float = 0.0, last: float | None = None) -> Figure:
     """Displacement, velocity, friction and force over time, one under the other, with sticks shaded.
 
@@ -157,13 +141,13 @@ def plot_motion(run: Trajectory, *, first: float = 0.0, last: float | None = Non
     """
     last = run.duration if last is None else last
     panels = _panels(run)
-    figure, axes = new_figure(len(panels), height=1.0 + 1.3 * len(panels))
+    figure, axes = style.new_figure(len(panels), height=1.0 + 1.3 * len(panels))
     for ax, wanted in zip(axes, panels, strict=True):
         times, values = curve(run, wanted, first=first, last=last)
         factor, unit = prefixed(np.concatenate(values), unit_of(run, wanted[0]))
         for quantity, row in zip(wanted, values, strict=True):
             ax.plot(times, factor * row, **_line(run, quantity, wanted))
-        ax.set_ylabel(axis_label(_panel_words(run, wanted), unit, between="\n"))
+        ax.set_ylabel(style.axis_label(_panel_words(run, wanted), unit, between="\n"))
         if np.min(values) < 0 < np.max(values):
             ax.axhline(0, color=FAINT, linewidth=0.8, zorder=0.5)
         own = [row for name, row in wanted if name in ("friction", "load")]
@@ -174,7 +158,7 @@ def plot_motion(run: Trajectory, *, first: float = 0.0, last: float | None = Non
             handle for handle in ax.get_legend_handles_labels()[0] if ax is axes[0] or _shades_alone(run, handle)
         ]
         if handles and (ax is axes[0] or contacts_of(run) > 1):
-            legend_above(ax, handles=handles, columns=6)
+            style.legend_above(ax, handles=handles, columns=6)
     axes[-1].set_xlabel("time [s]")
     axes[-1].set_xlim(first, last)
     figure.align_ylabels(axes)
@@ -231,22 +215,22 @@ def _shades_alone(run: Trajectory, handle: Any) -> bool:
     return handle.get_label() in {label for label, *_ in _KINDS.values()}
 
 
-@styled
+@style.styled
 def plot_loop(run: Trajectory, *, against: str = "x", contact: int = 0, ax: Axes | None = None) -> Axes:
     """Friction against displacement, velocity or load: the last cycle, over those before it."""
     across = "way" if against == "x" and isinstance(run.system, Structure) else against
-    return _portrait(run, (across, contact), ("friction", contact), axes_of(ax), contact)
+    return _portrait(run, (across, contact), ("friction", contact), style.axes_of(ax), contact)
 
 
-@styled
+@style.styled
 def plot_phase(run: Trajectory, *, mass: int = 0, ax: Axes | None = None) -> Axes:
     """Velocity against displacement: the last cycle, over those before it, with sticks of a single contact marked."""
     marked = 0 if contacts_of(run) == 1 else None
-    return _portrait(run, ("x", mass), ("v", mass), axes_of(ax, height=4.2), marked)
+    return _portrait(run, ("x", mass), ("v", mass), style.axes_of(ax, height=4.2), marked)
 
 
-@styled
-def plates_of(run: Trajectory) -> tuple[Plate, ...]:
+@style.styled
+def plates_of(run: Trajectory) -> tuple[style.Plate, ...]:
     """The figures that show a run, in reading order."""
     seen = np.unique(run.modes)
     kinds = {run.kinds(c)[mode] for c in range(contacts_of(run)) for mode in seen}
@@ -257,10 +241,10 @@ def plates_of(run: Trajectory) -> tuple[Plate, ...]:
     first, last = last_cycles(run, CLOSE_CYCLES)
     plates = []
     if first > 0:
-        plates.append(captioned("run", "whole-run", partial(plot_motion, run), shaded=shaded))
+        plates.append(style.captioned("run", "whole-run", partial(plot_motion, run), shaded=shaded))
     span = "As long as it moves" if run.status == "at rest" else "The last cycles"
     motion = partial(plot_motion, run, first=first, last=last)
-    plates.append(captioned("run", "motion", motion, span=span, shaded=shaded))
+    plates.append(style.captioned("run", "motion", motion, span=span, shaded=shaded))
     contacts, masses = contacts_of(run), len(run.labels("x"))
     for c in range(min(contacts, MOST_DRAWN)):
         number, of = (f"-{c + 1}", f", contact {c + 1}") if contacts > 1 else ("", "")
@@ -268,12 +252,12 @@ def plates_of(run: Trajectory) -> tuple[Plate, ...]:
             if against == "load" and not pressed(run, c):
                 continue
             draw = partial(plot_loop, run, against=against, contact=c)
-            plates.append(captioned("run", f"friction-{name}", draw, name=f"friction-{name}{number}", of=of))
+            plates.append(style.captioned("run", f"friction-{name}", draw, name=f"friction-{name}{number}", of=of))
     holds = " Marked: where the contact holds." if contacts == 1 else ""
     for j in range(min(masses, MOST_DRAWN)):
         number, of = (f"-x{j + 1}", f" of x{j + 1}") if masses > 1 else ("", "")
         draw, name = partial(plot_phase, run, mass=j), f"phase-portrait{number}"
-        plates.append(captioned("run", "phase-portrait", draw, name=name, of=of, holds=holds))
+        plates.append(style.captioned("run", "phase-portrait", draw, name=name, of=of, holds=holds))
     return tuple(plates)
 
 
@@ -321,8 +305,8 @@ def _portrait(run: Trajectory, across: Quantity, up: Quantity, ax: Axes, contact
         belt = y_factor * run.table.motion.face["way"]
         ax.axhline(belt, color=INK, linewidth=0.9, linestyle=":", zorder=1, label="belt")
     named = (numbered_words(run, _named(run, quantity), *quantity) for quantity in (across, up))
-    ax.set(xlabel=axis_label(next(named), x_unit), ylabel=axis_label(next(named), y_unit))
-    legend_above(ax, columns=4)
+    ax.set(xlabel=style.axis_label(next(named), x_unit), ylabel=style.axis_label(next(named), y_unit))
+    style.legend_above(ax, columns=4)
     return ax
 
 
@@ -431,7 +415,7 @@ def frames(run: Trajectory, *, tell: Callable[[int, int], None] | None = None) -
         yield np.asarray(canvas.buffer_rgba())[..., :3].copy()
 
 
-@styled
+@style.styled
 def _stage(run: Trajectory, times: Array) -> tuple[Any, list[_Scene], list[Any]]:
     """The canvas with all that stays drawn on it, and what moves."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -540,11 +524,11 @@ def _background(ax: Axes, run: Trajectory, across: str, times: Array) -> list[tu
         x, y = sampled(run, (("x", j), (up, j)), times)
         dots.append((dot, x_factor * (times if across == "time" else x), y_factor * y, colour if count > 1 else None))
     if count > 1 and across == "time":
-        legend_above(ax, columns=4)
+        style.legend_above(ax, columns=4)
     names = [numbered_words(run, label, name, 0) for label, name in (("displacement", "x"), ("velocity", "v"))]
     ax.set(
-        xlabel=axis_label("time" if across == "time" else names[0], x_unit),
-        ylabel=axis_label("displacement" if across == "time" else names[1], y_unit),
+        xlabel=style.axis_label("time" if across == "time" else names[0], x_unit),
+        ylabel=style.axis_label("displacement" if across == "time" else names[1], y_unit),
     )
     return dots
 

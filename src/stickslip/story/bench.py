@@ -17,7 +17,7 @@ from stickslip.bench.runs import Proposal, run_list
 from stickslip.bench.steps import STEPS, BenchStep, Commissioned
 from stickslip.bench.through import Tour
 from stickslip.estimate import Estimate, Result, stands
-from stickslip.figures.style import Plate, plate
+from stickslip.figures.style import Plate, captioned
 from stickslip.figures.traces import plot_calibrations, plot_plan, plot_response
 from stickslip.files.write import require_form, write_record
 from stickslip.laws.guessing import family_of
@@ -27,21 +27,12 @@ from stickslip.story.fit import of_laws
 from stickslip.story.friction import of_sticks
 from stickslip.story.story import Caution, Line, Story, Table, doubts, interval_of, logged, sentence, value_of
 
-CAPTION = "Root-mean-square error against the sampling rate, for each choice of sensors."
 # What leads: of which step, and which of its numbers; the rest stands in the tables.
 LEADING = (
     ("stick", "contact stiffness"), ("stick", "coupled frequency"), ("free", "natural frequency"),
     ("free", "damping ratio"), ("free", "lead of a over x"), ("discharge", "discharge time constant"),
     ("tap", "frequency of the mount of the accelerometer"), ("tap", "frequency of the mount of the load cell"),
 )  # fmt: skip
-OFF_LINE = (
-    "How far each level is off the straight line through all of them: scatter is how well the steps were set, a bow is "
-    "a sensor that bends."
-)
-ANSWER = (
-    "Averaged spectra, and the oscillator fitted line by line without their leakage: where a window is shorter than "
-    "the resonance rings, H1 and H2 part and the coherence falls, and the fit is what to read."
-)
 
 
 def of_record(record: Record, *, form: str = "csv") -> Story:
@@ -76,7 +67,7 @@ def of_plan(plan: ExperimentPlan, *, needs: Sequence[tuple[str, str]] = ()) -> S
         ["; ".join(_enough(plan, *need) for need in needs)] * bool(needs),
         notes=plan.refusals,
         tables=[Table("What each setup tells", ("fs [Hz]", "sensors", *plan.questions), rows, errors)],
-        draw=lambda: [plate("plan", partial(plot_plan, plan), "What each setup tells", CAPTION)],
+        draw=lambda: [captioned("bench", "plan", partial(plot_plan, plan))],
         data=plan.to_dict,
     )
 
@@ -206,11 +197,9 @@ def _plates(done: Commissioned) -> list[Plate]:
     plates = []
     sweep = done.results.get("sweep")
     if isinstance(sweep, ModalFit) and sweep.response is not None:
-        plates.append(plate("frequency-response", partial(plot_response, sweep), "The answer to the base", ANSWER))
+        plates.append(captioned("bench", "frequency-response", partial(plot_response, sweep)))
     if sensors:
-        plates.append(
-            plate("calibration", partial(plot_calibrations, sensors), "How straight the sensors are", OFF_LINE)
-        )
+        plates.append(captioned("bench", "calibration", partial(plot_calibrations, sensors)))
     return plates
 
 

@@ -19,6 +19,7 @@ from stickslip.figures import style
 from stickslip.files.write import whole
 from stickslip.printing import printable
 from stickslip.story.story import Story, summary
+from stickslip.units import spelled
 from stickslip.whole import whole_folder
 
 if TYPE_CHECKING:
@@ -112,7 +113,7 @@ def templates(*folders: Path, wording: Callable[[str], str] = str) -> Environmen
     environment.filters.update(
         inline_svg=inline_svg,
         spelled_out=spelled_out,
-        spelled=style.spelled,
+        spelled=spelled,
         played=played,
         heard=heard,
         packed=packed,

@@ -10,7 +10,7 @@ import numpy as np
 
 from stickslip.figures.bifurcation import plot_basins, plot_bifurcation, plot_boundary, plot_dither
 from stickslip.figures.maps import plates_of
-from stickslip.figures.style import Plate, plate
+from stickslip.figures.style import Plate, captioned
 from stickslip.maps.basins import Basins
 from stickslip.maps.bifurcation import Bifurcation
 from stickslip.maps.boundaries import Boundary
@@ -130,11 +130,8 @@ def of_bifurcation(diagram: Bifurcation) -> Story:
     rows = [(change.direction, f"{change.value:.6g}", change.before, change.after) for change in diagram.changes]
     ways = (("up", diagram.up), ("down", diagram.down))
     return _story(
-        "Motion along a parameter",
         "bifurcation",
         partial(plot_bifurcation, diagram),
-        "Where the mass is once in each period of the drive: blue followed upwards, orange downwards; lines mark "
-        "where the kind of motion changes. Below, the largest multiplier: at 1 the motion ceases to attract.",
         headline=list(_along(diagram)),
         tables=[Table("Changes of the motion", ("way", diagram.parameter, "before", "after"), rows)] if rows else (),
         data=lambda: {
@@ -186,32 +183,24 @@ def of_stability(stability: Stability) -> Story:
 def of_basins(basins: Basins) -> Story:
     """Attractors over starts."""
     return _story(
-        "Which start leads where",
         "basins",
         partial(plot_basins, basins),
-        "Each start in the colour of the motion it leads to; crosses: where that motion is at phase zero.",
     )
 
 
 def of_boundary(boundary: Boundary) -> Story:
     """Where the kind of motion changes."""
     return _story(
-        "Where the kind of motion changes",
         "boundary",
         partial(plot_boundary, boundary),
-        "Points: found by bisection of exact runs. Line: the closed form.",
     )
 
 
 def of_dither(dither: Dither) -> Story:
     """What dither leaves of the sticks and of the friction."""
     return _story(
-        "What dither does",
         "dither",
         partial(plot_dither, dither),
-        "Top: the longest stick left; below the line none outlasts a period of the dither. Bottom: the friction "
-        "left on average, and what the averaged law says; where they part, friction moves the mass in a period, "
-        "or the contact gives way.",
         headline=[
             f"Dither of {value_of(dither.amplitude)} at {dither.frequency:.5g} Hz on the {dither.on} removes "
             f"stick-slip: the longest stick falls from {dither.sticks[0]:.3g} s to {dither.sticks[1]:.3g} s."
@@ -233,5 +222,7 @@ def of_dither(dither: Dither) -> Story:
     )
 
 
-def _story(title: str, name: str, draw: Callable[[], Any], caption: str, **content: Any) -> Story:
-    return Story(title, draw=lambda: [plate(name, draw, title, caption)], **content)
+def _story(kind: str, draw: Callable[[], Any], **content: Any) -> Story:
+    """What is told under the title of its one figure."""
+    figure = captioned("motions", kind, draw)
+    return Story(figure.title, draw=lambda: [figure], **content)

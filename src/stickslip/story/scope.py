@@ -17,7 +17,7 @@ from stickslip.balance.motion import is_measured
 from stickslip.consistent.checks import Slip
 from stickslip.errors import StickslipError
 from stickslip.figures.contact import across
-from stickslip.figures.style import envelope, prefixed, spelled
+from stickslip.figures.style import envelope
 from stickslip.files.expression import shifted, split_gain, split_spec, times
 from stickslip.printing import printable
 from stickslip.record.record import RIG_UNITS, Record
@@ -26,6 +26,7 @@ from stickslip.rig.sensor import Digitiser, Noise, Sensor
 from stickslip.rig.settings import READING
 from stickslip.statistics import follows
 from stickslip.twin.belief import Belief
+from stickslip.units import prefixed, spelled
 
 DETAILED = 270_000  # values that the page holds one by one, of all lines; else the least and the most of each column
 COLUMNS = 1_500
