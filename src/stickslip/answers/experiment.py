@@ -17,6 +17,7 @@ from stickslip.contact.contact import contact_stiffness
 from stickslip.cycle.loops import friction_loops
 from stickslip.drives.kinds import HarmonicBase
 from stickslip.errors import ModelError, StickslipError
+from stickslip.estimate import plain
 from stickslip.oscillator import Oscillator
 from stickslip.parameters import finite
 from stickslip.record.record import Record
@@ -148,25 +149,7 @@ class ExperimentPlan:
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON; what is not finite becomes ``None``."""
-
-        def plain(value: Any) -> Any:
-            return None if isinstance(value, float) and not math.isfinite(value) else value
-
-        return {
-            "draws": self.draws,
-            "seed": self.seed,
-            "setups": [
-                {
-                    "fs": setup.fs,
-                    "sensors": list(setup.sensors),
-                    "accuracy": {
-                        question: {name: plain(value) for name, value in vars(answer).items()}
-                        for question, answer in setup.accuracy.items()
-                    },
-                }
-                for setup in self.setups
-            ],
-        }
+        return {"draws": self.draws, "seed": self.seed, "setups": plain(self.setups)}
 
 
 def plan_experiment(

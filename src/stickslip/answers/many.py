@@ -13,7 +13,7 @@ from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field, replace
 from itertools import islice
 from pathlib import Path
-from typing import Any, Protocol, Self, TypeVar
+from typing import Any, Self, TypeVar
 
 import numpy as np
 
@@ -65,18 +65,7 @@ def compare(findings: Sequence[Findings]) -> Comparison:
     return Comparison(tuple(findings), notes, results=results)
 
 
-class Slid(Protocol):
-    """What is known of one record's friction and load."""
-
-    @property
-    def name(self) -> str: ...
-    @property
-    def level(self) -> Estimate | None: ...
-    @property
-    def normal(self) -> Estimate | None: ...
-
-
-def against_load(findings: Sequence[Slid]) -> tuple[dict[str, Estimate | None], tuple[str, ...]]:
+def against_load(findings: Sequence[Findings | Row]) -> tuple[dict[str, Estimate | None], tuple[str, ...]]:
     """The coefficient and the line of friction against the normal load; and what could not be used."""
     known = [f for f in findings if f.normal is not None and f.level is not None and f.level.unit == "N"]
     left_out = {

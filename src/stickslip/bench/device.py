@@ -479,17 +479,27 @@ class Wire(BaseModel):
     serial: str = ""
 
 
-class Mover(BaseModel):
-    """One output: where, what a volt is worth there, and its limits."""
+class Limits(BaseModel):
+    """What an output can do at most."""
 
     model_config = STRICT
 
-    at: Annotated[str, Field(min_length=1)]
-    sensitivity: str = "1 m/V"
     stroke: Annotated[float, quantity("m"), Field(gt=0)] | None = None
     lowest: Annotated[float, quantity("Hz"), Field(ge=0)] | None = None
     highest: Annotated[float, quantity("Hz"), Field(gt=0)] | None = None
     acceleration: Annotated[float, quantity("m/s^2"), Field(gt=0)] | None = None
+
+    @property
+    def stated(self) -> dict[str, float]:
+        """Those that are known, as an :class:`Output` takes them."""
+        return {name: value for name in Limits.model_fields if (value := getattr(self, name)) is not None}
+
+
+class Mover(Limits):
+    """One output: where, what a volt is worth there, and its limits."""
+
+    at: Annotated[str, Field(min_length=1)]
+    sensitivity: str = "1 m/V"
 
 
 Wires = Annotated[dict[str, Annotated[Wire, BeforeValidator(_wire)]], Field(min_length=1)]

@@ -7,13 +7,25 @@ import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Self
+from typing import Annotated, Any
 
 import numpy as np
 from pydantic import BaseModel, Field
 
 from stickslip.arrays import Array
-from stickslip.bench.device import Block, Input, Mover, Output, Signal, Tone, Wires, inputs, output_of, vendors
+from stickslip.bench.device import (
+    Block,
+    Input,
+    Listening,
+    Mover,
+    Output,
+    Signal,
+    Tone,
+    Wires,
+    inputs,
+    output_of,
+    vendors,
+)
 from stickslip.errors import ModelError, RecordError
 from stickslip.files.expression import apply_sensitivity
 from stickslip.settings import STRICT, checked, quantity
@@ -75,7 +87,7 @@ class Unit:
         return Task(self)
 
 
-class Task:
+class Task(Listening):
     """A unit that measures."""
 
     def __init__(self, device: Unit) -> None:
@@ -101,9 +113,6 @@ class Task:
             raise ModelError(
                 f"{device.device} refuses ({error})", "terminals, ranges and rate are what the unit has", "correct them"
             ) from error
-
-    def __enter__(self) -> Self:
-        return self
 
     def __exit__(self, *raised: object) -> None:
         """Let go of the unit."""
@@ -190,12 +199,10 @@ def build(name: str, settings: Mapping[str, Any], folder: Path) -> Unit:
         A setting without meaning.
     """
     given = checked(_Settings, settings, source=f"devices.{name}")
-    limits = ("stroke", "lowest", "highest", "acceleration")
     outputs, movers = [], []
     for output, mover in given.outputs.items():
-        known = {limit: getattr(mover, limit) for limit in limits if getattr(mover, limit) is not None}
         worth = apply_sensitivity(mover.sensitivity, parse_unit("V"), output)
-        outputs.append(Output(output, worth.si, **known))
+        outputs.append(Output(output, worth.si, **mover.stated))
         movers.append((mover.at, worth.scale))
     wired = inputs(given.channels, unit="V", limit=VOLTS)
     return Unit(given.device, given.fs, wired, tuple(outputs), tuple(movers), name)

@@ -267,6 +267,8 @@ def modal_fit(
     >>> round(modes.mass.value, 2), round(modes.stiffness.value), round(modes.damping.value, 1)
     (2.42, 2310, 3.0)
     """
+    from scipy.optimize import least_squares
+
     if channels[0] not in INPUTS or damper not in ("ground", "base"):
         raise EstimateError(
             f"input {channels[0]}, damper {damper}",
@@ -277,7 +279,7 @@ def modal_fit(
     record = without_delays(record, *channels, question=MODAL)
     lines = _Lines.of(record, channels, damper)
     begin = lines.start()
-    solve: Any = _least_squares()
+    solve: Any = least_squares
     fit = solve(lines.misfit, begin, x_scale=np.maximum(np.abs(begin), 1e-6))
     power = float(fit.fun @ fit.fun) / (len(fit.fun) - len(begin))
     cover = max(1.0, power) * np.linalg.inv(fit.jac.T @ fit.jac)[:4, :4]
@@ -295,12 +297,6 @@ def _response_of(record: Record, channels: tuple[str, str]) -> FrequencyResponse
         return frequency_response(record, channels=channels)
     except StickslipError:
         return None
-
-
-def _least_squares() -> Any:
-    from scipy.optimize import least_squares
-
-    return least_squares
 
 
 @dataclass(frozen=True, eq=False)
@@ -385,6 +381,7 @@ def _modal_of(lines: _Lines, p: Array, cover: Array, given: dict[str, Estimate],
         return Estimate.normal(name, value, sd=sd, unit=unit, method=method, status=status)
 
     delay = of("delay of the displacement behind the input", p[2], [0, 0, 1, 0], "s")
+    about: Any = {"delay": delay, "lines": len(lines.turn), "response": None, "damper": lines.damper, "status": status}
     if lines.of_base:
         w = math.sqrt(p[0])
         frequency = of("natural frequency", w / math.tau, [1 / (2 * w * math.tau), 0, 0, 0], "Hz")
@@ -398,15 +395,11 @@ def _modal_of(lines: _Lines, p: Array, cover: Array, given: dict[str, Estimate],
                 "mass", spring.value / p[0], sd=part * spring.value / p[0], unit="kg", method=method
             )
         if weight is None:
-            return ModalFit(
-                frequency, ratio, None, None, None, delay, gain, len(lines.turn), None, lines.damper, status
-            )
+            return ModalFit(frequency, ratio, None, None, None, gain=gain, **about)
         m = weight.value
         spring = of("spring stiffness", m * p[0], [m, 0, 0, 0], "N/m", weight.sd * p[0])
         damper = of("viscous damping", m * p[1], [0, m, 0, 0], "N s/m", weight.sd * abs(p[1])).within(0.0)
-        return ModalFit(
-            frequency, ratio, weight, spring, damper, delay, gain, len(lines.turn), None, lines.damper, status
-        )
+        return ModalFit(frequency, ratio, weight, spring, damper, gain=gain, **about)
     m, c, k = p[0], p[1], p[3]
     w, root = math.sqrt(k / m), math.sqrt(k * m)
     return ModalFit(
@@ -415,10 +408,6 @@ def _modal_of(lines: _Lines, p: Array, cover: Array, given: dict[str, Estimate],
         of("mass", m, [1, 0, 0, 0], "kg"),
         of("spring stiffness", k, [0, 0, 0, 1], "N/m"),
         of("viscous damping", c, [0, 1, 0, 0], "N s/m").within(0.0),
-        delay,
-        None,
-        len(lines.turn),
-        None,
-        lines.damper,
-        status,
+        gain=None,
+        **about,
     )

@@ -237,18 +237,11 @@ def run_list(proposals: Sequence[Proposal], *, seconds: float = 20.0) -> RunList
     """
     if not 0 < seconds < math.inf:
         raise ModelError(f"seconds = {seconds}", "a recording lasts some time", "give a length in s")
-    return RunList(
-        run=tuple(
-            Run(
-                name=f"next-{number}",
-                frequency=proposal.frequency,
-                amplitude=proposal.amplitude,
-                seconds=seconds,
-                why=proposal.why,
-            )
-            for number, proposal in enumerate(proposals, start=1)
-        )
+    runs = (
+        Run(name=f"next-{number}", frequency=one.frequency, amplitude=one.amplitude, seconds=seconds, why=one.why)
+        for number, one in enumerate(proposals, start=1)
     )
+    return RunList(run=tuple(runs))
 
 
 def _frequencies(laws: Mapping[str, Oscillator], shaker: Shaker) -> list[float]:

@@ -10,13 +10,13 @@ from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Annotated, Any, Literal, NamedTuple, Self, get_args
+from typing import Annotated, Any, Literal, NamedTuple, get_args
 
 import numpy as np
 from pydantic import BaseModel, Field
 
 from stickslip.arrays import Array, Mask
-from stickslip.bench.device import Block, Input, Output, Signal, Tone, output_of
+from stickslip.bench.device import Block, Input, Limits, Listening, Output, Signal, Tone, output_of
 from stickslip.bench.march import March, Shaken
 from stickslip.compiled import waiting
 from stickslip.drives.kinds import Drive, HarmonicBase, HarmonicForce, Release
@@ -229,7 +229,7 @@ class _Order(NamedTuple):
     rehearsal: threading.Thread
 
 
-class SimStream:
+class SimStream(Listening):
     """The virtual rig, running."""
 
     def __init__(self, device: Sim) -> None:
@@ -245,12 +245,6 @@ class SimStream:
         wanted = [(sensor, rng) for sensor, rng in pairs if sensor.channel in names]
         self.readings = [_Reading(sensor, self.march, self.rate, rng) for sensor, rng in wanted]
         self.began = time.monotonic()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *raised: object) -> None:
-        """Nothing is held."""
 
     def read(self, timeout: float = 1.0) -> Block | None:
         """The next samples; see :class:`Stream`. A block that a drop touches is lost whole, as it is in a real unit."""
@@ -434,15 +428,6 @@ class _Fault(BaseModel):
     channel: str = ""
 
 
-class _Shaker(BaseModel):
-    model_config = STRICT
-
-    stroke: Annotated[float, quantity("m"), Field(gt=0)] | None = None
-    lowest: Annotated[float, quantity("Hz"), Field(ge=0)] | None = None
-    highest: Annotated[float, quantity("Hz"), Field(gt=0)] | None = None
-    acceleration: Annotated[float, quantity("m/s^2"), Field(gt=0)] | None = None
-
-
 class _Settings(BaseModel):
     """A table ``[devices.NAME]`` of kind "sim"."""
 
@@ -454,7 +439,7 @@ class _Settings(BaseModel):
     fs: Annotated[float, quantity("Hz"), Field(gt=0)] = 4000.0
     fast: bool = False
     faults: list[_Fault] = Field(default_factory=list)
-    shaker: _Shaker = Field(default_factory=_Shaker)
+    shaker: Limits = Field(default_factory=Limits)
     seed: Annotated[int, Field(ge=0)] = 1
     stated: bool = False
 
@@ -496,9 +481,8 @@ def build(name: str, settings: Mapping[str, Any], folder: Path) -> Sim:
     for channel, changes in given.sensors.items():
         rig = rig.having(channel, **changes)
     faults = tuple(Fault(f.kind, f.at, f.duration or math.inf, f.channel) for f in given.faults)
-    limits = {key: value for key, value in given.shaker.model_dump().items() if value is not None}
     system, start = _system(given.system, folder)
-    base = Output("base", "m", **limits)
+    base = Output("base", "m", **given.shaker.stated)
     return Sim(system, start, rig, given.fs, given.fast, faults, base, given.seed, name, given.stated)
 
 

@@ -31,6 +31,7 @@ from stickslip.story.story import (
     cautions,
     doubts,
     interval_of,
+    listed,
     number,
     tried,
     value_of,
@@ -224,7 +225,7 @@ def _dying(decay: Decay) -> str:
     if decay.motion is not None and decay.best is decay.motion:
         forces = decay.motion.choice.chosen.fitted.motion.words
         terms = [term for term in decay.motion.terms if rubs or term.name != dry.name]
-        told = f"by {forces}: {_listed([_with_interval(term) for term in terms])}."
+        told = f"by {forces}: {listed([_with_interval(term) for term in terms])}."
         hidden = "" if len(terms) == len(decay.motion.terms) else f" {_hidden(dry, 'dry friction')}"
         return f"The motion dies away {'as it would ' if hidden else ''}{told}{hidden}"
     if decay.undecided:
@@ -277,10 +278,6 @@ def _curved(decay: Decay) -> Iterator[str]:
         shift = 3 / 8 * fitted.value("curvature") * fitted.value("amplitude") ** 2
         way = "rises with the amplitude: it hardens" if shift > 0 else "falls with the amplitude: it softens"
         yield f"The spring is not straight, its frequency {way}, by {100 * abs(shift):.2g} % at the first swing."
-
-
-def _listed(parts: list[str]) -> str:
-    return " and ".join([", ".join(parts[:-1])] * (len(parts) > 1) + parts[-1:])
 
 
 def _chosen(decay: Decay) -> Iterator[str]:

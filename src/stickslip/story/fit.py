@@ -28,7 +28,19 @@ from stickslip.record.record import Record
 from stickslip.rig.settings import rig_toml
 from stickslip.settings import toml_lines
 from stickslip.story.scope import Scope, corrected, of_fit, reading_of
-from stickslip.story.story import Caution, Line, Story, Table, doubts, faulty, interval_of, leading, number, value_of
+from stickslip.story.story import (
+    Caution,
+    Line,
+    Story,
+    Table,
+    doubts,
+    faulty,
+    interval_of,
+    leading,
+    listed,
+    number,
+    value_of,
+)
 
 Fit: TypeAlias = LawComparison | LawFit | CurveFit
 Records: TypeAlias = Record | Sequence[Record]  # what it was fitted to
@@ -363,8 +375,7 @@ def _left(part: Prediction, name: str) -> str:
 
 
 def _listed(follows: Mapping[str, float]) -> str:
-    shares = [f"{_percent(value)} of {name}" for name, value in follows.items()]
-    return " and ".join([", ".join(shares[:-1]), shares[-1]] if len(shares) > 1 else shares)
+    return listed([f"{_percent(value)} of {name}" for name, value in follows.items()])
 
 
 def _percent(value: float | None) -> str:

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from stickslip.estimate import plain
 from stickslip.figures.bifurcation import plot_basins, plot_bifurcation, plot_boundary, plot_dither
 from stickslip.figures.maps import plates_of
 from stickslip.figures.style import Plate, captioned
@@ -17,9 +18,9 @@ from stickslip.maps.boundaries import Boundary
 from stickslip.maps.dither import Dither
 from stickslip.solve.tables import System
 from stickslip.squeak.stability import Stability
-from stickslip.story.findings import plain
 from stickslip.story.story import Line, Story, Table, number, value_of
 
+OF_DITHER = ("frequency", "amplitude", "on", "speed", "sticks", "tried", "scan", "checks")  # in JSON
 LOST = ("not run", "failed")  # outcomes that leave holes in a map
 
 
@@ -207,18 +208,7 @@ def of_dither(dither: Dither) -> Story:
         ],
         lines=[Line.of(dither.amplitude)],
         notes=dither.checks,
-        data=lambda: plain(
-            {
-                "frequency": dither.frequency,
-                "amplitude": dither.amplitude.to_dict(),
-                "on": dither.on,
-                "speed": dither.speed,
-                "sticks": dither.sticks,
-                "tried": dither.tried,
-                "scan": dither.scan,
-                "checks": dither.checks,
-            }
-        ),
+        data=lambda: plain({name: getattr(dither, name) for name in OF_DITHER}),
     )
 
 

@@ -42,7 +42,7 @@ from stickslip.squeak.spectra import write_sound
 from stickslip.story.folder import check_folder
 from stickslip.story.scope import Scope
 from stickslip.story.scope import of_run as of_motion
-from stickslip.story.story import Story, Table
+from stickslip.story.story import Story, Table, listed
 from stickslip.systems.file import Case
 from stickslip.units import prefixed
 
@@ -408,7 +408,7 @@ def holding(run: Trajectory) -> str:
 
 def _listed(parts: Sequence[str]) -> str:
     shown = [*parts[:MOST_NAMED], *([f"{len(parts) - MOST_NAMED} more"] if len(parts) > MOST_NAMED else [])]
-    return " and ".join([", ".join(shown[:-1]), shown[-1]] if len(shown) > 1 else shown)
+    return listed(shown)
 
 
 def _fastest_contact(run: Trajectory) -> float:

@@ -206,6 +206,11 @@ def sentence(text: str) -> str:
     return text[:1].upper() + text[1:]
 
 
+def listed(parts: Sequence[str]) -> str:
+    """ "a, b and c"."""
+    return " and ".join([", ".join(parts[:-1]), parts[-1]] if len(parts) > 1 else parts)
+
+
 def _rounded(value: float, digits: int) -> str:
     """With so many decimals; a zero without sign."""
     return f"{round(value, digits) + 0.0:.{digits}f}"
