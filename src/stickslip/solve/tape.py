@@ -511,7 +511,8 @@ class _Builder:
                 following = {k: part.speed for k, part in enumerate(parts[t]) if part.friction is None}
                 before = {k: part.speed for k, part in enumerate(parts[j]) if part.friction is None}
                 stuck = before | following | stuck
-            reset[e] = self.stilled(stuck) @ reset[e]
+            if stuck:
+                reset[e] = self.stilled(stuck) @ reset[e]
         return Exits(
             node=np.array([node for own in quantities for node, _ in own], dtype=np.int64),
             factor=np.array([factor for own in quantities for _, factor in own], dtype=np.float64),
