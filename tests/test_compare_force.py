@@ -12,6 +12,7 @@ from scipy.signal import lsim, lti
 import stickslip as ss
 from rigs import CASES, RIG, measured, told
 from stickslip import bench
+from stickslip.balance.mounts import _MeanLines, _swinging
 from stickslip.errors import EstimateError, RecordError
 from stickslip.estimate import kinds
 from stickslip.signals.response import resonance
@@ -42,6 +43,19 @@ def test_the_mounts_intervals_hold() -> None:
         inside += [first.frequency.includes(125.0), first.damping.includes(0.1)]
         inside += [second.frequency.includes(250.0), second.damping.includes(0.05)]
     assert np.mean(inside) > 0.85
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_no_mounts_are_named_where_noise_explains_the_lines(seed: int) -> None:
+    """Two mounts alike filter the pull, and with it noise that is a little larger than it seems."""
+    rng, count, mass = np.random.default_rng(seed), np.arange(1, 86), 0.284
+    load, pull = (0.05 * np.exp(2j * np.pi * rng.random(85)) / count**power for power in (1, 2))
+    noises = {name: sd * rng.standard_normal((85, 2)) @ [1, 1j] for name, sd in {"a": 1e-4, "load": 2e-5}.items()}
+    more = 1.2 * 2e-4 * rng.standard_normal((85, 2)) @ [1, 1j]
+    sd = np.full(85, math.hypot(1e-4, 2e-4 / mass))
+    acceleration = (pull - load) / mass + noises["a"]
+    means = _MeanLines(7.75 * count, acceleration, load + noises["load"], pull + more, sd, np.full(85, 2e-5), mass, 0.0)
+    assert not _swinging(means)
 
 
 @cache

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -27,6 +28,9 @@ COARSE = 12  # frequencies of each mount that the search begins with
 STARTS = 4  # of them that are refined
 TOLD = 30.0  # by how much a mount must lower the scaled sum of squares: two parameters by chance lower it by 2
 FIRST_DAMPING = 0.07
+# Variance of what is left without a mount, in that of noise and gains, from which there is something to explain: of a
+# motion that is not periodic, with noise alone, 1.3 was left, and two mounts alike took it up.
+NEEDED = 2.0
 HEARD = 3.0  # standard deviations of its noise from which a line counts
 
 
@@ -95,8 +99,12 @@ def find_mounts(lines: Lines, record: Record, balance: Balance) -> tuple[Resonan
     :math:`H_a (p - f)/m`. Frequency and damping of both mounts are those that bring every line of the two readings
     together, by least squares. A mount is named only where the lines can not do without it.
     """
-    means = _mean_lines(lines, record, balance)
-    if len(means.frequency) < 8:
+    return _swinging(_mean_lines(lines, record, balance))
+
+
+def _swinging(means: _MeanLines) -> tuple[Resonance, ...]:
+    """The mounts without which the lines would be further apart than noise and gains put them."""
+    if len(means.frequency) < 8 or np.mean(means.misfit(None, None) ** 2) < NEEDED:
         return ()
     fits = {kinds: _fitted(means, kinds) for kinds in ("", "a", "l", "al")}
     best = fits["al"]
@@ -120,6 +128,7 @@ def _mean_lines(lines: Lines, record: Record, balance: Balance) -> _MeanLines:
         noise = noise_along(record[name], record.fs, record.channels[name].noise) if name in mean else np.zeros(1)
         level[name] = math.sqrt(2 * float(np.mean(noise**2)) / points)  # of the real part of a mean line
     pulled = balance.stiffness * math.hypot(level["x"], level["z"])
+    off = _unsure(mean, record, balance)
     heard = (np.abs(mean["a"]) > HEARD * level["a"]) & (np.abs(mean["load"]) > HEARD * level["load"])
     heard &= lines.frequency < 0.4 * record.fs
     size = int(heard.sum())
@@ -128,11 +137,21 @@ def _mean_lines(lines: Lines, record: Record, balance: Balance) -> _MeanLines:
         mean["a"][heard],
         mean["load"][heard],
         pull[heard],
-        np.full(size, math.hypot(level["a"], pulled / balance.mass)),
+        np.hypot(math.hypot(level["a"], pulled / balance.mass), off[heard]),
         np.full(size, level["load"]),
         balance.mass,
         record.channels["load"].inertia,
     )
+
+
+def _unsure(mean: Mapping[str, Complex], record: Record, balance: Balance) -> Array:
+    """By how much each line of the acceleration may be off by gains and constants that are as unsure as stated."""
+    sd = record.rig.sd if record.rig is not None else {}
+    gains = {name: record.channels[name].gain_sd * mean[name] for name in mean if name in record}
+    stretch = mean["x"] - mean.get("z", 0.0)
+    parts = [gains["a"], sd.get("mass", 0.0) / balance.mass * mean["a"], gains["load"] / balance.mass]
+    parts += [balance.stiffness / balance.mass * gains[name] for name in ("x", "z") if name in gains]
+    return np.asarray(np.linalg.norm([*parts, sd.get("stiffness", 0.0) / balance.mass * stretch], axis=0))
 
 
 @dataclass(frozen=True, eq=False)
