@@ -488,7 +488,7 @@ def test_a_ratio_that_is_off_by_little_makes_all_constants_unsure_by_as_much() -
     slips = tried.results["slipped"]
     assert {slip.unsure for slip in slips if not slip.delays} == {0.02}
     assert not any(slip.constants or slip.cure for slip in slips)
-    far = _slip(tried.trial.belief.at(**{SPRING: 0.1}), SPRING, record, 0.0)
+    far = _slip(tried.trial.belief.at(**{SPRING: 0.1}), record, 0.0)
     assert far.constants == {"stiffness": 1.105}
 
 

@@ -24,6 +24,7 @@ from stickslip.twin.trial import COMPLIANCE, GIVES, Trial, try_on_twins
 from stickslip.workers import workers
 
 Answer = TypeVar("Answer", Loops | None, Sticks | None, Breakaway | None)
+CONSTANTS = {MASS: "mass", SPRING: "stiffness"}
 CALIBRATED = 0.03  # chosen: more than calibration leaves a gain or a constant off by is a mistake, to be corrected
 UNTOLD = Estimate("compliance", math.nan, (math.nan, math.nan), math.nan, "m/N", "fit to x")
 # Of each twin: static friction and a contact's stiffness are told by the fit to x, and a curve over speed not at all.
@@ -99,27 +100,27 @@ def _as_tried(findings: Findings, trial: Trial) -> dict[str, Any]:
         "breakaway": _with(findings.breakaway, trial.estimates),
         "presliding": findings.presliding if findings.stiffness is not None else _yields(findings.presliding, trial),
     }
-    off = max((abs(math.expm1(rig.values[name])) for name, rig in trial.slips.items() if name != LATE), default=0.0)
+    ratios = (rig.values[name] for rig in trial.slips for name in rig.slipped if name != LATE)
+    off = max((abs(math.expm1(ratio)) for ratio in ratios), default=0.0)
     unsure = float(f"{off:.1g}") if off <= CALIBRATED else 0.0
-    results["slipped"] = tuple(_slip(rig, name, findings.record, unsure) for name, rig in trial.slips.items())
+    results["slipped"] = tuple(_slip(rig, findings.record, unsure) for rig in trial.slips)
     if trial.doubt is not None and trial.unlike:  # what was not tried rests on the same constants and channels
         results |= {key: flagged(results.get(key, findings.results.get(key)), trial.doubt) for key in BY_FORCE}
     return results
 
 
-def _slip(rig: Belief, name: str, record: Record, unsure: float) -> Slip:
+def _slip(rig: Belief, record: Record, unsure: float) -> Slip:
     """What of a record's channels and constants is to be stated otherwise, were it what this rig has off.
 
     Of gains and constants the motion tells the ratio alone: where calibration may have left it, all are `unsure`.
     """
-    if name == LATE:
-        return Slip(rig.slip, delays={"x": record.channels["x"].delay + _rounded(rig.late)})
-    if unsure:
-        return Slip(rig.slip, unsure=unsure)
-    off = rig.values[name]
-    if name == GAIN:
-        return Slip(rig.slip, {"x": ("x", 1 + _rounded(math.expm1(-off)))})
-    return Slip(rig.slip, constants={{MASS: "mass", SPRING: "stiffness"}[name]: 1 + _rounded(math.expm1(off))})
+    off = {name: rig.values[name] for name in rig.slipped}
+    delays = {"x": record.channels["x"].delay + _rounded(rig.late)} if LATE in off else {}
+    if unsure and off.keys() - {LATE}:
+        return Slip(rig.slip, delays=delays, unsure=unsure)
+    cure = {"x": ("x", 1 + _rounded(math.expm1(-off[GAIN])))} if GAIN in off else {}
+    constants = {CONSTANTS[name]: 1 + _rounded(math.expm1(off[name])) for name in CONSTANTS if name in off}
+    return Slip(rig.slip, cure, constants, delays=delays)
 
 
 def _rounded(value: float) -> float:

@@ -270,14 +270,16 @@ class Belief:
         return self.at(**dict.fromkeys(self.unsure, 0.0))
 
     @property
-    def slipped(self) -> str:
-        """Which of the constants, or the clock of x, it takes to be off by more than was stated; empty where none."""
-        return next((name for name in SLIPS if name in self.values and name not in self.unsure), "")
+    def slipped(self) -> tuple[str, ...]:
+        """Which of the constants, and the clock of x, it takes to be off by more than was stated."""
+        return tuple(name for name in SLIPS if name in self.values and name not in self.unsure)
 
     @property
     def slip(self) -> str:
         """The same in words, with by how much, and what would look alike."""
-        name = self.slipped
+        return " and ".join(self._off_by(name) for name in self.slipped)
+
+    def _off_by(self, name: str) -> str:
         if name == LATE:
             words = f"x {1e3 * abs(self.late):.2g} ms {'late' if self.late > 0 else 'early'}"
             rig = self.stated
@@ -285,20 +287,18 @@ class Belief:
             base, shift = rig.damper == "base", rig.damping / rig.stiffness
             alike = shift > 0 and abs(self.late - (shift if base else -shift)) < ALIKE * shift
             return f"{words}, or the damper on the {'ground' if base else 'base'}" if alike else words
-        if not name:
-            return ""
         off = 100 * math.expm1(self.values[name])
         words = f"a {name} {abs(off):.2g} % {'larger' if off > 0 else 'smaller'} than stated"
         moves = driving(self.record)
         return f"{words}, or that of {moves} as much the other way" if name == GAIN and moves else words
 
     @property
-    def slips(self) -> dict[str, Belief]:
-        """The nearest rig of each kind of slip, where it has one itself; by what is off."""
-        nearest: dict[str, Belief] = {}
+    def slips(self) -> list[Belief]:
+        """The nearest rig of each kind of slip, where it has one itself."""
+        nearest: dict[tuple[str, ...], Belief] = {}
         for rig in (self, *sorted(self.rivals, key=lambda rival: rival.left)) if self.slipped else ():
             nearest.setdefault(rig.slipped, rig)
-        return {name: rig for name, rig in nearest.items() if name}
+        return [rig for rig in nearest.values() if rig.slipped]
 
     @property
     def strain(self) -> float:

@@ -152,10 +152,10 @@ class Trial:
         return self.doubt is not None and not self.doubt.lesser
 
     @property
-    def slips(self) -> Mapping[str, Belief]:
-        """By what is off, the nearest rig that has it off; none where that is slight, or does not explain x."""
+    def slips(self) -> list[Belief]:
+        """The nearest rig of each kind that has something off; none where that is slight, or does not explain x."""
         explained = self.belief.left <= LOST and self.strays <= UNLIKE
-        return self.belief.slips if explained and self.unlike else {}
+        return self.belief.slips if explained and self.unlike else []
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON: how many, the law believed in, what would be felt, and how far x strays."""
@@ -274,7 +274,7 @@ class _Misfit:
     @classmethod
     def of(cls, belief: Belief, strays: float, repeats: float) -> _Misfit:
         """That of a belief's record, with what else as well as its slip would be one."""
-        slip, feigned = " or ".join(r.slip for r in belief.slips.values()), _feigned(belief)
+        slip, feigned = " or ".join(rig.slip for rig in belief.slips), _feigned(belief)
         share = max((abs(math.expm1(belief.values[name])) for name in _off(belief) if name in RATIOS), default=0.0)
         most = FINER if RICHER & belief.values.keys() else SLIGHT
         little = feigned < most * belief.kinetic and share < most
@@ -313,7 +313,7 @@ class _Misfit:
 def _off(belief: Belief) -> set[str]:
     """What a record's nearest rig has off by more than was stated."""
     strained = {name for name, sd in belief.unsure.items() if abs(belief.values[name]) > STRAINED * sd}
-    return strained | {belief.slipped} - {""}
+    return strained | set(belief.slipped)
 
 
 def _feigned(belief: Belief) -> float:
