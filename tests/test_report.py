@@ -214,6 +214,18 @@ def test_the_share_that_sticks_is_told_as_its_interval(demo: Findings) -> None:
     assert "it sticks 26 to 33 % of the time" in told
 
 
+def test_what_the_intervals_leave_open_is_not_asserted(demo: Findings) -> None:
+    """A zero of x had widened them to one side: 25 N forward and 10 N back "differed", of one friction."""
+    assert demo.sticks is not None
+    forward = Estimate("sliding friction forward", 25.0, (9.0, 26.0), 1.0, "N", "")
+    back = Estimate("sliding friction back", 10.0, (9.5, 27.0), 1.0, "N", "")
+    never = Estimate("stuck share of the time", 0.0, (0.0, 0.0), 0.0, "1", "")
+    either = replace(demo.loops, forward=forward, back=back)
+    told = " ".join(summary(demo.having(loops=either, sticks=replace(demo.sticks, share=never))).headline)
+    assert "directions differ" not in told
+    assert "it never sticks" in told
+
+
 def test_directions_that_differ_are_told_of_a_regression_too() -> None:
     time = np.arange(8000) / 1000
     x = 0.1 * np.sin(np.pi * time) + 0.02 * np.sin(3.4 * np.pi * time)

@@ -283,6 +283,10 @@ def test_friction_that_falls_with_speed_is_found_with_its_static_level() -> None
     assert tried.loops.level.value == pytest.approx(truth["sliding friction"], rel=0.01)
     told = "Friction falls from"
     assert told in " ".join(ss.summary(tried).headline)
+    unresolved = replace(tried.breakaway, ratio=replace(tried.breakaway.ratio, interval=(1.0, 29.9)))
+    said = " ".join(ss.summary(tried.having(breakaway=unresolved)).headline)
+    assert told not in said, "of a contact whose friction falls nowhere it was, beside a static friction of 1.0 to 29.9"
+    assert "change of friction with speed is resolved" not in said
     unlike = tried.having(trial=replace(tried.trial, strays=9.0))
     assert told not in " ".join(ss.summary(unlike).headline), "of no kind that was tried"
 

@@ -184,7 +184,8 @@ def _of_directions(forward: Estimate | None, back: Estimate | None, what: str = 
     if forward is None or back is None:
         return
     apart = abs(forward.value - back.value)
-    if apart > SAME * abs(forward.value + back.value) / 2 and apart > 2 * forward.sd + 2 * back.sd:
+    (low, high), (least, most) = forward.interval, back.interval
+    if apart > SAME * abs(forward.value + back.value) / 2 and (low > most or least > high):
         alike = "" if what else "; a zero offset of a sensor or a sloping rig looks the same"
         yield (
             f"The two directions differ{what and ' ' + what}: {value_of(forward)} forward and {value_of(back)} "
@@ -222,15 +223,18 @@ def _of_loops(findings: Findings) -> Iterator[str]:
     low, high = loops.slope.interval
     changes = loops.slope.status == "ok" and (low > 0 or high < 0)
     trial = findings.trial
-    falls = trial is not None and not trial.unlike and math.isfinite(trial.belief.fall_speed)
-    if falls:
+    curved = trial is not None and not trial.unlike and math.isfinite(trial.belief.fall_speed)
+    ratio = findings.breakaway.ratio if curved and findings.breakaway is not None else None
+    falls = ratio is not None and stands(ratio.status) and ratio.interval[0] > 1
+    if falls and ratio is not None:
         belief = trial.belief
-        static, speed = value_of(loops.level, belief.static), number(belief.fall_speed, 0.1 * belief.fall_speed, "m/s")
+        static = number(belief.static, ratio.sd * belief.kinetic, loops.level.unit)
+        speed = number(belief.fall_speed, 0.1 * belief.fall_speed, "m/s")
         line = f"; over the speeds at which it slides its slope is {value_of(loops.slope)}" if changes else ""
         yield f"Friction falls from {static} at rest as it begins to slide, about a speed of {speed}{line}."
     elif changes:
         yield f"Friction {'rises' if low > 0 else 'falls'} with speed, by {value_of(loops.slope)}."
-    if loops.slope.status == "ok" and not changes and math.isfinite(low + high):
+    if loops.slope.status == "ok" and not changes and math.isfinite(low + high) and (falls or not curved):
         power = findings.trial and findings.trial.felt.get(loops.slope.name)
         seen = f": {value_of(loops.slope, power.felt)} would be" if power else ""
         yield f"No {'other ' if falls else ''}change of friction with speed is resolved{seen}."
@@ -246,7 +250,7 @@ def of_sticks(findings: Findings) -> str:
         return "how long it sticks is not resolved"
     if bound:
         return f"no stick is resolved: it sticks below {100 * high:.2g} % of the time (95 %)"
-    if not any(event.kind == "stick" for event in sticks.events):
+    if high == 0.0 or not any(event.kind == "stick" for event in sticks.events):
         brief = sticks.share.value >= RARELY
         share = value_of(sticks.share)
         return f"it rests only briefly as it turns round, {share} of the time in all" if brief else "it never sticks"
