@@ -104,3 +104,17 @@ def test_values_that_x_does_not_tell_apart_have_a_step_without_noise_too() -> No
         assert fit is not None
         for damping in descent.DAMPINGS:
             assert np.isfinite(descent._damped_step(still, fit, damping)).all()
+
+
+def test_static_friction_of_one_breakaway_is_found_beside_constants_that_are_off() -> None:
+    """Led over its beginning, a record from rest ended without any, and a curve at 1.04 times was taken for it."""
+    rig = stepped.Rig("static", 0.3115, 71.95, 0.1395, 0.5494e-3, 3.5028, kinetic=0.01269, static=0.01614)
+    rng, fs = np.random.default_rng(2), 1000.0
+    samples, level = round(20 * fs / rig.frequency), 5e-3 * rig.amplitude
+    (x, _, _), *_ = stepped.marched(rig, samples, 0, fs, stepped.STEPS)
+    z = rig.amplitude * np.sin(2 * np.pi * rig.frequency * np.arange(samples) / fs)
+    noisy = {name: values + level * rng.standard_normal(samples) for name, values in {"x": x, "z": z}.items()}
+    record = ss.Record.of(noisy, fs=fs).with_details("x", gain_sd=0.005).with_details("z", gain_sd=0.005)
+    mass, stiffness = (0.996 * rig.mass, 0.005 * rig.mass), (1.01 * rig.stiffness, 0.005 * rig.stiffness)
+    belief = search.believe(ss.analyze(record, mass=mass, stiffness=stiffness, damping=rig.damping).record)
+    assert belief.ratio == pytest.approx(rig.static / rig.kinetic, rel=0.04)
