@@ -36,7 +36,7 @@ from stickslip.consistent.forced_checks import (
     momentum_check,
     stops_check,
     velocity_check,
-    zero_off,
+    zeros_off,
 )
 from stickslip.consistent.sliding_balance import Stated, stated_checks, what_fails
 from stickslip.errors import EstimateError
@@ -78,14 +78,14 @@ class Consistency(Result, Plain):
         "ok", or what can not all be true.
     slips : tuple of Slip
         What would make the channels agree, the likeliest first.
-    zero : Slip or None
-        The zero that is off, where the mean force is not zero by much.
+    zeros : tuple of Slip
+        Which zero may be off, where the mean force is not zero by much: the balance tells a load cell's from no other.
     """
 
     checks: tuple[Check, ...]
     status: str
     slips: tuple[Slip, ...] = ()
-    zero: Slip | None = None
+    zeros: tuple[Slip, ...] = ()
 
     @property
     def failed(self) -> tuple[Check, ...]:
@@ -189,7 +189,7 @@ def consistency(
     failing = any(check.verdict == FAILS for check in checks)
     slips = mixups(seen.balance, failing=failing) if seen.steady and seen.lines.cycles is not None else ()
     checks = (*checks, *slip_check(seen.balance, slips))
-    return Consistency(checks, what_fails(checks), slips, zero_off(seen))
+    return Consistency(checks, what_fails(checks), slips, zeros_off(seen))
 
 
 def silent(record: Record, names: Sequence[str]) -> dict[str, str]:

@@ -322,8 +322,9 @@ def momentum_check(seen: Seen) -> Check:
         pull = seen.rig["stiffness"] * (means.get("z", 0.0) - means["x"]) + means.get("force", 0.0)
         left, right, unit = pull, means["load"], "N"
         size = float(abs(seen.strongest("load").mean()))
-        off = float(np.mean(left) - np.mean(right))
-        sentence = f"a zero is off by {off:.3g} N, or {1e3 * off / seen.rig['stiffness']:.3g} mm of x or z"
+        off = float(np.mean(right) - np.mean(left))
+        of_x = f"{1e3 * off / seen.rig['stiffness']:.3g} mm of x"
+        sentence = f"a zero is off by {off:.3g} N of load, or {of_x}, or of z as much the other way"
     elif "a" in means:
         left, right, unit = means["a"], np.zeros(seen.lines.count), "m/s^2"
         size = float(abs(seen.strongest("a").mean()))
@@ -335,30 +336,31 @@ def momentum_check(seen: Seen) -> Check:
     return compared(name, float(np.mean(left)), float(np.mean(right)), sd=sd, unit=unit, holds=holds, fails=sentence)
 
 
-def zero_off(seen: Seen) -> Slip | None:
-    """The sensor whose zero is off by a good part of what it reads, with the cure; of x or z by what friction bears."""
+def zeros_off(seen: Seen) -> tuple[Slip, ...]:
+    """The sensors of which one's zero is off by a good part of what it reads; of x or z by what friction bears."""
     check = momentum_check(seen)
     if check.verdict != FAILS:
         return _stretched(seen)
     name = "a" if check.unit == "m/s^2" else "load"
     off = check.left if name == "a" else check.right - check.left
     if abs(off) < FAR_OFF * abs(complex(seen.strongest(name).mean())):
-        return None
-    return Slip(check.sentence, zeros={name: off})
+        return ()
+    either = {name: off} if name == "a" else {name: off, "x": off / seen.rig["stiffness"]}
+    return tuple(Slip(check.sentence, zeros={sensor: zero}) for sensor, zero in either.items())
 
 
-def _stretched(seen: Seen) -> Slip | None:
+def _stretched(seen: Seen) -> tuple[Slip, ...]:
     """A spring that pulls more on the average than friction can bear: one way twice its level, the other way none."""
     cycles, beside = seen.lines.cycles is not None and seen.knows, {"load", "force"} & set(seen.channels)
     if not cycles or beside or "z" not in seen.channels or seen.contact == "base":
-        return None
+        return ()
     k, means = seen.rig["stiffness"], seen.lines.means
     off, amplitude = float(np.mean(means["x"] - means["z"])), _mean_cycle(seen)[0]
     friction = float(seen.work(k * seen.channels["z"] - seen.drag).mean()) / (4 * amplitude)
     if friction <= 0 or abs(off) < max(2 * friction / k, FAR_OFF * amplitude):
-        return None
+        return ()
     pull = f"the spring would pull {k * abs(off):.3g} N on the average, more than the friction bears"
-    return Slip(f"a zero of x or z is off by {1e3 * off:.3g} mm: {pull}", zeros={"x": off})
+    return (Slip(f"a zero of x or z is off by {1e3 * off:.3g} mm: {pull}", zeros={"x": off}),)
 
 
 def identity_check(seen: Seen) -> Check:

@@ -114,15 +114,13 @@ def _uncertain(record: Any) -> bool:
 
 def _remedies(findings: Findings) -> list[str]:
     """The commands that read the channels without a slip that would make them agree, or state what is missing."""
-    zero = _zero_off(findings)
-    off = findings.results.get("slips") or findings.results.get("slipped")
-    slips = off or ([zero] if zero is not None else [])
+    slips = findings.results.get("slips") or findings.results.get("slipped") or _zeros_off(findings)
     return scope.corrected(findings, slips) if slips else scope.completed(findings)
 
 
-def _zero_off(findings: Findings) -> Slip | None:
-    """The zero that is off by much, where nothing graver is wrong."""
-    return findings.consistency.zero if findings.consistency is not None and not findings.contradiction else None
+def _zeros_off(findings: Findings) -> tuple[Slip, ...]:
+    """The zeros of which one is off by much, where nothing graver is wrong."""
+    return findings.consistency.zeros if findings.consistency is not None and not findings.contradiction else ()
 
 
 def _wrong(findings: Findings) -> Iterator[str]:
@@ -146,8 +144,8 @@ def _headline(findings: Findings) -> Iterator[str]:
         if findings.sticks is not None:
             yield sentence(f"{of_sticks(findings)}.")
         return
-    if zero := _zero_off(findings):
-        yield Caution(f"{sentence(zero.words)}.")
+    if zeros := _zeros_off(findings):
+        yield Caution(f"{sentence(zeros[0].words)}.")
     clauses = [_of_level(findings)] if findings.loops is not None else []
     clauses += [of_sticks(findings)] if findings.sticks is not None else []
     if findings.loops is not None:
