@@ -118,3 +118,19 @@ def test_static_friction_of_one_breakaway_is_found_beside_constants_that_are_off
     mass, stiffness = (0.996 * rig.mass, 0.005 * rig.mass), (1.01 * rig.stiffness, 0.005 * rig.stiffness)
     belief = search.believe(ss.analyze(record, mass=mass, stiffness=stiffness, damping=rig.damping).record)
     assert belief.ratio == pytest.approx(rig.static / rig.kinetic, rel=0.04)
+
+
+def test_a_load_that_swings_is_named_and_no_constant_that_is_off() -> None:
+    """Friction that follows a recorded load led to a command that corrected the spring by 10 %."""
+    fs, (m, k, c), level = 1000.0, (0.45, 1950.0, 0.36), 1e-4
+    t, w = np.arange(4000) / fs, 2 * np.pi * 4.0
+    normal = 37.0 * (1 + 0.2 * np.sin(2 * np.pi * 4.33 * t))
+    x, v, a = (1e-3 * w**n * np.sin(w * t + n * np.pi / 2) for n in range(3))
+    z = x + (m * a + c * v + 0.01 * normal * np.sign(v)) / k
+    rng = np.random.default_rng(0)
+    noisy = {name: values + level * 1e-3 * rng.standard_normal(t.size) for name, values in {"x": x, "z": z}.items()}
+    tried = ss.tried(
+        ss.analyze(ss.Record.of({**noisy, "normal": normal}, fs=fs), mass=m, stiffness=k, damping=c), twins=8
+    )
+    assert "its normal load swings by 14 %" in tried.loops.level.status
+    assert not ss.summary(tried).remedies

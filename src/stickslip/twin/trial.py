@@ -85,6 +85,7 @@ UNLIKE = 1.15  # times what noise explains, by which x may stray from its twin b
 SLIGHT, FINER = 0.01, 0.001
 BRIEF = (FALL, *STATIC, GIVES)
 RICHER = {SPEED, GIVE, RATE}
+LOADED = 0.01  # chosen: of its mean, the swing of a recorded normal load from which friction that follows it is meant
 RATIOS = {SPRING, MASS, GAIN}  # by how much they are off stands as a logarithm
 ASTRAY, UNFELT, RIVALS = "unlike its twins", "not felt", "another law as likely"  # kinds of doubt
 
@@ -154,7 +155,7 @@ class Trial:
     @property
     def slips(self) -> list[Belief]:
         """The nearest rig of each kind that has something off; none where that is slight, or does not explain x."""
-        explained = self.belief.left <= LOST and self.strays <= UNLIKE
+        explained = self.belief.left <= LOST and self.strays <= UNLIKE and _load_swing(self.belief.record) <= LOADED
         return self.belief.slips if explained and self.unlike else []
 
     def to_dict(self) -> dict[str, Any]:
@@ -270,6 +271,7 @@ class _Misfit:
     feigned: float  # N, as friction
     share: float  # by which a gain or a constant is off
     slight: bool
+    load_swing: float
 
     @classmethod
     def of(cls, belief: Belief, strays: float, repeats: float) -> _Misfit:
@@ -279,7 +281,9 @@ class _Misfit:
         most = FINER if RICHER & belief.values.keys() else SLIGHT
         little = feigned < most * belief.kinetic and share < most
         slight = little and strays <= UNLIKE and belief.left <= LOST
-        return cls(strays, repeats, belief.strain, belief.left, slip, feigned, share, bool(slight))
+        return cls(
+            strays, repeats, belief.strain, belief.left, slip, feigned, share, bool(slight), _load_swing(belief.record)
+        )
 
     @property
     def unlike(self) -> bool:
@@ -305,9 +309,18 @@ class _Misfit:
             why = ": the contact is of no kind that was tried, or that constant is less sure than stated"
         else:
             return None
+        if self.load_swing > LOADED:
+            what = f"its normal load swings by {100 * self.load_swing:.2g} %, which that of its twins does not"
+            why = ": no contact whose friction follows a recorded load was tried"
         if self.slight:
             why = f", as a force less than {100 * SLIGHT:g} % of the friction, which the intervals count"
         return Doubt(what + why, ASTRAY, lesser=self.slight)
+
+
+def _load_swing(record: Record) -> float:
+    """Standard deviation of the recorded normal load over its mean; none where none was recorded."""
+    load = record["normal"] if "normal" in record else np.ones(1)
+    return float(np.std(load) / abs(np.mean(load))) if np.mean(load) else 0.0
 
 
 def _off(belief: Belief) -> set[str]:
