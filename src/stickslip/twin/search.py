@@ -217,16 +217,18 @@ def _with_slips(belief: Belief, mapped: Map) -> Belief:
 
     Where x asks for it, it is a rival; where it leaves so much less that nothing else will do, it is believed in.
     """
+    slips = [law for law in belief.rivals if law.slipped]
     # beside a slip that explains x by itself, what a law that does not would leave with it is not asked
-    more = explains(belief) or not any(map(explains, belief.rivals))
+    more = explains(belief) or not any(map(explains, slips))
     asked = [_with_slip(belief, name) for name in SLIPS if more and _score_favours(belief, name)]
-    slips = [*belief.rivals, *mapped(partial(_refined_on, record=belief.record), asked)]
+    ends = list(mapped(partial(_refined_on, record=belief.record), asked))
+    slips, rivals = [*ends, *slips], [*belief.rivals, *ends]
     nearest = min([belief, *slips], key=misfit)
     freedom = 0.0 if nearest.fit is None else nearest.fit.freedom
     # x tells a spring that is off from a mass that is by rounding alone: the first of those that are as near
     nearest = next(law for law in [belief, *slips] if freedom * math.log(misfit(law) / misfit(nearest)) <= SETTLED)
     best = nearest if freedom * math.log(misfit(belief) / misfit(nearest)) > CERTAIN else belief
-    return replace(best, rivals=tuple(law for law in slips if law is not best and _as_likely(law, best)))
+    return replace(best, rivals=tuple(law for law in rivals if law is not best and _as_likely(law, best)))
 
 
 def _with_slip(belief: Belief, *names: str) -> Belief:
