@@ -25,7 +25,7 @@ from stickslip.law.driven import Sampled, Tones
 from stickslip.story.friction import of_sticks
 from stickslip.twin.belief import EXCESS, GAIN, LATE, SPRING
 from stickslip.twin.descent import within_ends
-from stickslip.twin.search import believe
+from stickslip.twin.search import _with_slips, believe
 from stickslip.twin.trial import ASTRAY, _Misfit, try_on_twins
 
 RATIO = "static over sliding friction"
@@ -435,6 +435,14 @@ def test_what_a_late_x_does_to_a_quick_answer_is_taken_off() -> None:
     true = record.truth["energy per cycle"]
     assert quick.loops.energy_per_cycle.value < 0.6 * true
     assert tried.loops.energy_per_cycle.value == pytest.approx(true, rel=0.03)
+
+
+def test_a_rival_with_nothing_off_is_not_believed_in_for_what_is_off() -> None:
+    """Once its slope was taken away, another law was nearer than the one believed in, and took its place unasked."""
+    nearer = replace(asked(STOPS)[1].trial.belief, rivals=())
+    further = replace(nearer.at(kinetic=1.05 * nearer.kinetic), rivals=(nearer,))
+    best = _with_slips(further, map)
+    assert best.slipped or best.values == further.values
 
 
 def test_a_slip_is_named_once_and_by_the_nearest_rig() -> None:
