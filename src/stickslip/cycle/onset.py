@@ -482,7 +482,7 @@ def _by_peak(record: Record, strokes: Strokes) -> _Borne:
         raise EstimateError(
             f"{rows:g} samples from a reversal to the slip at {record.fs:g} Hz",
             f"what the contact bears before it slips takes {FEW} at least",
-            "sample faster",
+            "sample faster, if it ever sticks",
         )
     method = "" if record.rig is None else record.rig.method
     unknown = _unstated(record, method)

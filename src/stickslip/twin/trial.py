@@ -319,8 +319,8 @@ class _Misfit:
 
 def _load_swing(record: Record) -> float:
     """Standard deviation of the recorded normal load over its mean; none where none was recorded."""
-    load = record["normal"] if "normal" in record else np.ones(1)
-    return float(np.std(load) / abs(np.mean(load))) if np.mean(load) else 0.0
+    load = record["normal"][np.isfinite(record["normal"])] if "normal" in record else np.ones(1)
+    return float(np.std(load) / abs(np.mean(load))) if load.any() and np.mean(load) else 0.0
 
 
 def _off(belief: Belief) -> set[str]:
