@@ -11,7 +11,7 @@ import pytest
 import stepped
 import stickslip as ss
 from stickslip.twin import descent, search
-from stickslip.twin.belief import BENT, EXCESS, GIVE, HELD, KINETIC, LOSS, RATE, SLOPE, Belief
+from stickslip.twin.belief import BENT, EXCESS, GIVE, HELD, KINETIC, LOSS, POWER, RATE, SLOPE, SPEED, Belief
 
 RIG = stepped.Rig("compliant", 0.52, 0.51, 0.0122, 1.02e-3, 0.248, kinetic=2.08e-4, contact=2.556, loss=0.172)
 
@@ -104,6 +104,25 @@ def test_values_that_x_does_not_tell_apart_have_a_step_without_noise_too() -> No
         assert fit is not None
         for damping in descent.DAMPINGS:
             assert np.isfinite(descent._damped_step(still, fit, damping)).all()
+
+
+def test_a_curve_whose_speed_x_does_not_tell_leaves_its_level_told() -> None:
+    """Of friction that hardly falls speed and kinetic part go together: by the speed alone a level fell to nothing."""
+    belief = nearest()
+    fastest, excess = float(np.max(np.abs(belief.record["v"]))), belief.kinetic
+    curved = belief.at(**{EXCESS: excess, SPEED: math.log(9 * fastest), POWER: 0.0})
+    falls = (curved.at(**{SPEED: curved.values[SPEED] + 1e-4}).kinetic - curved.kinetic) / 1e-4
+    assert belief.fit is not None
+    root = np.array([[-1.8 * falls], [2.0]])  # a factor of e^2 in its speed, of which the kinetic part takes up 0.9
+    low, high = descent.linear_ends(
+        replace(curved, fit=replace(belief.fit, names=(KINETIC, SPEED), root=root)), kinetic, 2.0
+    )
+    assert curved.kinetic - 0.4 * excess < low < curved.kinetic < high < curved.kinetic + 0.4 * excess
+
+
+def kinetic(rig: Belief) -> float:
+    """The sliding friction of a rig [N]."""
+    return rig.kinetic
 
 
 def test_static_friction_of_one_breakaway_is_found_beside_constants_that_are_off() -> None:
