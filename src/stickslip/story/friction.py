@@ -222,9 +222,8 @@ def _of_loops(findings: Findings) -> Iterator[str]:
     changes = loops.slope.status == "ok" and (low > 0 or high < 0)
     trial = findings.trial
     curved = trial is not None and not trial.unlike and math.isfinite(trial.belief.fall_speed)
-    ratio = findings.breakaway.ratio if curved and findings.breakaway is not None else None
-    falls = ratio is not None and stands(ratio.status) and ratio.interval[0] > 1
-    if falls and ratio is not None:
+    ratio = _surely_static(findings) if curved else None
+    if ratio is not None:
         belief = trial.belief
         static = number(belief.static, ratio.sd * belief.kinetic, loops.level.unit)
         speed = number(belief.fall_speed, 0.1 * belief.fall_speed, "m/s")
@@ -232,10 +231,16 @@ def _of_loops(findings: Findings) -> Iterator[str]:
         yield f"Friction falls from {static} at rest as it begins to slide, about a speed of {speed}{line}."
     elif changes:
         yield f"Friction {'rises' if low > 0 else 'falls'} with speed, by {value_of(loops.slope)}."
-    if loops.slope.status == "ok" and not changes and math.isfinite(low + high) and (falls or not curved):
+    if loops.slope.status == "ok" and not changes and math.isfinite(low + high) and (ratio is not None or not curved):
         power = findings.trial and findings.trial.felt.get(loops.slope.name)
         seen = f": {value_of(loops.slope, power.felt)} would be" if power else ""
-        yield f"No {'other ' if falls else ''}change of friction with speed is resolved{seen}."
+        yield f"No {'other ' if ratio is not None else ''}change of friction with speed is resolved{seen}."
+
+
+def _surely_static(findings: Findings) -> Estimate | None:
+    """Static over sliding friction, where it surely exceeds one."""
+    ratio = findings.breakaway.ratio if findings.breakaway is not None else None
+    return ratio if ratio is not None and stands(ratio.status) and ratio.interval[0] > 1 else None
 
 
 def of_sticks(findings: Findings) -> str:

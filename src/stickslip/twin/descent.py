@@ -27,6 +27,7 @@ LEARNS = 0.5  # of what was left, that a step leaves at most where its slopes ar
 # Chi-squared below which a pass gains nothing. As a share of what is left, 1e-4 stopped in the valley of a damped
 # contact's stiffness, 13 above its floor; 1e-3, in bristles' (seed 911).
 SETTLED = 0.1
+BENDS = 1.0  # chosen: of the logarithm of a curve's speed or exponent, beyond which no value is a line in them
 LITTLE = 0.01  # of a standard deviation: a step so small that a value is linear in it
 
 
@@ -220,10 +221,11 @@ def _along_line(belief: Belief, rig: Belief, value: Callable[[Belief], float]) -
     """
     moved = {name: rig.values[name] - known for name, known in belief.values.items()}
     far = max((abs(moved[name]) for name in (SPEED, POWER) if name in moved), default=0.0)
-    if far <= 1.0:
+    if far <= BENDS:
         return value(rig)
-    nearer = belief.at(**{name: belief.values[name] + step / far for name, step in moved.items()})
-    return value(belief) + far * (value(nearer) - value(belief))
+    part = BENDS / far
+    nearer = belief.at(**{name: belief.values[name] + part * step for name, step in moved.items()})
+    return value(belief) + (value(nearer) - value(belief)) / part
 
 
 def _displaced(belief: Belief, fit: Fit, way: Array, deviations: float) -> Belief:

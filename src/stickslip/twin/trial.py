@@ -145,7 +145,11 @@ class Trial:
     @property
     def doubt(self) -> Doubt | None:
         """Why the record is not of the kind of its twins; None where it is."""
-        return _Misfit.of(self.belief, self.strays, self.repeats).doubt
+        return self._misfit.doubt
+
+    @property
+    def _misfit(self) -> _Misfit:
+        return _Misfit.of(self.belief, self.strays, self.repeats)
 
     @property
     def unlike(self) -> bool:
@@ -155,8 +159,9 @@ class Trial:
     @property
     def slips(self) -> list[Belief]:
         """The nearest rig of each kind that has something off; none where that is slight, or does not explain x."""
-        explained = self.belief.left <= LOST and self.strays <= UNLIKE and _load_swing(self.belief.record) <= LOADED
-        return self.belief.slips if explained and self.unlike else []
+        misfit = self._misfit
+        explained = misfit.left <= LOST and misfit.strays <= UNLIKE and misfit.load_swing <= LOADED
+        return self.belief.slips if explained and misfit.unlike else []
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON: how many, the law believed in, what would be felt, and how far x strays."""
