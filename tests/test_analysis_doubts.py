@@ -96,11 +96,14 @@ def test_a_mount_that_is_not_stated_is_told_beside_the_friction() -> None:
 
 
 def test_a_mount_found_is_said_of_its_own_sensor() -> None:
-    """It read "how a (found in this record) and load are mounted"."""
+    """It read "how a (found in this record) and load are mounted", where the load cell was left aside too."""
     given = of("x", "z", "a", "load")
-    doubt = _doubt(given.with_details("a", mount=(125.0, 0.1)), given, ss.rig.rig_settings(RIG), aligned=False)
-    assert doubt is not None
-    assert doubt.words.startswith("how a (its mount found in this record) and load are mounted is not stated")
+    record = given.with_details("a", mount=(125.0, 0.1))
+    for method, others in (("fusion", "and load are"), ("smoother", "is")):
+        used = replace(record, rig=ss.friction_force(given, method=method, **RIG).rig)
+        doubt = _doubt(used, given, ss.rig.rig_settings(RIG), aligned=False)
+        assert doubt is not None
+        assert doubt.words.startswith(f"how a (its mount found in this record) {others} mounted is not stated")
 
 
 def test_sensors_that_are_not_there_or_left_out_are_not_missed() -> None:

@@ -249,9 +249,9 @@ def test_a_long_record_in_blocks_says_the_same(monkeypatch: pytest.MonkeyPatch) 
     assert parts.sd == pytest.approx(whole.sd, rel=0.15)
 
 
-def square(offset: float, delay: float, *, filtered: bool) -> ss.Record:
-    """x and a of an acceleration of +-1 m/s^2 that jumps each 20 samples, `offset` samples after one; a is late."""
-    rng, turn = np.random.default_rng(1), 2 * math.pi * FS / 40
+def square(offset: float, delay: float, *, filtered: bool, cycle: float = 40.0) -> ss.Record:
+    """x and a of an acceleration of +-1 m/s^2, jumping twice in `cycle` samples, `offset` after one; a is late."""
+    rng, turn = np.random.default_rng(1), 2 * math.pi * FS / cycle
     waves = turn * np.arange(1, 16 if filtered else 400, 2)[:, None]  # up to 0.375 of the rate
     times = T - offset / FS
     x = np.sum(-4 * turn / math.pi / waves**3 * np.sin(waves * times), axis=0)
@@ -276,6 +276,14 @@ def test_jumps_sampled_without_a_filter_leave_a_delay_unknown_by_half_a_sample(o
     filtered = ss.balance.sensor_delay(square(offset, delay, filtered=True)).delay
     assert filtered.includes(delay)
     assert filtered.sd * FS < 0.02
+
+
+@pytest.mark.parametrize("cycle", [40.0, 37.3, 203.7, 1013.1])
+def test_jumps_sampled_without_a_filter_are_no_difference_of_the_sensors(cycle: float) -> None:
+    """Put into the middle of their intervals they left 2.6 to 17 times the power of the noise of exact sensors."""
+    lag = ss.balance.sensor_delay(square(0.3, 0.0, filtered=False, cycle=cycle))
+    assert lag.delay.includes(0.0)
+    assert "more than noise" not in lag.status
 
 
 def test_unresolved_jumps_are_those_that_no_sample_lies_on() -> None:

@@ -12,7 +12,7 @@ import numpy as np
 from stickslip.answers.findings import Inquiry
 from stickslip.arrays import Array, stretches
 from stickslip.balance.felt_and_computed import ForceComparison, compare_force
-from stickslip.balance.force import friction_force
+from stickslip.balance.force import friction_force, sensors_behind
 from stickslip.balance.lag import HIDDEN, REPEATS, SensorDelay, sensor_delay
 from stickslip.balance.mass import mass_and_stiffness
 from stickslip.balance.motion import CREEP, LEAST, is_measured
@@ -433,8 +433,8 @@ def _doubt(record: Record, given: Record, rig: RigSettings, *, aligned: bool) ->
         return None
     sensors = [
         name if record.channels[name].mount is None else f"{name} (its mount found in this record)"
-        for name in ("a", "load")
-        if is_measured(record, name) and given.channels[name].mount is None
+        for name in sorted(sensors_behind(record))
+        if given.channels[name].mount is None
     ]
     unknown = [f"how {' and '.join(sensors)} {'is' if len(sensors) == 1 else 'are'} mounted"] if sensors else []
     if aligned:

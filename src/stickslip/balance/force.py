@@ -10,6 +10,7 @@ import numpy as np
 
 from stickslip.arrays import Array
 from stickslip.balance.balance import (
+    ALONE,
     FRICTION,
     Rig,
     as_measured,
@@ -22,7 +23,7 @@ from stickslip.balance.balance import (
 )
 from stickslip.balance.fusion import fuse
 from stickslip.balance.mass import mass_and_stiffness, stiffness_per_mass
-from stickslip.balance.motion import require_change, require_fit
+from stickslip.balance.motion import is_measured, require_change, require_fit
 from stickslip.errors import EstimateError, ModelError
 from stickslip.estimate import NORMAL_95, Constant, Estimate
 from stickslip.record.record import Record, StatedRig, Step, require_record
@@ -217,6 +218,14 @@ def _balanced(record: Record, rig: Rig, method: str, requested: str) -> Record:
         "averaged over five points" if method == "F1" else "as read",
     ]
     return with_friction(with_motion(record, derive), force, np.sqrt(variance), StatedRig(method, **asdict(rig)), notes)
+
+
+def sensors_behind(record: Record) -> list[str]:
+    """The sensors whose mounts are in the friction of a record, the load cell first."""
+    method = "" if record.rig is None else record.rig.method
+    by_cell = method in (ALONE, "F2") or ("friction" in record and record.channels["friction"].source == "load")
+    sensors = ("load",) if by_cell else FUSIONS.get(method, ("a",))
+    return [name for name in ("load", "a") if name in sensors and is_measured(record, name)]
 
 
 def _lacking(record: Record, requested: str, wanted: Sequence[str]) -> list[str]:

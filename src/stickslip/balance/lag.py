@@ -145,7 +145,8 @@ def sensor_delay(
             raise EstimateError(f"{len(records)} records", "the least residual is that of one", "pass them one by one")
         return _by_residual(records[0], channels)
     pairs, mount = [_pair(record, channels, order) for record in records], records[0].channels[channels[1]].mount
-    limited, sooner = _limited(pairs, channels)
+    jumps = [unresolved_jumps(pair.second) for pair in pairs] if channels[1] == "a" else []
+    limited, sooner = _limited(pairs, jumps)
     alignment, free, others = _fit(limited, mount, sooner)
     gain, spread = alignment.theta[1], alignment.sd([0, 1, 0, 0])
     if abs(gain) < FAINT * spread:
@@ -163,12 +164,14 @@ def sensor_delay(
                 "the channels are swapped",
                 "name them the other way round when reading",
             )
-    return _answer(alignment, free, others, mount, channels)
+    # A jump lies anywhere in its interval, and where may repeat itself: all that this strays by is at the lines then.
+    strays = sum(float(np.sum(own.sizes**2)) / pair.noise[1] ** 2 for pair, own in zip(pairs, jumps, strict=False)) / 12
+    most = UNEXPLAINED * max(1.0, strays / (2 * len(alignment.lines.turn)))
+    return _answer(alignment, free, others, mount, channels, most=most)
 
 
-def _limited(pairs: Sequence[Pair], channels: tuple[str, str]) -> tuple[Sequence[Pair], Sequence[Pair]]:
+def _limited(pairs: Sequence[Pair], jumps: Sequence[Jumps]) -> tuple[Sequence[Pair], Sequence[Pair]]:
     """The pairs with unresolved jumps of an acceleration band-limited, and with them half a sample sooner if any."""
-    jumps = [unresolved_jumps(pair.second) for pair in pairs] if channels[1] == "a" else []
     if not any(own.unresolved for own in jumps):
         return pairs, ()
     limited, sooner = (
@@ -264,15 +267,17 @@ def _answer(
     others: Sequence[Alignment],
     mount: tuple[float, float] | None,
     channels: tuple[str, str],
+    *,
+    most: float,
 ) -> SensorDelay:
-    """What the fit supports; `free` is the one whose mount is free."""
+    """What the fit supports; `free` is the one whose mount is free, and `most` what it may leave of the noise."""
     (first, second), method, fitted = channels, "phase of all lines that both channels show", alignment is free
     gain = alignment.theta[1]
     alike = [other.delay for other in others if gain < 0 or other.theta[1] > 0]
     hidden = (
         second == "a" and not fitted and mount is None and free.sd([1, 0, 0, 0]) > MASKED * alignment.sd([1, 0, 0, 0])
     )
-    status = _status(alignment, alike, channels, hidden=hidden)
+    status = _status(alignment, alike, channels, hidden=hidden, unlike=alignment.unexplained > most)
     low, high = alignment.lines.turn.min() / (2 * math.pi), alignment.lines.turn.max() / (2 * math.pi)
     stated = f"held at {mount[0]:g} Hz and {mount[1]:g}, as stated" if mount else "taken to be rigid"
     moved = abs(float(alignment.moved[0]))
@@ -299,7 +304,7 @@ def _answer(
     return SensorDelay(delay, gained, frequency, damping, tuple(alike), channels, "phase", status)
 
 
-def _status(pair: Alignment, others: Sequence[float], channels: tuple[str, str], *, hidden: bool) -> str:
+def _status(pair: Alignment, others: Sequence[float], channels: tuple[str, str], *, hidden: bool, unlike: bool) -> str:
     (first, second), gain = channels, pair.theta[1]
     doubts: list[Doubt | str] = []
     if gain < 0:
@@ -318,7 +323,7 @@ def _status(pair: Alignment, others: Sequence[float], channels: tuple[str, str],
             "motion does not tell them apart; state the mount, or give runs at other frequencies too"
         )
         doubts.append(Doubt(sentence, HIDDEN))
-    if pair.unexplained > UNEXPLAINED:
+    if unlike:
         doubts.append(
             f"{first} and {second} differ by more than noise, a delay and a mount ({pair.unexplained:.3g} times the "
             "power of the noise); the intervals are widened"

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from stickslip.balance.balance import ALONE, Balance, gains_unsure
-from stickslip.balance.force import FUSIONS
+from stickslip.balance.force import FUSIONS, sensors_behind
 from stickslip.balance.motion import FORCES, is_measured, motion_channels
 from stickslip.cycle.slips import FAST, Stroke, Strokes, find_strokes, ringing_of, sliding_swing
 from stickslip.cycle.static_peak import LEAST, Peak, begun, unseen
@@ -496,7 +496,7 @@ def _by_peak(record: Record, strokes: Strokes) -> _Borne:
             f"static friction is told where it strays by less than {100 * NOTHING:.0f} % of its level",
             unknown or "give a record with less noise",
         )
-    best = next(iter(_used(record, method)), "x")
+    best = next(iter(sensors_behind(record)), "x")
     fall = float(np.median(friction)) - level
     corner = max(BLUNT[best] * float(np.median([_steepest(stroke) for stroke in chosen])), ROUNDED[best] * fall)
     blurred = "told from the displacement alone, which blurs a peak" if best == "x" else "ok"
@@ -504,15 +504,9 @@ def _by_peak(record: Record, strokes: Strokes) -> _Borne:
     return _Borne(chosen, friction, PEAK, max(noise, corner / 4) + stray, corner + stray, status)
 
 
-def _used(record: Record, method: str) -> list[str]:
-    """The sensors behind a friction that a method found, without its displacements."""
-    sensors = ("load",) if method == ALONE else FUSIONS.get(method, ("a",))
-    return [name for name in ("load", "a") if name in sensors and is_measured(record, name)]
-
-
 def _unstated(record: Record, method: str) -> str:
     """What of the sensors behind the friction is taken as it reads, in words."""
-    names = _used(record, method)
+    names = sensors_behind(record)
     if method in (*FUSIONS, ALONE):
         names = [name for name in names if record.channels[name].mount is None]
         how = "is not stated, and its ringing is in it: state it, by with_details or under [sensors] in the rig file"
