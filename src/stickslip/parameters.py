@@ -175,6 +175,8 @@ def _entry(of: Field[Any]) -> Iterator[str]:
 
 def finite(name: str, value: float, *, unit: str, positive: bool = False, signed: bool = False) -> float:
     """`value`, if the parameter can have it: finite, and not negative unless `signed`, not zero if `positive`."""
+    if type(value) is float and 0.0 < value < math.inf:  # as nearly all are: a fit asks some hundred times a trial
+        return value
     try:
         known, number = math.isfinite(value), float(value)
     except (TypeError, ValueError):
@@ -218,7 +220,10 @@ def find(system: Any, name: str) -> tuple[Path, ...]:
     ModelError
         No parameter has that name.
     """
-    known = places(system)
+    return _places_of(places(system), name)
+
+
+def _places_of(known: Mapping[Path, Any], name: str) -> tuple[Path, ...]:
     own = tuple(name.split("."))
     if own in known:
         return (own,)
@@ -256,7 +261,8 @@ def changed(system: Part, changes: Mapping[str, Any]) -> Part:
     """The system with other values: whole parts first, then what stands in them."""
     whole = {name: value for name, value in changes.items() if name.rpartition(".")[2] in PARTS and find(system, name)}
     for some in (whole, {name: value for name, value in changes.items() if name not in whole}):
-        system = _rebuilt(system, {path: value for name, value in some.items() for path in find(system, name)})
+        known = places(system) if some else {}
+        system = _rebuilt(system, {path: value for name, value in some.items() for path in _places_of(known, name)})
     return system
 
 

@@ -99,7 +99,7 @@ class Tones(Measured):
 
     def __call__(self, begin: float, end: float, off: ArrayLike = ()) -> Drive:
         """The drive whose time 0 is `begin`."""
-        share, angle, turns = np.pad(np.asarray(off), (0, 3 - np.size(off)))
+        share, angle, turns = (*np.ravel(off).tolist(), 0.0, 0.0, 0.0)[:3]
         slower = turns / self.length
         moved = []
         for order, (size, f, phase) in enumerate(self.tones, start=1):

@@ -173,7 +173,7 @@ def answered(
     system = replace(problem, profile=None).system(point.u)
     traces, sums, counts, noise = [], dict[str, float](), dict[str, int](), dict[str, float]()
     for j in range(len(problem.stretches)):
-        stretch, time, measured, fitted = problem.mounted(point.u, j), {}, {}, {}
+        stretch, time, measured, fitted = point.stretches[j], {}, {}, {}
         gains = problem.sensor_knobs(point.u, "gain", j)
         for sensor, raw, passed in zip(stretch.sensors, point.raw[j], point.passed[j], strict=True):
             name = sensor.channel.name

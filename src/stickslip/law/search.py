@@ -92,6 +92,8 @@ class Point:
     starts : tuple of ndarray
         Displacement, velocity and memory at each stretch's start, as coordinates of its scales, and by how much its
         drive is off.
+    stretches : tuple of Stretch
+        As they are read there, each sensor on its mount as the knobs have it.
     raw : tuple of tuple of ndarray
         What each sensor of each stretch would read with a gain of one.
     passed : tuple
@@ -107,6 +109,7 @@ class Point:
 
     u: Array
     starts: tuple[Array, ...]
+    stretches: tuple[Stretch, ...]
     raw: tuple[tuple[Array, ...], ...]
     passed: tuple[tuple[Index | None, ...], ...]
     runs: tuple[Trajectory, ...]
@@ -215,16 +218,18 @@ class Problem:
     def at(self, u: Array, starts: tuple[Array, ...]) -> Point:
         """Simulate all stretches; chi squared is infinite where the engine refuses."""
         raw, passed, runs, residuals = [], [], [], []
+        nowhere = Point(u, starts, (), (), (), (), (), math.inf)
         try:
             system = self.system(u)
         except ModelError:
-            return Point(u, starts, (), (), (), (), math.inf)
-        for j in range(len(self.stretches)):
-            stretch, delays, gains = self.mounted(u, j), self.delays(u, j), self.sensor_knobs(u, "gain", j)
+            return nowhere
+        stretches = tuple(self.mounted(u, j) for j in range(len(self.stretches)))
+        for j, stretch in enumerate(stretches):
+            delays, gains = self.delays(u, j), self.sensor_knobs(u, "gain", j)
             off = starts[j][len(self.scales[j]) :]
             run = attempted(stretch, system, self.start(j, starts[j]), off)
             if run is None:
-                return Point(u, starts, (), (), (), (), math.inf)
+                return nowhere
             runs.append(run)
             read = stretch.told(run, delays)
             raw.append(tuple(values for values, _ in read))
@@ -237,7 +242,7 @@ class Problem:
         residuals[0] = np.append(residuals[0], self._trust() @ ([knob.mean for knob in self.knobs] - u))
         chi2 = sum(float(r @ r) for r in residuals)
         chi2 = chi2 if math.isfinite(chi2) else math.inf
-        return Point(u, starts, tuple(raw), tuple(passed), tuple(runs), tuple(residuals), chi2)
+        return Point(u, starts, stretches, tuple(raw), tuple(passed), tuple(runs), tuple(residuals), chi2)
 
     def _trust(self) -> Array:
         """Rows that hold what is known beforehand to it, over the coordinates."""
@@ -254,8 +259,7 @@ class Problem:
         """Derivatives by the knobs and by each stretch's own start; None where the engine refuses a neighbour."""
         moving = [k for k, knob in enumerate(self.knobs) if knob.kind not in OF_SENSORS]
         system, tangents = self.system(point.u), []
-        for j in range(len(self.stretches)):
-            stretch = self.mounted(point.u, j)
+        for j, stretch in enumerate(point.stretches):
             changed = self._changed(point, j, moving, system)
             if changed is None:
                 return None
@@ -271,7 +275,7 @@ class Problem:
                 for k, knob in enumerate(self.knobs):
                     whose = (sensor.channel.name, *DRIVES)
                     if knob.kind in OF_SENSORS and knob.channel in whose and knob.stretch in (None, j):
-                        shared[part, k] = self._sensed(point, (j, s, k), motion, sensor, gain)
+                        shared[part, k] = self._sensed(point, (j, s, k), motion, gain, point.residuals[j][part])
             own[rows[-1].stop :, len(self.scales[j]) :] = np.diag(1 / np.array(stretch.drive.unsure))
             tangents.append(Slopes(shared, own))
         trust = self._trust()
@@ -279,18 +283,17 @@ class Problem:
         tangents[0] = Slopes(np.vstack([shared, trust]), np.vstack([own, np.zeros((len(trust), own.shape[1]))]))
         return tangents
 
-    def _sensed(self, point: Point, at: tuple[int, int, int], motion: Motion, sensor: Sensor, gain: float) -> Array:
-        """Derivative of what sensor s of stretch j would read by knob k, which is its own."""
+    def _sensed(self, point: Point, at: tuple[int, int, int], motion: Motion, gain: float, left: Array) -> Array:
+        """Derivative of what sensor s of stretch j would read by knob k, which is its own; `left` are its residuals."""
         j, s, k = at
-        knob, raw, passed = self.knobs[k], point.raw[j][s], point.passed[j][s]
+        knob, sensor, passed = self.knobs[k], point.stretches[j].sensors[s], point.passed[j][s]
         if knob.kind == "gain":
-            return sensor.freed(knob.scale * raw, passed)
+            return sensor.freed(knob.scale * point.raw[j][s], passed)
         moved = point.u + STEP * np.eye(len(self.knobs))[k]
-        near = self.mounted(moved, j).sensors[s]
-        read, _ = near.predicted(motion, self.delays(moved, j)[sensor.channel.name])
-        pairs = ((sensor, raw), (near, read))
-        left, beside = (mounted.freed(sensor.readings - gain * readings, passed) for mounted, readings in pairs)
-        return np.asarray((left - beside) / STEP)
+        if knob.kind in OF_MOUNTS:
+            sensor = sensor.remounted(**{knob.kind: knob.value(moved[k]) / knob.value(point.u[k])})
+        read, _ = sensor.predicted(motion, self.delays(moved, j)[sensor.channel.name])
+        return np.asarray((left - sensor.freed(sensor.readings - gain * read, passed)) / STEP)
 
     def _changed(self, point: Point, j: int, moving: Sequence[int], system: Oscillator) -> list[Array] | None:
         """Derivatives of what the sensors of stretch j would read: by the knobs that move the mass, and its start."""
@@ -304,7 +307,7 @@ class Problem:
                 return None
         if hasattr(system.law, "rates"):
             return self._differences(point, j, nearby, system)
-        stretch, size = self.mounted(point.u, j), len(self.scales[j])
+        stretch, size = point.stretches[j], len(self.scales[j])
         off = point.starts[j][size:]
         neighbours, scaled = [stretch.driven(neighbour, off) for neighbour in nearby], []
         if isinstance(stretch.drive, Sampled):
@@ -325,7 +328,7 @@ class Problem:
         self, point: Point, j: int, nearby: Sequence[Oscillator], system: Oscillator
     ) -> list[Array] | None:
         """As `_changed`, of a curved law: forward differences of its motion."""
-        stretch, start, size = self.mounted(point.u, j), point.starts[j], len(self.scales[j])
+        stretch, start, size = point.stretches[j], point.starts[j], len(self.scales[j])
         beside = [(neighbour, start) for neighbour in nearby] + [
             (system, start + STEP * unit) for unit in np.eye(len(start))
         ]

@@ -16,7 +16,7 @@ from stickslip.law.driven import DriveFrom
 from stickslip.oscillator import Oscillator
 from stickslip.record.channels import Channel
 from stickslip.record.record import Record
-from stickslip.signals.response import Response, leak, resonance, respond
+from stickslip.signals.response import Response, leak, resonance, respond, ring
 from stickslip.solve.sensitivity import Sensitivity
 from stickslip.solve.simulate import simulate
 from stickslip.solve.trajectory import Trajectory
@@ -33,16 +33,18 @@ class Motion:
     """What sensors feel of a run: those that ask for the same instants share the answer."""
 
     def __init__(self, run: Trajectory, outputs: tuple[str, ...]) -> None:
-        self.run, self.outputs, self.breaks = run, outputs, run.starts
-        self.known: dict[bytes, tuple[dict[str, Array], Index]] = {}
+        self.run, self.breaks = run, run.starts
+        self.outputs = {False: tuple(name for name in outputs if name not in JUMPS), True: outputs}
+        self.known: dict[tuple[bytes, bool], tuple[dict[str, Array], Index]] = {}
 
-    def __call__(self, at: Array) -> tuple[dict[str, Array], Index]:
-        """Values by name, and how many events of the run each instant has passed."""
-        key = at.tobytes()
+    def __call__(self, at: Array, source: str) -> tuple[dict[str, Array], Index]:
+        """Values of an output and its like by name (forces cost more), and how many events each instant has passed."""
+        key = at.tobytes(), source in JUMPS
         if key not in self.known:
-            values, piece = self.run.sample(np.clip(at, 0.0, self.run.duration), self.outputs)
+            outputs = self.outputs[key[1]]
+            values, piece = self.run.sample(np.clip(at, 0.0, self.run.duration), outputs)
             passed = np.searchsorted(self.run.event_pieces, piece, side="right")
-            self.known[key] = dict(zip(self.outputs, values, strict=True)), passed
+            self.known[key] = dict(zip(outputs, values, strict=True)), passed
         return self.known[key]
 
 
@@ -90,8 +92,8 @@ class Sensor:
         time = np.arange(first, last) / record.fs - channel.delay - span[0]
         return cls(channel, slice(first, last), time, record[name][first:last], noise)
 
-    def remounted(self, frequency: float, damping: float) -> Sensor:
-        """The sensor, its mount's resonance and damping ratio so many times those stated."""
+    def remounted(self, frequency: float = 1.0, damping: float = 1.0) -> Sensor:
+        """The sensor, its mount's resonance and damping ratio so many times those that it has."""
         if (frequency, damping) == (1.0, 1.0) or self.channel.mount is None:
             return self
         stated = self.channel.mount
@@ -117,13 +119,13 @@ class Sensor:
         source, inertia = SENSED[self.channel.name], self.channel.inertia
 
         def sensed(at: Array) -> Array:
-            values, _ = run(at)
+            values, _ = run(at, "a" if inertia else source)
             return values[source] + inertia * values["a"] if inertia else values[source]
 
         at = self.time - late
         if self.response.poles:
             return respond(sensed, breaks=run.breaks, times=at, response=self.response, nodes=NODES), None
-        return sensed(at), run(at)[1] if source in JUMPS else None
+        return sensed(at), run(at, source)[1] if source in JUMPS else None
 
     def changed(self, motion: Sensitivity, late: float) -> Array:
         """Derivatives of what it would read (n, K): a jump that comes later has left out its own impulse."""
@@ -140,13 +142,10 @@ class Sensor:
         changed = respond(sensed, breaks=motion.run.starts, times=at, response=self.response, nodes=NODES)
         jumps = motion.jumps(source) + (inertia * motion.jumps("a") if inertia else 0.0)
         jumped = np.flatnonzero(np.abs(jumps) > JUMPED * np.abs(jumps).max(initial=0.0))
-        after = at[:, None] - motion.run.starts[1:][jumped]
-        rung = np.zeros(after.shape)
-        for pole, residue in zip(self.response.poles, self.response.residues, strict=True):
-            if pole.imag >= 0:  # its conjugate speaks for both
-                twice = 2.0 if pole.imag > 0 else 1.0
-                rung += np.where(after > 0, twice * (residue * np.exp(pole * np.maximum(after, 0.0))).real, 0.0)
-        return np.asarray(changed.T - (rung * jumps[jumped]) @ motion.later[1:][jumped])
+        struck = motion.run.starts[1:][jumped], -jumps[jumped, None] * motion.later[1:][jumped]
+        filter_ = np.array(self.response.poles), np.array(self.response.residues)
+        ring(filter_, at, struck, np.empty(len(changed), dtype=complex), changed.T)
+        return changed.T
 
     @cached_property
     def response(self) -> Response:

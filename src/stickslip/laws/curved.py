@@ -123,8 +123,10 @@ class Expression:
     @property
     def symbols(self) -> frozenset[str]:
         """Names of the symbols that it is made of."""
-        own = {self.name} if self.kind == "symbol" else set()
-        return frozenset(own.union(*(part.symbols for part in self.parts)))
+        inner = [self]
+        for part in inner:
+            inner += part.parts
+        return frozenset(part.name for part in inner if part.kind == "symbol")
 
     def put(self, values: Mapping[str, Expression]) -> Expression:
         """The same formula with other expressions in the place of symbols.
@@ -403,10 +405,10 @@ def _ratio(form: Row, of: Row) -> float | None:
 def _curved(low: CurvedMode, up: CurvedMode, speed: float) -> CurvedMode | None:
     assert low.friction is not None
     assert up.friction is not None
+    if not differs(low.friction, up.friction, v=speed):
+        return None
     at = {"v": lifted(speed)}
     below, above = low.friction.put(at), up.friction.put(at)
-    if not differs(below, above):
-        return None
     share = (symbol("f") - below) / (above - below)
     rates = dict[str, Expression]()
     for name in {**low.rates, **up.rates}:
@@ -416,12 +418,12 @@ def _curved(low: CurvedMode, up: CurvedMode, speed: float) -> CurvedMode | None:
     return CurvedMode("", "", 0, None, exits, rates, levels={"above": above, "below": below})
 
 
-def differs(below: Expression, above: Expression) -> bool:
-    """Whether two expressions differ, at values of their symbols at which both have one."""
-    names = sorted(below.symbols | above.symbols)
+def differs(below: Expression, above: Expression, **known: float) -> bool:
+    """Whether two expressions differ, at values of their symbols at which both have one; some of these are known."""
+    names = sorted((below.symbols | above.symbols) - known.keys())
     for values in _values(names):
         try:
-            a, b = below.at(**values), above.at(**values)
+            a, b = below.at(**values, **known), above.at(**values, **known)
         except ModelError:
             continue
         if abs(a - b) > ALIKE * max(abs(a), abs(b)):

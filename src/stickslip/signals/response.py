@@ -115,19 +115,20 @@ def respond(
     grid = times[0] + step * np.arange(-ahead, len(times))
     pieces = max(1, math.ceil(max(abs(pole) for pole in response.poles) * step / TURN))
     finer = step * np.arange(pieces) / pieces
-    rule, first_input = gauss(nodes), np.asarray(values(after[:1]))
-    lead, inputs = first_input.shape[:-1], first_input.size
+    rule, factors = gauss(nodes), np.empty(nodes, dtype=complex)
     poles, residues = np.array(response.poles), np.array(response.residues)
-    states, began = np.zeros((inputs, len(poles)), dtype=complex), np.zeros((inputs, 1))
-    factors, answer = np.empty(nodes, dtype=complex), np.zeros((inputs, len(grid)))
     for first in range(0, len(grid) - 1, BLOCK):
         part = grid[first : first + BLOCK + 1]
         inside = breaks[slice(*np.searchsorted(breaks, part[[0, -1]]))]
         parts = (part[:-1, None] + finer).ravel(), part[-1:], inside, np.zeros(int(part[0] < 0 < part[-1]))
         edges = np.sort(np.concatenate(parts))
         at = edges[:-1, None] + np.diff(edges)[:, None] * rule[0]
-        forced = np.asarray(values(np.maximum(at, 0.0).ravel())).reshape(inputs, *at.shape)
-        began = began if first else forced[:, 0, :1].copy()  # the grid starts before 0
+        forced = np.asarray(values(np.maximum(at, 0.0).ravel()))
+        lead, forced = forced.shape[:-1], forced.reshape(-1, *at.shape)
+        inputs = len(forced)
+        if not first:
+            states, answer = np.zeros((inputs, len(poles)), dtype=complex), np.zeros((inputs, len(grid)))
+            began = forced[:, 0, :1].copy()  # the grid starts before 0
         ends = np.searchsorted(edges, part[1:])
         for k in range(inputs):
             filter_ = poles, residues, states[k]
@@ -176,6 +177,32 @@ def follow(filter_: Any, edges: Array, ends: Any, forced: Array, rule: Any, fact
                 k += 1
             out[e] += (residue * state).real
         states[p] = state
+
+
+@compiled(**FAST)
+def ring(filter_: Any, times: Array, struck: Any, states: Complex, out: Array) -> None:
+    """Add to `out` (n, K) what the poles answer at increasing `times` to impulses: `struck` are their instants, and how
+    large each is in each of K inputs (J, K); `states` (K,) is scratch."""
+    poles, residues = filter_
+    instants, impulses = struck
+    for p in range(len(poles)):
+        pole, residue, j = poles[p], residues[p], 0
+        if pole.imag < 0.0:
+            continue  # its conjugate speaks for both
+        if pole.imag > 0.0:
+            residue *= 2.0
+        states[:] = 0.0
+        for i in range(len(times)):
+            decay = cmath.exp(pole * (times[i] - times[i - 1])) if i else 0.0 * pole
+            for k in range(len(states)):
+                states[k] *= decay
+            while j < len(instants) and instants[j] < times[i]:
+                decay = cmath.exp(pole * (times[i] - instants[j]))
+                for k in range(len(states)):
+                    states[k] += decay * impulses[j, k]
+                j += 1
+            for k in range(len(states)):
+                out[i, k] += (residue * states[k]).real
 
 
 def derivative_spectra(values: Array, *, fs: float, orders: Sequence[int], shift: float = 0.0) -> Complex:

@@ -33,7 +33,9 @@ def combined(terms: Iterable[tuple[float, Form]]) -> Form:
         constant += factor * value
         for node, weight in part.items():
             weights[node] = weights.get(node, 0.0) + factor * weight
-    return {node: weight for node, weight in weights.items() if weight != 0.0}, constant
+    if 0.0 in weights.values():
+        weights = {node: weight for node, weight in weights.items() if weight != 0.0}
+    return weights, constant
 
 
 class Bound:
@@ -42,6 +44,8 @@ class Bound:
     def __init__(self, mass: Array, inverse: Array, rows: Array) -> None:
         self.mass, self.inverse, self.rows = mass, inverse, rows
         self.count, self.degrees = rows.shape
+        if not self.count:
+            return
         whole = self.count == self.degrees  # nothing is free
         self.share: Array = np.asarray(np.linalg.inv(rows @ inverse @ rows.T), dtype=np.float64)
         self.spread = rows.T @ np.linalg.inv(rows @ rows.T) if whole else inverse @ rows.T @ self.share
@@ -50,6 +54,8 @@ class Bound:
 
     def friction(self, force: Sequence[Form], acceleration: Sequence[Form]) -> list[Form]:
         """Forces of the contacts that hold, by the forces on the masses and the accelerations of the counter-face."""
+        if not self.count:
+            return []
         if self.count < self.degrees:
             return _through(
                 self.share,
@@ -115,10 +121,11 @@ class Operations:
         """A node's number; a new one only where no equal one is there."""
         weights = sorted(form[0].items())  # in whatever order a law has written them: one code serves all
         key = (kind, left, right, power, tuple(weights), form[1])
-        if key not in self.known:
-            self.known[key] = self.size + len(self.rows)
+        known = self.known.get(key)
+        if known is None:
+            known = self.known[key] = self.size + len(self.rows)
             self.rows.append((kind, left, right, power, (dict(weights), form[1])))
-        return self.known[key]
+        return known
 
     def node(self, form: Form) -> int:
         """The node that has a linear form's value."""

@@ -170,10 +170,9 @@ class _Changes:
         self.quantity[first] = (near.series[:, :, 0] - table.series[:, 0]) / step
         self.reset[first] = (near.reset - table.reset) / step
         self.leap[first] = (near.leap - table.leap) / step
+        beside = [replace(run, table=near.of(k)) for k in range(len(near.flow))]
         for name, rows in self.rows.items():
-            rows[first] = [
-                (replace(run, table=near.of(k)).rows(name) - run.rows(name))[:, 0] / step for k in range(len(near.flow))
-            ]
+            rows[first] = [(one.rows(name) - run.rows(name))[:, 0] / step for one in beside]
 
     @property
     def of_events(self) -> tuple[Array, ...]:

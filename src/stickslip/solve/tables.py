@@ -22,7 +22,7 @@ from stickslip.arrays import Array, Index, Mask
 from stickslip.drives.kinds import Drive, Motion
 from stickslip.errors import ModelError
 from stickslip.laws.base import Exit, Law, Mode
-from stickslip.laws.curved import CurvedLaw, CurvedMode, compared_by_value, with_sliding_modes
+from stickslip.laws.curved import CurvedMode, compared_by_value, with_sliding_modes
 from stickslip.oscillator import Oscillator, Structure
 from stickslip.solve.cells import Linear
 
@@ -292,7 +292,7 @@ def is_curved(system: System) -> bool:
 
 def curves_of(system: System) -> list[str]:
     """What is curved in the contacts of a system, in words."""
-    curved = [type(law).__name__ for law in laws_of(system) if isinstance(law, CurvedLaw)]
+    curved = [type(law).__name__ for law in laws_of(system) if hasattr(law, "rates")]
     contacts = system.contacts if isinstance(system, Structure) else ()
     return curved + [f"a load of power {contact.power:g}" for contact in contacts if contact.power != 1]
 

@@ -192,7 +192,7 @@ class _Builder:
     def __init__(self, system: System) -> None:
         self.system, self.motion = system, system.drive.motion()
         self.joint = isinstance(system, Structure)
-        whole = system if isinstance(system, Structure) else _alone(system)
+        whole = system if isinstance(system, Structure) else _Alone.of(system)
         self.whole, self.degrees = whole, whole.size
         self.contacts, self.one = self.contacts_of(whole), 0
         self.one = 2 * whole.size + sum(len(contact.memory) for contact in self.contacts)
@@ -210,7 +210,7 @@ class _Builder:
             if isinstance(contact.law, Creeping):
                 contact.creep(self.standstill(contact))
 
-    def contacts_of(self, whole: Structure) -> list[_Contact]:
+    def contacts_of(self, whole: Structure | _Alone) -> list[_Contact]:
         """The contacts, with the places of their memory in the state."""
         contacts, begin = [], 2 * whole.size
         for contact in whole.contacts:
@@ -500,7 +500,8 @@ class _Builder:
         target = [number for joint in joints for number in joint.targets]
         pairs = zip(leaving, target, strict=True)
         speeds = [self.contacts[c].left(parts[j][c], exit_, parts[t][c]) for (j, c, exit_), t in pairs]
-        reset = np.tile(np.eye(self.size), (len(leaving), 1, 1))
+        unit = np.eye(self.size)
+        reset = np.tile(unit, (len(leaving), 1, 1))
         for e, ((j, c, exit_), t) in enumerate(zip(leaving, target, strict=True)):
             contact = self.contacts[c]
             for name, row in exit_.reset.items():
@@ -519,7 +520,7 @@ class _Builder:
             target=np.array(target, dtype=np.int64),
             crossing=np.array([exit_.crossing for *_, exit_ in leaving], dtype=np.bool_),
             polished=np.isnan(speeds),
-            carried=np.array([not np.array_equal(one, np.eye(self.size)) for one in reset], dtype=np.bool_),
+            carried=np.array([np.any(one != unit) for one in reset], dtype=np.bool_),
             reset=reset,
             first=np.cumsum([0, *(len(joint.exits) for joint in joints)]),
         )
@@ -532,10 +533,22 @@ class _Builder:
         return np.asarray(stilled(np.eye(self.size)[None], self.degrees, columns)[0])
 
 
-def _alone(system: Oscillator) -> Structure:
-    """The structure of one mass and one contact that an oscillator is."""
-    contact = Contact(system.law, [1.0])  # type: ignore[arg-type]
-    return Structure(system.mass, system.damping, system.stiffness, [contact], damper=system.damper)
+class _Alone(NamedTuple):
+    """The structure of one mass and one contact that an oscillator is, which need not be checked again."""
+
+    mass: Array
+    damping: Array
+    stiffness: Array
+    contacts: tuple[Contact]
+    damper: str
+    acts_on: tuple[float] = (1.0,)
+    size: int = 1
+
+    @classmethod
+    def of(cls, system: Oscillator) -> _Alone:
+        mass, damping, stiffness = np.array([[[system.mass]], [[system.damping]], [[system.stiffness]]])
+        contact = Contact(system.law, [1.0])  # type: ignore[arg-type]
+        return cls(mass, damping, stiffness, (contact,), system.damper)
 
 
 def kept_of(size: int, sums: Sums, exits: Exits, guards: Guards) -> tuple[tuple[int, ...], ...]:
