@@ -7,6 +7,7 @@ import pytest
 from click.testing import CliRunner
 
 import joints
+import scripts
 import stickslip as ss
 from stickslip.answers import analyze_joint, joint_law
 from stickslip.cli.program import main
@@ -76,6 +77,67 @@ def test_friction_that_bends_over_the_speed_is_doubted(static: float, speed: flo
 
 def test_friction_along_a_line_is_not_said_to_bend() -> None:
     assert not any("bent" in kinds(regress_joint(log(static=0.06, seed=seed)).level.status) for seed in range(6))
+
+
+def by_teeth(seed: int, share: float = 0.12, excess: float = 0.0) -> ss.Record:
+    """A joint whose friction is 0.06 N m and a share of what motor and gravity both press on its teeth with."""
+    t = np.arange(6000) / 200
+    q = 1.2 * np.sin(2 * np.pi * 0.2 * t) + 0.5 * np.sin(2 * np.pi * 0.9 * t)
+    v, a = np.gradient(q, t), np.gradient(np.gradient(q, t), t)
+    weight, torque = 0.5 * np.sin(q), np.zeros_like(q)
+    level = 0.06 + excess * np.exp(-((abs(v) / 0.4) ** 2))
+    for _ in range(60):  # it is part of its own load, by less than half
+        torque = 0.02 * a + 0.03 * v + weight + np.sign(v) * (level + share * np.abs(weight + torque))
+    torque += 0.005 * np.random.default_rng(seed).standard_normal(t.size)
+    return ss.Record.of({"theta": q, "force": torque}, fs=200, units={"force": "N m"})
+
+
+def test_friction_that_grows_with_what_the_teeth_bear_falls_nowhere() -> None:
+    """Beside a load part of gravity alone the motor's share passed for viscous friction and a fall with the speed."""
+    for seed in range(4):
+        joint = regress_joint(by_teeth(seed))
+        assert joint.by_teeth
+        assert joint.static is None
+        truth = {"load": 0.24, "forward": 0.06, "back": 0.06, "viscous": 0.03, "inertia": 0.02, "sine": 0.5}
+        for name, value in truth.items():
+            told = getattr(joint, name)
+            assert abs(told.value - value) < 3.5 * told.sd, name
+        assert joint.laws == ("M3", "M4", "M5", "M6")
+        assert not regress_joint(log(static=0.06, seed=seed)).by_teeth
+    fallen = regress_joint(by_teeth(0, excess=0.06))
+    assert fallen.laws == ("M4", "M5", "M6")
+    assert fallen.static.includes(0.12 + 0.24 * fallen.carried)
+
+
+@pytest.mark.parametrize(
+    ("draws", "named"), [(1, 2), pytest.param(20, 60, marks=pytest.mark.soak)], ids=["short", "long"]
+)
+def test_no_law_of_servos_that_is_true_is_denied(draws: int, named: int) -> None:
+    """Load tests of the six laws by another integrator; of the five that are no plain friction some are named."""
+    program, simplest = scripts.loaded("benchmarks/joint_loops.py"), 0
+    for model in range(1, 7):
+        for seed in range(330_000, 330_000 + draws):
+            record, truth = program.loaded(seed, model)
+            joint = regress_joint(record, **({} if "force" in record else {"kp": truth["kp"]}))
+            assert f"M{model}" in joint.laws, seed
+            simplest += joint.laws[0] == f"M{min(model, 4)}"
+    assert simplest >= named
+
+
+def test_friction_that_is_told_at_rest_alone_is_felt() -> None:
+    """Of 10 N m at rest it was said that no dry friction is felt, as the kinetic part may be none."""
+    record, _ = scripts.loaded("benchmarks/joint_loops.py").loaded(310_000, 4)
+    findings = analyze_joint(record)
+    assert findings.joint.level.interval[0] == 0 < findings.joint.static.interval[0]
+    said = " ".join(ss.summary(findings).headline)
+    assert "No dry friction" not in said
+    assert "Its friction falls with the speed" in said
+    assert "M1, M2 and M3 are denied; M4 is the simplest" in said
+
+
+def test_curves_of_which_one_exponent_falls_nowhere_are_answered() -> None:
+    record, truth = scripts.loaded("benchmarks/joint_loops.py").loaded(300_005, 4)
+    assert regress_joint(record, **({} if "force" in record else {"kp": truth["kp"]})).static is not None
 
 
 @pytest.mark.parametrize(("kind", "places"), [("friction", 2), ("friction", 8), ("torque", 2)])

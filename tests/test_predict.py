@@ -254,6 +254,14 @@ def test_a_joint_under_a_steady_torque_falls_as_galileo_says() -> None:
     assert place[-1] - place[0] == pytest.approx(log["theta"][-1], rel=0.02)  # its torque rises within a sample
 
 
+def test_friction_of_what_the_teeth_bear_takes_its_share_of_the_motor() -> None:
+    """A steady 2 N m against 0.4 N m and 0.2 of the mean of that and of no gravity: 14 rad/s²."""
+    time = np.arange(400) / 200
+    log = ss.Record.of({"theta": 7 * time**2, "force": np.full(400, 2.0)}, fs=200, units={"force": "N m"})
+    place, _ = Joint(0.1, 0.4, 0.4, 0.0, 0.0, load=0.2, by_teeth=1.0).moved(log, loop=False)
+    assert place[-1] - place[0] == pytest.approx(log["theta"][-1], rel=0.01)
+
+
 def test_a_joint_of_next_to_no_inertia_is_refused_and_not_waited_for() -> None:
     log = ss.Record.of({"theta": np.sin(np.arange(400) / 20), "reference": np.sin(np.arange(400) / 20)}, fs=200)
     with pytest.raises(ss.errors.ModelError, match=r"an inertia of 1e-12 .*stickslip joint tells"):

@@ -371,6 +371,8 @@ class Joint:
         Of a torque that goes up and down along the way: its size, periods in a radian, and phase.
     excess, speed, exponent : float
         By how much its friction at rest is above that, within which speed it falls, and Stribeck's exponent.
+    by_teeth : float
+        1 where `load` is that which a gear's teeth bear, the mean of the motor's torque and of gravity's.
     kp, damping : float
         Of its control loop, late as that is: 0 where nobody stated the gain, nor `kd` of a log with its torque.
     torque_constant : float
@@ -397,6 +399,7 @@ class Joint:
     excess: float = 0.0
     speed: float = 1.0
     exponent: float = 2.0
+    by_teeth: float = 0.0
     kp: float = 0.0
     damping: float = 0.0
     torque_constant: float = 0.0
@@ -426,7 +429,7 @@ class Joint:
         constant = stated.get("torque_constant", 0.0)
         loop_of = {"kp": kp, "damping": damping, "torque_constant": constant, "delay": late if surely else 0.0}
         teeth = {"cogging": _known(joint.cogging), "waves": joint.waves[0], "phase": joint.waves[1]}
-        numbers |= {**teeth, **falls, **loop_of}
+        numbers |= {**teeth, **falls, **loop_of, "by_teeth": joint.by_teeth}
         doubtful = tuple(dict.fromkeys(estimate.name for estimate in doubted))
         return cls(**{name: float(value) for name, value in numbers.items()}, axis=axis, doubtful=doubtful)
 
@@ -477,7 +480,7 @@ class Joint:
         steps = math.ceil(max(FINEST, fastest) / fs)
         velocity = differentiate(position, fs)
         rate = np.where(np.abs(velocity.values) > MOVES * velocity.sd, velocity.values, 0.0)
-        numbers = np.array([getattr(self, field.name) for field in fields(self)[:14]])
+        numbers = np.array([getattr(self, field.name) for field in fields(self)[:15]])
         place, torque = smooth(position, fs).values.copy(), np.ascontiguousarray(drive).copy()
         anew[0] = True
         march_joint(numbers, np.array([kp, kd]), anew, rate, steps, 1 / (fs * steps), place, torque)
@@ -496,7 +499,7 @@ def march_joint(p, gains, anew, rate, steps, dt, place, torque):  # type: ignore
     Runge's and Kutta's fourth order, one side of the friction in a step: where the speed changes its sign in it, it
     rests, and slides again as soon as the friction does not bear the torque. It begins `anew` as the log does there.
     """
-    inertia, forward, back, ahead, behind, share, sine, cosine, cogging, waves, phase, excess, fall, exponent = p
+    inertia, forward, back, ahead, behind, share, sine, cosine, cogging, waves, phase, excess, fall, exponent, teeth = p
     kp, kd = gains
     closed = kp != 0.0
     q, v = place[0], rate[0]
@@ -515,7 +518,8 @@ def march_joint(p, gains, anew, rate, steps, dt, place, torque):  # type: ignore
                 load = sine * np.sin(q) + cosine * np.cos(q)
                 push -= cogging * np.sin(2 * np.pi * waves * q + phase)
                 side = 1.0 if push > load else -1.0
-                if abs(push - load) <= (forward if side > 0 else back) + share * abs(load) + excess:
+                borne = abs(load + teeth * push) / (1 + teeth)
+                if abs(push - load) <= (forward if side > 0 else back) + share * borne + excess:
                     continue
             # four slopes, each about the one before it
             moved, rose, vs, a = 0.0, 0.0, v, 0.0
@@ -526,7 +530,7 @@ def march_joint(p, gains, anew, rate, steps, dt, place, torque):  # type: ignore
                 push = kp * (command - x) + kd * (slope - vs) if closed else command
                 push -= cogging * np.sin(2 * np.pi * waves * x + phase)
                 load = sine * np.sin(x) + cosine * np.cos(x)
-                rubs = (forward if side > 0 else back) + share * abs(load)
+                rubs = (forward if side > 0 else back) + share * abs(load + teeth * push) / (1 + teeth)
                 if excess > 0.0:
                     rubs += excess * np.exp(-((abs(vs) / fall) ** exponent))
                 a = (push - load - (ahead if side > 0 else behind) * vs - side * rubs) / inertia

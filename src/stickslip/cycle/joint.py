@@ -16,12 +16,15 @@ from stickslip.cycle.joint_fall import (
     Fall,
     Misfit,
     bends,
+    borne_by_teeth,
     damps_error,
     falling,
+    feasible,
+    loaded,
     misfits,
     possible,
     too_early,
-    without_load,
+    worries,
 )
 from stickslip.cycle.joint_fit import (
     ADVICE,
@@ -34,7 +37,6 @@ from stickslip.cycle.joint_fit import (
     coefficient,
     cogged,
     damped,
-    feasible,
     fitted,
     joint_data,
     punctual,
@@ -45,14 +47,11 @@ from stickslip.cycle.joint_fit import (
 from stickslip.cycle.joint_slides import COGS
 from stickslip.cycle.regression import TURNING, UNITS
 from stickslip.errors import EstimateError
-from stickslip.estimate import NORMAL_95, Constant, Doubt, Estimate, Result, Status
+from stickslip.estimate import NORMAL_95, Constant, Doubt, Estimate, Result, Status, stands
 from stickslip.record.record import Record
 from stickslip.signals.noise import noise_level
-from stickslip.statistics import FEW_INDEPENDENT, LeastSquares, mixture
+from stickslip.statistics import LeastSquares, mixture
 
-# Share of noise in the power of the acceleration: up to it the inertias of 96 of 99 joints without a reference held,
-# seeds 91000 to 94117; above it one of 5 was low by 85 %.
-DROWNED = 0.5
 LATEST = 0.1  # s that a torque may be late
 # Times the power of noise in the torque's rate: noise alone had 0.9 to 1.2 on 10 logs, 41 others 1.4 at least.
 HEARD = 1.5
@@ -62,10 +61,10 @@ STRAYS = 1.6  # times its chance that a delay strays: so it did on 60 joints of 
 EARLY = 2.5
 NEARER, NEAR = 8, 1e-3  # steps towards the delay, and the last one's size in samples
 WAYS = ((1.0, "forward"), (-1.0, "back"))
-# Kinds of doubt.
-NOISY, CONFOUNDED, SHIFTED = "noisy", "confounded", "shifted"
+CONFOUNDED, SHIFTED = "confounded", "shifted"  # kinds of doubt
 BARELY = 0.5  # of a value: an interval that is wider on either side hardly tells it
 PERHAPS = ("load", "sine", "cosine", "damping", "warming", "thinning")  # terms that not every log tells
+LAWS = ("M1", "M2", "M3", "M4", "M5", "M6")
 RICHER = {"load", "uneven", *WARM}  # what Coulomb and viscous friction of both directions alike do not have
 
 
@@ -85,7 +84,7 @@ class JointFriction(Result):
     viscous_forward, viscous_back : Estimate or None
         Of each direction, where they differ surely.
     load : Estimate or None
-        Friction per torque that gravity puts on the joint; None where the log does not tell it.
+        Friction per torque that gravity puts on the joint, or its teeth bear; None where the log does not tell it.
     inertia : Estimate
         Moment of inertia [kg m^2]; as stated where it was.
     sine, cosine : Estimate or None
@@ -103,7 +102,7 @@ class JointFriction(Result):
     gain : float
         Torque per angle that enters it [N m/rad]: of a controller whose torque is not measured its kp, else 0.
     carried : float
-        Mean torque [N m] that gravity puts on the joint while it slides.
+        Mean of that torque [N m] while it slides.
     residual : float
         Norm of what is left over the norm of the torque.
     condition : float
@@ -137,6 +136,8 @@ class JointFriction(Result):
     moving : mapping of str to float
         What the numbers are all together where none is below zero, by which the joint can be moved: each by itself may
         lie beyond what the others allow. Empty where they are as told.
+    by_teeth : bool
+        Whether friction surely grows with what a gear's teeth bear, the mean of the motor's torque and of gravity's.
     """
 
     level: Estimate
@@ -174,6 +175,19 @@ class JointFriction(Result):
     cogging: Estimate | None = None
     waves: tuple[float, float] = (0.0, 0.0)
     moving: Mapping[str, float] = field(default_factory=dict)
+    by_teeth: bool = False
+
+    @property
+    def laws(self) -> tuple[str, ...]:
+        """Which of the laws M1 to M6 of servos (Duclusaud and others 2024, arXiv:2410.08650) the log leaves possible.
+
+        M1 is Coulomb and viscous friction, M2 falls with the speed too, M3 grows with the load, M4 to M6 do both. Any
+        that has not what is surely there is denied; of the others a log tells only by how little they differ.
+        """
+        load, falls = self.load, self.static is not None
+        grows = load is not None and load.known and stands(load.status) and load.value > SURELY * load.sd
+        denied = {"M1": grows or falls, "M2": grows, "M3": falls}
+        return tuple(law for law in LAWS if not denied.get(law, False))
 
     def cogs(self, position: Array) -> Array:
         """The torque [N m] that goes up and down along the way, at positions."""
@@ -211,7 +225,8 @@ def regress_joint(
         g(q) = g_s \sin q + g_c \cos q
 
     (Swevers, Verdonck and De Schutter 2007, for a joint without load part; friction in proportion to the load is that
-    of a gear's teeth). The torque is measured (``force``), that of a current with its constant, or that of the
+    of a gear's teeth; where what these bear, :math:`|\tau + g| / 2`, surely explains it better, it stands in place of
+    :math:`|g|`). The torque is measured (``force``), that of a current with its constant, or that of the
     controller, :math:`k_p e(t - d) + k_d \dot e(t - d)` of its error :math:`e = r - q`, whose `kd` is regressed too
     where it is not stated, and its delay d: what controllers usually have of that, 1 ms to 2 ms, is known beforehand.
     The balance is weighed by windows that lie within a stroke, so that sticking, and friction that differs near rest,
@@ -279,17 +294,19 @@ def regress_joint(
     (data,) = cogged(warmed([data]))
     delay = delay_of(data)
     data = punctual(data, delay)
+    data = loaded(data)
     fit, terms, pull, left_out = fitted(data)
     (slow,) = warmed([joint_data(record, gravity, True, teeth, **given)[1]])
     slow = punctual(slow.alike(data), delay)
-    fall = falling(slow, fit, terms, pull)
+    slow = slow if data.by_gravity else borne_by_teeth(slow, fit, terms, pull)
+    bent = bends(slow, fit, terms, pull)
+    fall = falling(slow, fit, terms, pull) if bent else None
     data = slow if fall else data
     if delay is None:
         left_out = (*left_out, f"{WORDS['lag' if data.source == 'reference' else 'late']}: {ADVICE['late']}")
-    bent = fall is None and bends(slow, fit, terms, pull)
     if fall is not None:
         fit, terms, pull = fall.fits[fall.best], fall.terms, fall.pull
-    beside = misfits(data, fit, terms, bent, turning(record), delay)
+    beside = misfits(data, fit, terms, bent and fall is None, turning(record), delay)
     answer = _answer(record, data, fit, terms, pull, left_out, fall, beside)
     return replace(answer, delay=possible(delay, data.source))
 
@@ -370,7 +387,7 @@ def _answer(
     fall: Fall | None,
     beside: tuple[Misfit, ...],
 ) -> JointFriction:
-    status = Status(*_worries(data, fit, terms))
+    status = Status(*worries(data, fit, terms))
     tell = Telling(data, fit, terms, turning(record), status, beside)
     if fall is not None:
         tell = Averaged(data, fit, terms, turning(record), status, beside, fall)
@@ -385,7 +402,9 @@ def _answer(
         ways = [tell.sum({"viscous": 1, "uneven": by}, f"viscous friction {way}") for by, way in WAYS]
     inertia = replace(data.stated["inertia"], name="inertia") if "inertia" in data.stated else known["inertia"]
     perhaps: dict[str, Any] = {name: known.get(name) for name in PERHAPS}
-    damped = known["damping"].value * _error_rate(data) if "damping" in known else np.zeros(len(data.raw))
+    damped = np.zeros(len(data.raw))
+    if "damping" in known and (log := data.logs[0]).reference is not None:
+        damped = known["damping"].value * log.sliding.window.apply(log.reference - log.position, 1)
     return JointFriction(
         level=level.within(0.0),
         forward=forward,
@@ -406,6 +425,7 @@ def _answer(
         stated=data.stated,
         status=status,
         moving=moving,
+        by_teeth=not data.by_gravity and "load" in terms,
         **_rows(record, data, fit, terms, pull, inertia.value, damped),
         **_stribeck(tell, fall, pull, known.get("load")),
         **_cogging(tell),
@@ -464,8 +484,11 @@ def _cogging(tell: Telling) -> dict[str, Any]:
 
 
 def _carried(data: JointData, pull: tuple[float, float]) -> float:
-    """Mean size of gravity's torque while it slides."""
-    place = data.logs[0].link[data.logs[0].sliding.rows]
+    """Mean size of what the teeth bear, or of gravity's torque, while it slides."""
+    slides, borne = data.logs[0].sliding, data.logs[0].borne
+    if borne is not None:
+        return float(np.mean(np.abs(borne[0] / slides.weights)))
+    place = data.logs[0].link[slides.rows]
     return float(np.mean(np.abs(pull[0] * np.sin(place) + pull[1] * np.cos(place))))
 
 
@@ -476,6 +499,8 @@ def _level(tell: Telling, pull: tuple[float, float], load: Estimate | None, *, r
         weights[FALL[0]] = 1.0
     if load is None or not load.known:
         return tell.sum(weights, name)
+    if not tell.data.by_gravity:
+        return tell.sum(weights | {"load": _carried(tell.data, pull)}, name)
     place = tell.data.logs[0].link[tell.data.logs[0].sliding.rows]
     side = np.sign(pull[0] * np.sin(place) + pull[1] * np.cos(place))
     carried, share = _carried(tell.data, pull), load.value
@@ -484,27 +509,6 @@ def _level(tell: Telling, pull: tuple[float, float], load: Estimate | None, *, r
     more = share * carried  # its product counts twice in a sum of both factors
     low, high = level.interval
     return replace(level, value=level.value - more, interval=(low - more, high - more))
-
-
-def _error_rate(data: JointData) -> Array:
-    """How the error of the position changes."""
-    assert data.logs[0].reference is not None
-    return data.logs[0].sliding.window.apply(data.logs[0].reference - data.logs[0].position, 1)
-
-
-def _worries(data: JointData, fit: LeastSquares, terms: tuple[str, ...]) -> list[Doubt | str]:
-    worries: list[Doubt | str] = []
-    if "load" in data.terms and "load" not in terms:
-        worries.append(without_load(fit, terms))
-    if fit.independent < FEW_INDEPENDENT * len(terms):
-        worries.append(f"only {fit.independent:.0f} independent samples for {len(terms)} coefficients")
-    if data.logs[0].reference is None and "inertia" in terms:
-        column = data.columns(("inertia",), 0.0, (0.0, 0.0))
-        noisy = float(data.noise(("inertia",))[0, 0] / np.sum(column**2))
-        if noisy > DROWNED:
-            doubt = f"{100 * noisy:.2g} % of the acceleration is noise of the encoder: log the reference too"
-            worries.append(Doubt(doubt, NOISY))
-    return worries
 
 
 @dataclass(frozen=True)

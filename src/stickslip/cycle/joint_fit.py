@@ -85,7 +85,6 @@ HELD = (0.0, 5e-4)
 LOOP = (1e-3, 2e-3)  # s, delay of a controller, and how that varies, chosen: it holds its output for 0.2 to 10 ms
 # left out in this order where the motion can not tell all of them apart
 OPTIONAL: tuple[tuple[str, ...], ...] = (WARM, ("load",), ("sine", "cosine"))
-RESISTING = ("inertia", "forward", "back", "viscous_forward", "viscous_back", "load")  # never below zero
 
 
 Fitted = tuple[LeastSquares, tuple[str, ...], tuple[float, float]]  # with its terms and gravity's sine and cosine part
@@ -118,6 +117,11 @@ class JointData:
         """The columns of all logs, one below the other."""
         return np.concatenate([log.columns(terms, load, pull, steered=steered) for log in self.logs])
 
+    @property
+    def by_gravity(self) -> bool:
+        """Whether friction grows with gravity's torque alone, in whose columns it stands then."""
+        return self.logs[0].borne is None
+
     def alike(self, other: JointData) -> JointData:
         """With the cogging of another."""
         logs = tuple(replace(log, cogs=other.logs[0].cogs) for log in self.logs)
@@ -131,7 +135,7 @@ class JointData:
     def model(self, fit: LeastSquares, terms: tuple[str, ...], pull: tuple[float, float]) -> Array:
         """What a fit, of these logs or of others, makes of the torque."""
         share = coefficient(fit, terms, "load")
-        bare = tuple(term for term in terms if term != "load")
+        bare = tuple(term for term in terms if term != "load" or not self.by_gravity)
         columns = np.concatenate([log.quiet().columns(bare, share, pull) for log in self.logs])
         return np.asarray(self.known + columns @ fit.coefficients[[terms.index(term) for term in bare]])
 
@@ -523,27 +527,9 @@ def separable(data: JointData) -> tuple[LeastSquares, tuple[str, ...], tuple[flo
     raise _inseparable(data, terms)
 
 
-def feasible(data: JointData, terms: tuple[str, ...]) -> dict[str, float]:
-    """Coefficients of a balance in which no friction drives: if need be without a load part, and alike both ways."""
-    bare = tuple(term for term in terms if term != "load")
-    alike = tuple("coulomb" if term == "forward" else term for term in bare if term not in ("back", "uneven"))
-    for some in dict.fromkeys((terms, bare, alike)):
-        try:
-            fit, _ = about_load(data, some)
-        except EstimateError:
-            continue
-        values = {"load": 0.0, **dict(zip(some, map(float, fit.coefficients), strict=True))}
-        both, uneven = values.pop("coulomb", 0.0), values.pop("uneven", 0.0)
-        values = {"forward": both, "back": both, **values}
-        values |= {f"viscous_{way}": values["viscous"] + by * uneven for way, by in (("forward", 1), ("back", -1))}
-        if all(value >= 0 for name, value in values.items() if name in RESISTING):
-            return values
-    return {}
-
-
 def about_load(data: JointData, terms: tuple[str, ...]) -> tuple[LeastSquares, tuple[float, float]]:
     """The regression, linear about its own load part: of those that settle the one that leaves least."""
-    if "load" not in terms:
+    if "load" not in terms or not data.by_gravity:
         fit = _solved(data, terms, 0.0, (0.0, 0.0))
         return fit, _pull(fit, terms)
     settled = [one for start in STARTS if (one := _settled(data, terms, start)) is not None]
@@ -572,7 +558,7 @@ def _settled(data: JointData, terms: tuple[str, ...], start: float) -> tuple[Lea
 def _solved(data: JointData, terms: tuple[str, ...], share: float, pull: tuple[float, float]) -> LeastSquares:
     columns = data.columns(terms, share, pull)
     torque = data.torque - data.known
-    if "load" in terms:  # linear about `share`: its column stands in gravity's already
+    if "load" in terms and data.by_gravity:  # linear about `share`: its column stands in gravity's already
         torque = torque + share * columns[:, terms.index("load")]
     instruments = None if not data.followed else data.columns(terms, share, pull, steered=True)
     return least_squares(columns, torque, instruments=instruments, noise=data.noise(terms))

@@ -254,6 +254,9 @@ class Log:
         By how much what the encoder tells of is ahead of the link, by the play of the teeth between.
     noise : ndarray, shape (3, 3)
         ``E'E`` of the encoder's noise E in the columns of `DERIVATIVES`; none where the reference knows nothing of it.
+    borne : (ndarray, ndarray) or None
+        What the gear's teeth bear at the rows, by the motion and by the reference: the mean of the motor's torque and
+        of gravity's, smoothed and weighed; None where friction grows with gravity's torque alone.
     """
 
     position: Array
@@ -269,6 +272,7 @@ class Log:
     bodies: Array | None = None
     ahead: Array | float = 0.0
     noise: Array = field(default_factory=lambda: np.zeros((len(DERIVATIVES), len(DERIVATIVES))))
+    borne: tuple[Array, Array] | None = None
 
     @property
     def link(self) -> Array:
@@ -311,7 +315,7 @@ class Log:
         warmer = 0.0 if self.temperature is None else self.temperature - self.about
         along = self.position - self.cogs[1]
         teeth = 2 * np.pi * self.cogs[0] * along
-        stronger = 1 + load * side * np.sign(carried)
+        stronger = 1 + load * side * np.sign(carried) if self.borne is None else 1.0
         made = {
             "inertia": lambda: at(turned, 2),
             "viscous": lambda: at(turned, 1),
@@ -321,7 +325,7 @@ class Log:
             "coulomb": lambda: at(side),
             "sine": lambda: at(np.sin(position) * stronger),
             "cosine": lambda: at(np.cos(position) * stronger),
-            "load": lambda: at(side * np.abs(carried)),
+            "load": lambda: at(side * np.abs(carried)) if self.borne is None else self._rubbed(steered),
             "damping": lambda: self._error_rate(steered),
             "warming": lambda: at(side * warmer),
             "thinning": lambda: at(five_point_difference(turned, 1) * fs * warmer),
@@ -343,6 +347,11 @@ class Log:
     def kept(self) -> dict[tuple[str, bool], Array]:
         """Columns that stay the same about any load part and any gravity."""
         return {}
+
+    def _rubbed(self, steered: bool) -> Array:
+        """What the teeth bear, against the motion."""
+        assert self.borne is not None
+        return np.asarray(self.sliding.side[self.sliding.rows] * np.abs(self.borne[steered]))
 
     def _error_rate(self, steered: bool) -> Array:
         """How the error of the position changes; its instrument is what inertia makes of the reference."""

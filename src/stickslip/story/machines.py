@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -12,7 +12,7 @@ import numpy as np
 from stickslip.answers.arm import Joint
 from stickslip.answers.findings import Comparison, Findings
 from stickslip.answers.machines import joint_law
-from stickslip.cycle.joint import JointFriction
+from stickslip.cycle.joint import LAWS, JointFriction
 from stickslip.cycle.joint_fit import SURELY, is_late
 from stickslip.cycle.joint_logs import JointLogs
 from stickslip.cycle.tribometer import DEFINITIONS
@@ -29,6 +29,13 @@ from stickslip.units import parse_unit
 
 APART = 0.05  # of a level, by which directions or definitions must differ to be worth a sentence
 RARELY = 0.005  # of the time
+BY_GRAVITY = "gravity's torque"
+SIMPLEST = {
+    "M1": "Coulomb and viscous friction",
+    "M2": "Coulomb and viscous friction, and a fall with the speed",
+    "M3": "Coulomb and viscous friction, and growth with the load",
+    "M4": "Coulomb and viscous friction, a fall with the speed and growth with the load",
+}
 TRIED = "# all of the joint: what stickslip predict moves along another log"
 
 
@@ -154,8 +161,9 @@ def _together(comparison: Comparison) -> Iterator[str]:
     parts = [f"{value_of(together.forward)} forward and {value_of(together.back)} back"]
     parts.append(f"{value_of(together.viscous)} of viscous friction")
     if together.load is not None and together.load.known and together.load.interval[0] > 0:
-        parts.append(f"{value_of(together.load)} of gravity's torque")
+        parts.append(f"{value_of(together.load)} of {BY_GRAVITY}")
     yield f"Together the logs tell Coulomb friction of {', '.join(parts)}."
+    yield from _laws([log.joint for log in comparison.findings])
     missed, plain = (sorted(getattr(one, name) for one in logs) for name in ("error", "plain"))
     yield (
         f"The torque of each log is predicted by the others but for {100 * missed[0]:.2g} to {100 * missed[-1]:.2g} % "
@@ -170,7 +178,7 @@ def _of_one_joint(findings: Findings) -> Iterator[str]:
     said = {doubt.words for doubt in doubts_of(level.status)}
     doubt = f", which is not to be trusted ({level.status})" if not stands(level.status) else _in_doubt(level, set())
     under = f" under a mean load of {number(joint.carried, joint.carried / 100, unit)}" if joint.carried else ""
-    if level.interval[0] > 0:
+    if level.interval[0] > 0 or joint.static is not None:
         yield f"The joint slides against {value_of(level)} of friction{under} (95 %: {interval_of(level)}){doubt}."
         yield from _directions(joint)
         yield from _fall(joint, said)
@@ -180,10 +188,11 @@ def _of_one_joint(findings: Findings) -> Iterator[str]:
     if joint.load is not None and joint.load.known:
         most = f"less than {value_of(joint.load, joint.load.interval[1])}"
         some = f"{value_of(joint.load)}{_in_doubt(joint.load, said)}" if joint.load.interval[0] > 0 else most
-        parts.append(f"{some} of gravity's torque")
+        parts.append(f"{some} of {'the mean torque of motor and gravity' if joint.by_teeth else BY_GRAVITY}")
     fastest = float(np.abs(joint.speed).max())
     rate = f"{fastest:.3g} rad/s" if unit == "N m" else f"{fastest:.3g} m/s"
     yield f"To that come {' and '.join(parts)}; it was moved at up to {rate}."
+    yield from _laws([joint])
     yield from _warmth(findings)
     sources = {"reference": "its controller's gains make", "current": "its current makes"}
     torque = "the torque that" if unit == "N m" else "the force that"
@@ -213,6 +222,19 @@ def _of_one_joint(findings: Findings) -> Iterator[str]:
         )
     if findings.sticks is not None and findings.sticks.share.value > RARELY and stands(findings.sticks.share.status):
         yield f"It stands still up to {value_of(findings.sticks.share)} of the time."
+
+
+def _laws(joints: Sequence[JointFriction]) -> Iterator[str]:
+    """Which of the laws M1 to M6 all logs leave, where they carry a load."""
+    if any(joint.load is None for joint in joints):
+        return
+    left = [law for law in LAWS if all(law in joint.laws for joint in joints)]
+    *others, last = [law for law in LAWS if law not in left] or ["none"]
+    denied = f"{', '.join(others)} and {last} are" if others else f"{last} is"
+    yield (
+        f"Of the friction laws M1 to M6 of servos {denied} denied; "
+        f"{left[0]} is the simplest of the others: {SIMPLEST[left[0]]}."
+    )
 
 
 def _in_doubt(estimate: Estimate, said: set[str]) -> str:
