@@ -53,11 +53,19 @@ def let_go(t: Array, w: float, zeta: float, dry: float, rise: float = 0.0) -> Ar
 
 
 def on_a_cubic_spring(
-    t: Array, w: float, zeta: float, dry: float, cubic: float = 0.0, *, air: float = 0.0, rise: float = 0.0
+    t: Array,
+    w: float,
+    zeta: float,
+    dry: float,
+    cubic: float = 0.0,
+    *,
+    air: float = 0.0,
+    rise: float = 0.0,
+    power: float = 2.0,
 ) -> Array:
     """From one on a spring ``x + cubic x^3``, half cycle by half cycle, by scipy's eighth-order rule.
 
-    A drag `air` v^2 may slow it too, and its dry friction `rise` towards rest, on a bell curve of a tenth of w.
+    A drag `air` v^2 may slow it too, and its dry friction `rise` towards rest, as exp(-|10 v/w|^power).
     """
     x, begin, at = np.ones(len(t)), 0.0, 1.0
 
@@ -70,7 +78,7 @@ def on_a_cubic_spring(
 
         def rates(_: float, state: Array, side: float = side) -> list[float]:
             u, v = state
-            rubbing = side * dry * (1 + rise * math.exp(-((10 * v / w) ** 2)))
+            rubbing = side * dry * (1 + rise * math.exp(-(abs(10 * v / w) ** power)))
             return [v, -w * w * (u + cubic * u**3 - rubbing) - 2 * zeta * w * v - air * v * abs(v)]
 
         turning.direction = side  # type: ignore[attr-defined]

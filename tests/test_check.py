@@ -261,3 +261,14 @@ def test_a_measured_friction_at_the_end_of_its_range_is_clipped() -> None:
     assert [fault.channel for fault in cut.check() if fault.kind == "clipped"] == ["friction"]
     computed = record.with_channel("friction", cut["friction"], unit="N", source="friction_force")
     assert not [fault for fault in computed.check() if fault.kind == "clipped"]
+
+
+def test_a_joint_that_turns_round_on_static_friction_is_not_clipped() -> None:
+    """It arrives with its speed gone and leaves at once: what followed the rest looked like a top that was cut."""
+    slow, rest, fast = np.arange(200.0, 0.0, -1.0), np.zeros(36), np.arange(1.0, 806.0)
+    there = np.concatenate([-6e-5 * slow**2, rest, -3e-3 * (fast - 5 * (1 - np.exp(-fast / 5)))])
+    x = np.concatenate([there, -4.8 - there] * 3)
+    counted = np.round(x / 1.534e-3) * 1.534e-3
+    assert not [fault for fault in Record.of({"x": counted}, fs=200.0).check() if fault.kind == "clipped"]
+    cut = np.clip(counted, -4.5, -0.3)
+    assert [fault for fault in Record.of({"x": cut}, fs=200.0).check() if fault.kind == "clipped"]

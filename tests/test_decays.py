@@ -455,6 +455,17 @@ def test_begin_and_rest_are_those_of_the_motion_that_is_named(more):
     assert "drifts" not in headline
 
 
+def test_friction_that_falls_to_less_than_half_is_told_as_such():
+    """A rise held below one ended at two thirds, and viscous and dry friction were sure, each far off."""
+    findings, headline = let_go_of(zeta=0.008, dry=0.011, rise=1.5, power=1.0)
+    terms = {estimate.name: estimate for estimate in findings.decay.motion.terms}
+    assert findings.decay.best is findings.decay.motion
+    assert terms["rise of friction towards rest"].includes(1.5)
+    assert findings.decay.best.damping_ratio.includes(0.008)
+    assert findings.decay.best.dry_displacement.includes(0.05 * 0.011)
+    assert "(Stribeck)" in headline
+
+
 def test_where_no_motion_fits_the_nearest_tells_the_course():
     """A rejected fit's bracket stood sure, and far off; its force stood beside the displacement of whichever motion."""
     findings, headline = let_go_of(zeta=0.004, dry=0.006, rise=0.5)

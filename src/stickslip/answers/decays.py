@@ -181,9 +181,10 @@ class Decay(Result):
 
     @property
     def denied(self) -> bool:
-        """Whether the record speaks against viscous and dry friction, and for none of the other motions."""
+        """Whether the record speaks against viscous and dry friction, or all of its noise, and for no other motion."""
         negative = self.best.dry_displacement.interval[1] < 0
-        return self.best is not self.motion and (self.against < CLEAR or negative)
+        unlike = bool(self.strays) and self.motion is not None and self.motion.choice.lack_of_fit < CLEAR
+        return self.best is not self.motion and (self.against < CLEAR or negative or unlike)
 
     @property
     def undecided(self) -> bool:

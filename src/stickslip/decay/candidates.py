@@ -28,6 +28,7 @@ SHAPES = {"stribeck_speed": (0.02, 1.0), "exponent": (0.1, 1.0)}
 ADDED = ("quadratic", "rise", "micro_slip")
 CLEAR = 10.0  # effect over noise above which the shape of a term is known
 HIGHEST = {"damping_ratio": 0.95, "rise": 1.0, "wear": 0.5}  # by half in a first amplitude is no wear any more
+NEARLY, STEEP, STEEPEST = 0.99, 1.01, 4.0  # of the highest rise: from where, and up to which, one beyond is searched
 STRIBECK_SPEEDS = (0.05, 0.3)  # of the first speed, at which a slope is looked for
 EXPONENT = 0.5  # of the micro-slip that is looked for
 NUMBERS = {name: number for number, name in enumerate(PARAMETERS)}
@@ -130,6 +131,15 @@ class Fitted:
         for start, drift in zip(starts, DRIFTS, strict=True):
             start[NUMBERS["wear"]] = drift
         return min((fit_motion(WORN, self.blocks, start) for start in starts), key=lambda fitted: fitted.cost)
+
+    @cached_property
+    def steeper(self) -> Fitted:
+        """The same with friction that may rise further towards rest, where it rises as far as is looked for."""
+        if self.value("rise") < NEARLY * HIGHEST["rise"]:
+            return self
+        start = self.parameters.copy()
+        start[NUMBERS["rise"]] = STEEP
+        return fit_motion(self.motion, self.blocks, start)
 
     def value(self, name: str) -> float:
         """One parameter."""
@@ -258,7 +268,7 @@ def _search(motion: Motion, blocks: BlockMeans, start: Array, half_cycles: int |
     parameters = start.copy()
     columns = [NUMBERS[name] for name in motion.free]
     units = _units(start)[columns]
-    low, high = (ends / units for ends in _bounds(motion, first_speed(start)))
+    low, high = (ends / units for ends in _bounds(motion, start))
     last: dict[bytes, tuple[Array, Array, int]] = {}
 
     def at(free: Array) -> tuple[Array, Array, int]:
@@ -305,15 +315,22 @@ def _units(start: Array) -> Array:
     return np.array([measures.get(name, 1.0) for name in PARAMETERS])
 
 
-def _bounds(motion: Motion, speed: float) -> tuple[Array, Array]:
+def _bounds(motion: Motion, start: Array) -> tuple[Array, Array]:
     """Lowest and highest value of each free parameter."""
     low, high = [], []
     for name in motion.free:
-        unit = speed if name == "stribeck_speed" else 1.0
-        ends = SHAPES.get(name, (LOWEST.get(name, -math.inf), HIGHEST.get(name, math.inf)))
+        unit = first_speed(start) if name == "stribeck_speed" else 1.0
+        ends = SHAPES.get(name, (LOWEST.get(name, -math.inf), highest(name, start)))
         low.append(unit * ends[0])
         high.append(unit * ends[1])
     return np.array(low), np.array(high)
+
+
+def highest(name: str, parameters: Array) -> float:
+    """Highest value of a parameter, searched from or ending at these; of a rise above it, the steepest."""
+    if name == "rise" and parameters[NUMBERS[name]] > HIGHEST[name]:
+        return STEEPEST
+    return HIGHEST.get(name, math.inf)
 
 
 def first_speed(parameters: Array) -> float:

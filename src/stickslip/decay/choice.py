@@ -14,7 +14,6 @@ from stickslip.arrays import Array
 from stickslip.decay.candidates import (
     ALWAYS,
     EXPONENT,
-    HIGHEST,
     HOPELESS,
     NUMBERS,
     STRIBECK_SPEEDS,
@@ -23,6 +22,7 @@ from stickslip.decay.candidates import (
     first_speed,
     fit_candidates,
     fit_motion,
+    highest,
 )
 from stickslip.decay.motions import MOTIONS, Restoring
 from stickslip.errors import EstimateError
@@ -30,6 +30,7 @@ from stickslip.estimate import NORMAL_95, Estimate
 from stickslip.statistics import mean_uncertainty, student
 
 SIZE = 0.05  # of each candidate's test: how often a true one is rejected
+STRIBECK = "stribeck"  # the candidate
 COLOURED = 0.01  # p-value of the best residual's whiteness below which its correlation counts
 DRAWS = 20000  # of the greatest of correlated Student variables
 NEAR = 2.0  # times the least residual: what counts where no candidate is true
@@ -145,7 +146,7 @@ class Candidate:
         others = fitted.jacobian[:, fitted.settled]
         residual = direction - others @ (np.linalg.pinv(others) @ direction)
         power, value = float(residual @ residual), fitted.value(added)
-        room = HIGHEST.get(added, math.inf) - value
+        room = highest(added, self.fitted.parameters) - value
         if power <= (APART * np.linalg.norm(direction)) ** 2:
             return direction, -value, room if math.isfinite(room) else 0.0
         sd, freedom = self.noise.along(residual / power)
@@ -332,6 +333,11 @@ def choose_fitted(fits: Mapping[str, Fitted], candidates: tuple[str, ...]) -> Ch
     """:func:`choose` among candidates that are fitted, `ALWAYS` among them."""
     fits = {name: fitted for name, fitted in fits.items() if name in {*candidates, *ALWAYS}}
     best = min(fits.values(), key=lambda fitted: fitted.cost)
+    if STRIBECK in fits and _whiteness(best.residual, best.blocks.floor) < COLOURED:
+        # a rise beyond the highest where it leaves noise alone: a broad one stood for the air drag of a real pendulum
+        steeper = fits[STRIBECK].steeper
+        if _whiteness(steeper.residual, steeper.blocks.floor) >= COLOURED:
+            fits[STRIBECK] = best = steeper
     noise = Noise(best.residual, best.jacobian.shape[1], best.blocks.floor)
     tried = tuple(_tested(fitted, noise, best) for name, fitted in fits.items() if name in candidates)
     choice = _chosen(tried)

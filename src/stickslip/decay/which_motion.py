@@ -271,7 +271,8 @@ def whichever(choices: Sequence[Choice], estimate: Estimate, parameter: str) -> 
     if PLAIN & set(kept):
         ends = min(low, ends[0]), max(high, ends[1])
     else:
-        value, status = min(max(value, ends[0]), ends[1]), Status(*(choice.status for choice in choices))
+        nearest = [choice.chosen.estimate(parameter).value for choice in choices]
+        value, status = float(np.clip(np.mean(nearest), *ends)), Status(*(choice.status for choice in choices))
     return replace(
         estimate,
         value=value,

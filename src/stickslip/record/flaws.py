@@ -284,11 +284,11 @@ def _were_cut(
     if not sides:
         return False
     heights, errors, drops, tops = np.array(sides).T
-    height = float(np.median(heights))
+    pairs = heights.reshape(-1, 2)
+    height = float(np.median(pairs.min(axis=1)))  # a stuck mass arrives with its slope gone, and may leave with one
     error = 1.2533 * float(np.sqrt(np.mean(errors**2) / len(heights)))
     cut = height > strictness * max(2 * slack, 5 * error, 0.08 * float(np.median(drops)))
     if cut and plateaus:
-        pairs = heights.reshape(-1, 2)
         alike = float(np.mean(pairs.max(axis=1) < 2 * pairs.min(axis=1)))
         cut = alike > 0.5 and float(np.mean((tops > 0.2) & (tops < 0.8))) > 0.5
     return bool(cut)

@@ -521,8 +521,19 @@ class Belief:
         gains["x"] = self.gain
         if (moves := driving(self.record)) is not None:  # what it wrote, it writes again
             gains[moves] = 1 / (1 + self.values.get(DRIVE[0], 0.0))
-        sensors = (replace(s, gain=gains.get(s.channel, 1.0)) for s in self.rig.sensors)
+        # Where a rest lies between two counts is chance: error of a count stands as long as the mass does.
+        zeros = {s.channel: s.digitiser.step * rng.uniform(-0.5, 0.5) for s in self.rig.sensors if s.digitiser.step}
+        sensors = (
+            replace(
+                s,
+                gain=gains.get(s.channel, 1.0),
+                digitiser=replace(s.digitiser, offset=zeros.get(s.channel, 0.0)),
+            )
+            for s in self.rig.sensors
+        )
         written = self._written(sensors, self._motion, rng)
+        for name, zero in zeros.items():
+            written = replace(written, samples={**written.samples, name: written[name] - zero})
         for name in written:
             known = channels[name]
             details = {"delay": known.delay, "mount": known.mount, "inertia": known.inertia}
