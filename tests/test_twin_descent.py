@@ -11,7 +11,7 @@ import pytest
 import stepped
 import stickslip as ss
 from stickslip.twin import descent, search
-from stickslip.twin.belief import BENT, EXCESS, GIVE, HELD, KINETIC, LOSS, POWER, RATE, SLOPE, SPEED, Belief
+from stickslip.twin.belief import BENT, EXCESS, GIVE, HELD, KINETIC, LATE, LOSS, POWER, RATE, SLOPE, SPEED, Belief
 
 RIG = stepped.Rig("compliant", 0.52, 0.51, 0.0122, 1.02e-3, 0.248, kinetic=2.08e-4, contact=2.556, loss=0.172)
 
@@ -153,3 +153,18 @@ def test_a_load_that_swings_is_named_and_no_constant_that_is_off() -> None:
     )
     assert "its normal load swings by 14 %" in tried.loops.level.status
     assert not ss.summary(tried).remedies
+
+
+@pytest.mark.parametrize("amplitude", [2e-3, 4e-3])
+def test_static_friction_of_a_record_that_is_late_is_found_with_the_delay(amplitude: float) -> None:
+    """A gain a fifth off and x 5 or 11 ms early were said, without static friction, and a command to mend them."""
+    rig = stepped.Rig("static", 2.4, 2500.0, 1.0, amplitude, 2.0, kinetic=1.8, static=2.2)
+    rng, fs, samples = np.random.default_rng(4), 1000.0, 4000
+    (x, _, _), *_ = stepped.marched(rig, samples, 1000, fs, stepped.STEPS)
+    z = rig.amplitude * np.sin(2 * np.pi * rig.frequency * np.arange(samples) / fs)
+    late = {"x": x[:-2], "z": z[2:]}
+    noisy = {name: values + 2e-6 * rng.standard_normal(samples - 2) for name, values in late.items()}
+    believed = search.believe(ss.friction_force(ss.Record.of(noisy, fs=fs), **rig.stated))
+    assert believed.slipped == (LATE,)
+    assert believed.values[LATE] == pytest.approx(2 / fs, rel=0.05)
+    assert (believed.kinetic, believed.ratio) == pytest.approx((rig.kinetic, rig.static / rig.kinetic), rel=0.01)

@@ -19,13 +19,12 @@ from stickslip.errors import StickslipError
 from stickslip.estimate import UNTRIED, Estimate, Result, Status
 from stickslip.record.record import Record, StatedRig
 from stickslip.twin.belief import GAIN, LATE, MASS, SPRING, Belief
-from stickslip.twin.search import believe
+from stickslip.twin.search import CALIBRATED, believe
 from stickslip.twin.trial import COMPLIANCE, GIVES, Trial, try_on_twins
 from stickslip.workers import workers
 
 Answer = TypeVar("Answer", Loops | None, Sticks | None, Breakaway | None)
 CONSTANTS = {MASS: "mass", SPRING: "stiffness"}
-CALIBRATED = 0.03  # chosen: more than calibration leaves a gain or a constant off by is a mistake, to be corrected
 UNTOLD = Estimate("compliance", math.nan, (math.nan, math.nan), math.nan, "m/N", "fit to x")
 # Of each twin: static friction and a contact's stiffness are told by the fit to x, and a curve over speed not at all.
 ASKED = (partial(friction_loops, bins=2), find_sticks)
