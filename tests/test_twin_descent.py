@@ -10,6 +10,7 @@ import pytest
 
 import stepped
 import stickslip as ss
+from stickslip.estimate import stands
 from stickslip.twin import descent, search
 from stickslip.twin.belief import BENT, EXCESS, GIVE, HELD, KINETIC, LATE, LOSS, POWER, RATE, SLOPE, SPEED, Belief
 
@@ -168,3 +169,16 @@ def test_static_friction_of_a_record_that_is_late_is_found_with_the_delay(amplit
     assert believed.slipped == (LATE,)
     assert believed.values[LATE] == pytest.approx(2 / fs, rel=0.05)
     assert (believed.kinetic, believed.ratio) == pytest.approx((rig.kinetic, rig.static / rig.kinetic), rel=0.01)
+
+
+def test_a_rig_that_is_nowhere_near_bounds_no_friction() -> None:
+    """Below 940883 GN was said of a contact that only gives way."""
+    fs, w, rng = 500.0, 6 * math.pi, np.random.default_rng(0)
+    t = np.arange(4000) / fs
+    z, x = 5e-3 * np.sin(w * t), 5e-5 * np.sin(w * t - 0.3) ** 3
+    noisy = {"x": x + 1e-7 * rng.standard_normal(t.size), "z": z}
+    tried = ss.tried(ss.analyze(ss.Record.of(noisy, fs=fs), mass=1.0, stiffness=3000.0, damping=1.0), twins=8)
+    assert tried.trial.belief.left > 0.3
+    for estimate in (tried.loops.level, tried.loops.forward, tried.loops.back):
+        assert not stands(estimate.status)
+        assert max(map(abs, estimate.interval)) < 100.0

@@ -153,6 +153,8 @@ def _linear(record: Record, oscillator: Oscillator, drive: DriveFrom) -> Belief:
     begun = Belief(record, oscillator, values, drive, Rig(tuple(_sensors(record))), unsure)
     # where the sensor has an offset, the rest position is nearer to its mean than to its zero
     begun = min(begun, begun.at(x=values["x"] - float(record["x"].mean())), key=misfit)
+    if not math.isfinite(misfit(begun)):  # a slope that falls so far that the motion grows beyond all numbers
+        begun = begun.at(**{SLOPE: 0.0})
     led = _descended_along(begun, [record.rows(0, samples) for samples in _horizons(record)])
     return refined(replace(led, record=record))
 

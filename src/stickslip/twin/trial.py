@@ -237,7 +237,7 @@ def try_on_twins(
         )
     misfit = _Misfit.of(belief, *_strays(belief, twins, frequency))
     tried = {}
-    others = _counted_offsets(belief, frequency)
+    others = {} if misfit.left > LOST else _counted_offsets(belief, frequency)
     for name in ASKED:
         if name in answers and answers[name].known:
             pairs = [(twin.answers.get(name), twin.truth[name]) for twin in twins]
@@ -248,9 +248,10 @@ def try_on_twins(
         answers = {**answers, GIVES: Estimate(GIVES, belief.contact, (0.0, math.inf), math.inf, "N/m", "fit to x")}
     for name, value in FITTED.items():
         if name in answers and (name != GIVES or GIVE in belief.values):
-            tried[name] = _widened(_fitted(answers[name], value, belief, twins, misfit), _rival_offsets(belief, value))
-    apart = tried[OFFSET].value if OFFSET in tried else 0.0
-    tried |= {name: _widened(tried[name], [times * apart]) for name, times in ZERO.items() if name in tried}
+            apart = [] if misfit.left > LOST else _rival_offsets(belief, value)
+            tried[name] = _widened(_fitted(answers[name], value, belief, twins, misfit), apart)
+    offset = tried[OFFSET].value if OFFSET in tried else 0.0
+    tried |= {name: _widened(tried[name], [times * offset]) for name, times in ZERO.items() if name in tried}
     if ENERGY in tried and frequency > 0:
         tried[ENERGY] = _widened(tried[ENERGY], [-_work_of_drift(belief, frequency), _work_of_drift(belief, frequency)])
     if misfit.doubt and not misfit.unlike:
@@ -438,7 +439,7 @@ def _tried(quick: Estimate, pairs: list[tuple[Estimate | None, float]], misfit: 
     errors = np.array([e.value - true for e, true in pairs if e is not None and e.known and math.isfinite(true)])
     if len(errors) < max(8, ANSWERED * len(pairs)):
         words = f"{len(errors)} of {len(pairs)} twins could answer it, so that it is not tried on them"
-        return replace(quick, status=Status(words, quick.status))
+        return replace(quick, status=Status(words, *([misfit.doubt] if misfit.doubt else []), quick.status))
     value, interval = _less_bias(quick.value, errors, misfit.strays)
     doubts = [doubt for doubt in doubts_of(quick.status) if doubt.kind != FEW]
     if misfit.doubt or both:  # the twins share what is not so, or was not stated
@@ -454,6 +455,8 @@ def _fitted(
     """What the displacement tells through the equation of motion; a bound where the part is not believed in."""
     if misfit.unlike and not quick.known:  # of a contact of another kind the fit tells no more
         return quick
+    if misfit.left > LOST:  # and one that is nowhere near tells nothing
+        return _estimate(quick, quick.value, quick.interval, quick.method, [quick.status], misfit)
     part = {LEVEL: KINETIC, FALL: SLOPE, GIVES: GIVE}.get(quick.name, EXCESS)
     reach = 0.0
     if part not in belief.values:
