@@ -275,17 +275,19 @@ def _of_breakaway(breakaway: Breakaway, when: str) -> Iterator[str]:
         why = ratio.status if breakaway.status == "ok" else breakaway.status
         yield f"The breakaway force is not known: {why}."
         return
+    if low <= 1 + ALIKE and high > LOOSE:
+        yield f"{when} the record hardly tells what it bears: at most {high:.2g} times the sliding friction."
+        return
     if not stands(ratio.status):
-        if low < 1 and high > LOOSE:
-            yield f"{when} the record hardly tells what it bears: at most {high:.2g} times the sliding friction."
-            return
         most = f"at most {high:.3g}" if low < 1 else value_of(ratio)
         yield f"{when} it seems to bear {most} times as much as while it slides."
         return
-    more = "more than" if low > 1 + ALIKE else "less than" if high < 1 - ALIKE else "about as much as"
+    more = "more than" if low > 1 + ALIKE else "less than" if high < 1 - ALIKE else ""
+    times = f"while it slides ({value_of(ratio)} times, 95 %: {interval_of(ratio)})"
     both = [estimate for estimate in (breakaway.forward, breakaway.back) if estimate]
     sides = " and ".join(f"{value_of(estimate)} {estimate.name.split()[-1]}" for estimate in both)
-    yield (f"{when} it bears {sides}: {more} while it slides ({value_of(ratio)} times, 95 %: {interval_of(ratio)}).")
+    # of what is not told from the sliding friction the two directions may differ as that does
+    yield f"{when} it bears {sides}: {more} {times}." if more else f"{when} it bears about as much as {times}."
     rings = [estimate for estimate in (breakaway.ringing_forward, breakaway.ringing_back) if estimate is not None]
     if rings:
         yield f"After slip begins it rings at {' and '.join(f'{value_of(e)} {e.name.split()[-1]}' for e in rings)}."
