@@ -71,3 +71,32 @@ def test_rests_at_turns_are_told_by_the_encoders_noise(servo, bits: int) -> None
     assert sticks.share.includes(rests)
     assert sticks.share.interval[1] < 1.5 * rests
     assert not sticks.per_cycle.known  # two tones whose period is that of the log
+
+
+def repeating(slow: float, fast: float, cogs: float = 0.0) -> ss.Record:
+    """A joint that rubs in proportion to its load, moved by two tones of closed form and read in 12 bits."""
+    t, count = np.arange(10000) / 250, 2 * np.pi / 2**12
+    waves = ((1.1, 2 * np.pi * slow, 0.0), (0.25, 2 * np.pi * fast, 0.4))
+    q, v, a = (sum(size * w**n * np.sin(w * t + shift + n * np.pi / 2) for size, w, shift in waves) for n in range(3))
+    weight = 8 * np.sin(q + 0.2) + np.cos(q + 0.2) + cogs * np.sin(40 * q)
+    torque = 0.2 * a + 0.5 * v + weight + np.sign(v) * (0.8 + 0.12 * np.abs(weight))
+    torque += 5e-3 * np.random.default_rng(0).standard_normal(t.size)
+    return ss.Record.of({"theta": np.round((q + 0.2) / count) * count, "force": torque}, fs=250, units={"force": "N m"})
+
+
+@pytest.mark.parametrize(("slow", "fast"), [(0.2, 1.1), (0.25, 0.75), (0.2, 1.1318)])
+def test_what_counts_leave_of_a_motion_that_repeats_is_no_torque_along_the_way(slow: float, fast: float) -> None:
+    """It is the same in each cycle: teeth were said to make 0.05 to 0.12 N m, and all friction was doubted."""
+    joint = regress_joint(repeating(slow, fast))
+    assert joint.cogging is None
+    assert joint.static is None
+    for name, value in {"inertia": 0.2, "viscous": 0.5, "forward": 0.8, "back": 0.8, "load": 0.12}.items():
+        estimate = getattr(joint, name)
+        assert stands(estimate.status)
+        assert abs(estimate.value - value) < 3 * estimate.sd
+
+
+def test_teeth_are_felt_in_a_motion_that_repeats() -> None:
+    joint = regress_joint(repeating(0.2, 1.1, cogs=0.15))
+    assert joint.cogging is not None
+    assert joint.cogging.includes(0.15)

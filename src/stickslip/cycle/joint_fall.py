@@ -190,7 +190,8 @@ class _Solved:
     def fit(self, number: int) -> LeastSquares:
         """One of them, with all that makes its intervals (two-stage least squares)."""
         design = self.designs[number]
-        return least_squares(design, self.torque, instruments=self.basis @ (self.basis.T @ design), noise=self.noise)
+        known = self.basis @ (self.basis.T @ design)
+        return least_squares(design, self.torque, instruments=known, noise=self.noise).of_a_cycle()
 
 
 def speed_of(log: Log, *, steered: bool = False) -> tuple[Array, float]:
@@ -510,7 +511,7 @@ def misfits(
     if _surely(*grows):
         line = f"friction surely grows with the torque of the bodies, by {grows[0]:.2g} of it: this is a mean over that"
         seen.append(Misfit(RUBS, Doubt(line, BORNE, lesser=True)))
-    what, size, elsewhere = data.ripple(fit.residual)
+    what, size, elsewhere = data.ripple(fit)
     if size > ROUNDING * float(np.sqrt(np.mean(data.torque**2))):
         unit = (TURNING if turning else UNITS)["coulomb"]
         doubt = Doubt(f"{what} changes along the way, by {size:.2g} {unit} r.m.s.", PLACE, lesser=True)

@@ -79,6 +79,7 @@ SEEN = 0.01  # of the power of a wave, that the windows have to leave of it
 # Independent samples times the share of what is left that a wave explains: of 170 logs without cogging, seeds 201000
 # to 201021, 15 at most, of 101 others once over 25 by a wave no longer tried, with cogging to 33 or more on 19 of 20.
 COGGED = 25.0
+LUCK = 2.0  # times the power that chance alone brings on average; F with 16 degrees of freedom, one in a hundred
 OFTEN, USUAL = 0.25, 0.02  # odds that a torque is late, chosen, and s by which it then usually is, chosen
 # s, and how that varies, chosen: of a torque in time. What a computer at 1 kHz sets acts half a period late on average.
 HELD = (0.0, 5e-4)
@@ -163,18 +164,24 @@ class JointData:
         smoothed = [log.sliding.at(np.asarray(log.torque)) for log in logs]
         return replace(self, logs=tuple(logs), torque=np.concatenate(smoothed))
 
-    def ripple(self, residual: Array) -> tuple[str, float, Array]:
+    def ripple(self, fit: LeastSquares) -> tuple[str, float, Array]:
         """What of the residual repeats along the way: whether as friction, which changes with the side, or as torque,
         its size, and what it makes of the torque at the rows if it stands elsewhere along the way, shape (parts, n).
+
+        What recurs with the motion repeats along the way by chance: then it is to be more than means over as many
+        parts leave of so many independent samples.
         """
         slides = [log.sliding for log in self.logs]
         weights = np.concatenate([one.weights for one in slides])
         number = places(np.concatenate([log.position[log.sliding.rows] for log in self.logs]))
         sides = {"friction": np.concatenate([one.side[one.rows] for one in slides]), "torque": np.ones(len(number))}
-        seen = {what: repeating(number, residual / weights * side) for what, side in sides.items()}
+        seen = {what: repeating(number, fit.residual / weights * side) for what, side in sides.items()}
         what = max(seen, key=lambda name: float(np.linalg.norm(seen[name])))
         elsewhere = np.stack([np.roll(seen[what], shift)[number] for shift in range(len(seen[what]))])
         size = float(np.sqrt(np.mean(elsewhere[0] ** 2)))
+        chance = LUCK * len(elsewhere) / fit.independent * float(np.mean((fit.residual / weights) ** 2))
+        if fit.recurring > 1 and size**2 < chance:
+            return what, 0.0, np.zeros_like(elsewhere)
         return what, size, elsewhere * sides[what] * weights
 
     def unshared(self, inertia: float, viscous: float) -> tuple[Array, Array]:
@@ -561,7 +568,7 @@ def _solved(data: JointData, terms: tuple[str, ...], share: float, pull: tuple[f
     if "load" in terms and data.by_gravity:  # linear about `share`: its column stands in gravity's already
         torque = torque + share * columns[:, terms.index("load")]
     instruments = None if not data.followed else data.columns(terms, share, pull, steered=True)
-    return least_squares(columns, torque, instruments=instruments, noise=data.noise(terms))
+    return least_squares(columns, torque, instruments=instruments, noise=data.noise(terms)).of_a_cycle()
 
 
 def _pull(fit: LeastSquares, terms: Sequence[str]) -> tuple[float, float]:

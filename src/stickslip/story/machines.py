@@ -229,12 +229,14 @@ def _laws(joints: Sequence[JointFriction]) -> Iterator[str]:
     if any(joint.load is None for joint in joints):
         return
     left = [law for law in LAWS if all(law in joint.laws for joint in joints)]
-    *others, last = [law for law in LAWS if law not in left] or ["none"]
-    denied = f"{', '.join(others)} and {last} are" if others else f"{last} is"
-    yield (
-        f"Of the friction laws M1 to M6 of servos {denied} denied; "
-        f"{left[0]} is the simplest of the others: {SIMPLEST[left[0]]}."
-    )
+    *others, last = [law for law in LAWS if law not in left] or [""]
+    simplest = f"{left[0]} is the simplest of the others: {SIMPLEST[left[0]]}"
+    if not last:
+        yield f"None of the friction laws M1 to M6 of servos is denied; {SIMPLEST[left[0]]} (M1) will do."
+    elif others:
+        yield f"Of the friction laws M1 to M6 of servos {', '.join(others)} and {last} are denied; {simplest}."
+    else:
+        yield f"Of the friction laws M1 to M6 of servos {last} is denied; {simplest}."
 
 
 def _in_doubt(estimate: Estimate, said: set[str]) -> str:
