@@ -55,8 +55,8 @@ class LeastSquares:
         By how much of the error of a sample and of its neighbours, which share it, the fit follows them.
     restored : ndarray, shape (p,)
         By how much each coefficient would grow with the noise of the columns, in proportion.
-    recurring : float
-        By how many each sample counts, where what is left comes again with the motion; then `independent` counts it.
+    cyclic : bool
+        Whether what is left may come again with a motion that does; standard deviations then count it once.
     """
 
     coefficients: Array
@@ -66,7 +66,7 @@ class LeastSquares:
     projection: Array
     leverage: Array
     restored: Array
-    recurring: float = 1.0
+    cyclic: bool = False
 
     @cached_property
     def _sure(self) -> tuple[Array, Array]:
@@ -74,6 +74,11 @@ class LeastSquares:
         pairs = [_influenced(form, self.residual, self.independent, terms) for form in self.projection]
         wider = math.sqrt(self.recurring)
         return np.array([wider * sd for sd, _ in pairs]), np.array([freedom for _, freedom in pairs])
+
+    @cached_property
+    def recurring(self) -> float:
+        """In how many cycles of a motion what is left is the same (:func:`recurrence`): all tell no more than one."""
+        return recurrence(self.residual) if self.cyclic else 1.0
 
     @property
     def sd(self) -> Array:
@@ -104,11 +109,6 @@ class LeastSquares:
         restored = NOISE_UNSURE * float(np.asarray(weights) @ self.restored)
         value, sd = float(np.asarray(weights) @ self.coefficients), math.hypot(sd, beside, restored)
         return Estimate.normal(name, value, sd=sd, unit=unit, method=method, quantile=student(freedom), **more)
-
-    def of_a_cycle(self) -> LeastSquares:
-        """The same where what is left may recur with a motion that does: all cycles tell no more of that than one."""
-        recurring = recurrence(self.residual)
-        return replace(self, independent=self.independent / recurring, recurring=recurring)
 
 
 def _influenced(form: Array, residual: Array, independent: float, terms: int) -> tuple[float, float]:

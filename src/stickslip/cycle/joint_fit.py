@@ -79,7 +79,9 @@ SEEN = 0.01  # of the power of a wave, that the windows have to leave of it
 # Independent samples times the share of what is left that a wave explains: of 170 logs without cogging, seeds 201000
 # to 201021, 15 at most, of 101 others once over 25 by a wave no longer tried, with cogging to 33 or more on 19 of 20.
 COGGED = 25.0
-LUCK = 2.0  # times the power that chance alone brings on average; F with 16 degrees of freedom, one in a hundred
+# Of the power that is left, what recurs along the way: 0.24 to 0.4 of gears and of a real axis' ball screw, 0.2 at most
+# of seven joints whose counts recur with the motion; and times what chance brings, one in a hundred (F of 16).
+MUCH, LUCK = 0.22, 2.0
 OFTEN, USUAL = 0.25, 0.02  # odds that a torque is late, chosen, and s by which it then usually is, chosen
 # s, and how that varies, chosen: of a torque in time. What a computer at 1 kHz sets acts half a period late on average.
 HELD = (0.0, 5e-4)
@@ -168,8 +170,8 @@ class JointData:
         """What of the residual repeats along the way: whether as friction, which changes with the side, or as torque,
         its size, and what it makes of the torque at the rows if it stands elsewhere along the way, shape (parts, n).
 
-        What recurs with the motion repeats along the way by chance: then it is to be more than means over as many
-        parts leave of so many independent samples.
+        What recurs with the motion recurs at its places too: then it is to be more than means over as many parts leave
+        of so many independent samples, or much of what is left.
         """
         slides = [log.sliding for log in self.logs]
         weights = np.concatenate([one.weights for one in slides])
@@ -179,8 +181,8 @@ class JointData:
         what = max(seen, key=lambda name: float(np.linalg.norm(seen[name])))
         elsewhere = np.stack([np.roll(seen[what], shift)[number] for shift in range(len(seen[what]))])
         size = float(np.sqrt(np.mean(elsewhere[0] ** 2)))
-        chance = LUCK * len(elsewhere) / fit.independent * float(np.mean((fit.residual / weights) ** 2))
-        if fit.recurring > 1 and size**2 < chance:
+        least = min(LUCK * len(elsewhere) * fit.recurring / fit.independent, MUCH)
+        if fit.recurring > 1 and size**2 < least * float(np.mean((fit.residual / weights) ** 2)):
             return what, 0.0, np.zeros_like(elsewhere)
         return what, size, elsewhere * sides[what] * weights
 
@@ -235,7 +237,7 @@ def cogged(data: Sequence[JointData]) -> list[JointData]:
     best = waves[int(np.argmax(np.concatenate([explained(some, every) for some in np.array_split(waves, 8)])))]
     finer = best + np.linspace(-1, 1, 41) / (2 * np.pi * reach)
     shares = explained(finer, 1)
-    if not fit.independent * float(shares.max()) > COGGED:
+    if not fit.independent * float(shares.max()) > COGGED * fit.recurring:
         return list(data)
     cogs = float(finer[int(np.argmax(shares))]), float(place.min()) + reach / 2
     with_cogs = [tuple(replace(log, cogs=cogs) for log in one.logs) for one in data]
@@ -568,7 +570,8 @@ def _solved(data: JointData, terms: tuple[str, ...], share: float, pull: tuple[f
     if "load" in terms and data.by_gravity:  # linear about `share`: its column stands in gravity's already
         torque = torque + share * columns[:, terms.index("load")]
     instruments = None if not data.followed else data.columns(terms, share, pull, steered=True)
-    return least_squares(columns, torque, instruments=instruments, noise=data.noise(terms)).of_a_cycle()
+    fit = least_squares(columns, torque, instruments=instruments, noise=data.noise(terms))
+    return replace(fit, cyclic=True)
 
 
 def _pull(fit: LeastSquares, terms: Sequence[str]) -> tuple[float, float]:
