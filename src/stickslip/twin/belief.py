@@ -485,6 +485,15 @@ class Belief:
             out[name] = (column + moved @ by_start) * read / self.size(name)
         return out | {name: column * read for name, column in zip(scaled, columns[len(names) :], strict=False)}
 
+    def strayed(self, rng: np.random.Generator) -> Array:
+        """How else it would move [m], were its drive read by a sensor with other noise of the same size.
+
+        A record's own is in its belief's motion: a random drive's was in no interval, and three of its levels missed.
+        """
+        if not isinstance(self.drive, Sampled | Tones):
+            return np.zeros(len(self.record))
+        return np.asarray(replace(self, drive=self.drive.strayed(rng)).moved - self.moved)
+
     def _instants(self, run: Trajectory) -> Array:
         """When x is read, on the run's clock [s]."""
         first = max(0.0, -self.late) - self.sensor.lag
