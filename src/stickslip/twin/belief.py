@@ -530,7 +530,7 @@ class Belief:
         gains["x"] = self.gain
         if (moves := driving(self.record)) is not None:  # what it wrote, it writes again
             gains[moves] = 1 / (1 + self.values.get(DRIVE[0], 0.0))
-        # Where a rest lies between two counts is chance: error of a count stands as long as the mass does.
+        # Where a rest lies between two counts is chance, and that error stands as long as the mass does.
         zeros = {s.channel: s.digitiser.step * rng.uniform(-0.5, 0.5) for s in self.rig.sensors if s.digitiser.step}
         sensors = (
             replace(
