@@ -25,8 +25,9 @@ from stickslip.law.driven import Sampled, Tones
 from stickslip.story.friction import of_sticks
 from stickslip.twin.belief import EXCESS, GAIN, LATE, SPRING
 from stickslip.twin.descent import within_ends
+from stickslip.twin.likeness import ASTRAY, Misfit
 from stickslip.twin.search import _with_slips, believe
-from stickslip.twin.trial import ASTRAY, _Misfit, try_on_twins
+from stickslip.twin.trial import try_on_twins
 
 RATIO = "static over sliding friction"
 PULL = 800 * 4e-3  # N: what shakes these rigs
@@ -449,7 +450,7 @@ def test_a_slip_is_named_once_and_by_the_nearest_rig() -> None:
     belief = asked(STOPS)[1].trial.belief
     off = [(LATE, -2e-4), (SPRING, 2e-3), (SPRING, 1e-3)]
     slips = replace(belief.at(**{LATE: -1e-4}), rivals=tuple(belief.at(**{name: value}) for name, value in off))
-    assert _Misfit.of(slips, 1.0, 1.0).slip == "x 0.1 ms early or a spring 0.1 % larger than stated"
+    assert Misfit.of(slips, 1.0, 1.0).slip == "x 0.1 ms early or a spring 0.1 % larger than stated"
 
 
 def test_a_slip_is_named_with_what_looks_like_it() -> None:

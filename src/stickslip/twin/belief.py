@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, fields, replace
-from functools import cached_property, lru_cache, partial
+from functools import cached_property, lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -24,7 +24,6 @@ from stickslip.parameters import declaration
 from stickslip.record.record import Record
 from stickslip.rig.rig import Rig
 from stickslip.rig.sensor import Digitiser, MeasuredNoise, Noise, Sensor
-from stickslip.signals.noise import density_beside
 from stickslip.solve.curved import CurvedTrajectory
 from stickslip.solve.sensitivity import sensitivity
 from stickslip.solve.simulate import simulate
@@ -63,7 +62,6 @@ SLIDES = 0.2  # of the largest speed, above which friction is that of sliding: b
 FALL = 0.02  # of friction, over the speeds at which it slides
 EVENTS = 1000  # in a cycle, beyond which a rig that is tried is given up
 FOLLOWED = 1e-12  # tolerance to which curved laws are followed: the error of a difference is this over its step
-STEADY = 0.1  # of x that may be beside the harmonics: of a transient a wrong law leaves some tenth, which is no noise
 NEAR = 1.1  # times a sensor's noise, that a search may leave to have come to its end
 TINY = 1e-9  # of the motion: noise below is rounding
 FURTHEST = 30.0  # step of a logarithm: beyond it nothing is told
@@ -340,31 +338,6 @@ class Belief:
             if float(apart @ apart) > deviations**2 * fit.weight:
                 return part
         return None
-
-    def with_measured_noise(self) -> Belief:
-        """The same, the noise of x and of its drive as what is left of them beside the harmonics: slow, or with a hum.
-
-        A law or a constant that is wrong leaves what repeats with each cycle of a steady motion, and so nothing there.
-        Of a motion that is not steady the noise stays white.
-        """
-        if not isinstance(self.drive, Tones):
-            return self
-        beside = partial(density_beside, fs=self.record.fs, frequency=self.drive.tones[0][1])
-        moved = levelled(self.moved)
-        own = beside(moved, white=0.0)
-        if own is None or own[1] * float(own[0].sum()) > STEADY**2 * float(moved.var()):
-            return self
-        rig = self.rig
-        left = {"x": self.residual, driving(self.record): self.drive.beside}
-        for sensor in rig.sensors:
-            if sensor.channel in left:
-                counts = sensor.digitiser.step**2 / 12  # which its twins have of their own
-                noise = beside(left[sensor.channel], white=math.sqrt(sensor.noise.white**2 + counts))
-                assert noise is not None
-                density, spacing = np.maximum(noise[0] - 2 * counts / self.record.fs, 0.0), noise[1]
-                measured = MeasuredNoise(sensor.noise.white, density=density, spacing=spacing)
-                rig = rig.having(sensor.channel, noise=measured)
-        return replace(self, rig=rig)
 
     @cached_property
     def moved(self) -> Array:

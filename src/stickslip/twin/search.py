@@ -13,14 +13,14 @@ import numpy as np
 from stickslip.balance.motion import driving, is_measured, lacking
 from stickslip.drives.kinds import HarmonicBase
 from stickslip.errors import StickslipError
-from stickslip.law.driven import DriveFrom, possible_drives
+from stickslip.law.driven import DriveFrom, Tones, possible_drives
 from stickslip.laws.coulomb import LinearSlope
 from stickslip.oscillator import Oscillator
 from stickslip.record.flaws import saturated
 from stickslip.record.record import Record
 from stickslip.rig.rig import Rig
-from stickslip.rig.sensor import Digitiser, Mount, Noise, Sensor
-from stickslip.signals.noise import noise_level, quantisation_step
+from stickslip.rig.sensor import Digitiser, MeasuredNoise, Mount, Noise, Sensor
+from stickslip.signals.noise import density_beside, noise_level, quantisation_step
 from stickslip.statistics import least_squares
 from stickslip.twin.belief import (
     BENT,
@@ -57,6 +57,7 @@ STEPS = 4  # passes of it over each
 LEAST = 50  # samples
 SEARCHED = 4000  # samples in which it is searched where a law's valley lies
 SENSED = ("x", "z", "force", "v", "a", "load")  # channels that a virtual rig writes
+STEADY = 0.1  # of x that may be beside the harmonics: of a transient a wrong law leaves some tenth, which is no noise
 LAWS = 3  # that are tried beside the simplest
 CLOSE = 6.6  # chi-squared by which one law leads another, one in a hundred by chance
 SLIPPED = 11.0  # chi-squared from which a constant, or the clock of x, may be off: one in a thousand by chance
@@ -141,7 +142,7 @@ def believe(record: Record, *, mapped: Map = map) -> Belief:
     simple = min((_linear(record, oscillator, drive) for drive in drives), key=misfit)
     belief = _without_chance(_richer(_without_chance(simple, SLOPE, KINETIC), simple.as_stated(), mapped), SLOPE)
     belief = _with_slips(belief, mapped)
-    measured = belief.with_measured_noise()  # which, slow, weighs less against what is stated of the constants
+    measured = _with_measured_noise(belief)  # which, slow, weighs less against what is stated of the constants
     return belief if measured is belief else _refined_on(measured, record)
 
 
@@ -557,3 +558,29 @@ def _sensors(record: Record) -> list[Sensor]:
                 )
             )
     return sensors
+
+
+def _with_measured_noise(belief: Belief) -> Belief:
+    """The same, the noise of x and of its drive as what is left of them beside the harmonics: slow, or with a hum.
+
+    A law or a constant that is wrong leaves what repeats with each cycle of a steady motion, and so nothing there.
+    Of a motion that is not steady the noise stays white.
+    """
+    if not isinstance(belief.drive, Tones):
+        return belief
+    beside = partial(density_beside, fs=belief.record.fs, frequency=belief.drive.tones[0][1])
+    moved = levelled(belief.moved)
+    own = beside(moved, white=0.0)
+    if own is None or own[1] * float(own[0].sum()) > STEADY**2 * float(moved.var()):
+        return belief
+    rig = belief.rig
+    left = {"x": belief.residual, driving(belief.record): belief.drive.beside}
+    for sensor in rig.sensors:
+        if sensor.channel in left:
+            counts = sensor.digitiser.step**2 / 12  # which its twins have of their own
+            noise = beside(left[sensor.channel], white=math.sqrt(sensor.noise.white**2 + counts))
+            assert noise is not None
+            density, spacing = np.maximum(noise[0] - 2 * counts / belief.record.fs, 0.0), noise[1]
+            measured = MeasuredNoise(sensor.noise.white, density=density, spacing=spacing)
+            rig = rig.having(sensor.channel, noise=measured)
+    return replace(belief, rig=rig)

@@ -17,24 +17,18 @@ from stickslip.balance.motion import NEARLY
 from stickslip.errors import EstimateError, StickslipError
 from stickslip.estimate import FEW, NORMAL_95, UNSTATED, Doubt, Estimate, Status, doubts_of, kinds
 from stickslip.record.record import Record
-from stickslip.statistics import BINS, repeating, student
+from stickslip.statistics import student
 from stickslip.twin import descent
 from stickslip.twin.belief import (
-    DAMPER,
-    DRIVE,
     EXCESS,
-    GAIN,
     GIVE,
     KINETIC,
-    LATE,
-    MASS,
     RATE,
     SLOPE,
-    SPEED,
-    SPRING,
     Belief,
     levelled,
 )
+from stickslip.twin.likeness import ASTRAY, LOST, Misfit, strays
 from stickslip.twin.search import CHANCE, CLOSE
 from stickslip.workers import Map
 
@@ -73,22 +67,8 @@ SIZES = tuple(1e-4 * 1.4**step for step in range(30))  # of friction, or of the 
 STICKS = ("stick", "microstick")  # kinds of event
 JUMPED = 3.0  # times the noise of the others, by which a twin has moved another way
 ANSWERED = 0.5  # of the twins, that must answer a question for the record's answer to be tried on them
-STRAINED = 4.0  # standard deviations by which a constant may be off before that is said
-LOST = 0.3  # of x, that the nearest rig may leave: beyond, twins scatter so far that none strays from another
-SAME = 0.95  # of x, that is the same in every cycle, where noise is told from a misfit by that: a bin of 16 holds 0.99
-UNLIKE = 1.15  # times what noise explains, by which x may stray from its twin before that is said
-# Of the sliding friction, the force that a constant amounts to which is off by more than was stated, and explains x,
-# below which the numbers of dry friction alone stand: nobody knows a spring to a ten thousandth, and of a quiet record
-# x asks for less. Those of a part that acts briefly or weakly do not, since as small a force may pass for all of it: of
-# ten rigs with textbook bristles by tests/stepped.py two told static friction 1.3 and 2.3 times as large as it is,
-# beside a misfit of 0.3 %. Beside a curve or a contact that gives way it has to be FINER: with gains and constants off
-# by half a per cent these took that up, and sliding friction was 1.1 and 1.5 % off beside a force of 0.2 and 0.3 %.
-SLIGHT, FINER = 0.01, 0.001
 BRIEF = (FALL, *STATIC, GIVES)
-RICHER = {SPEED, GIVE, RATE}
-LOADED = 0.01  # chosen: of its mean, the swing of a recorded normal load from which friction that follows it is meant
-RATIOS = {SPRING, MASS, GAIN}  # by how much they are off stands as a logarithm
-ASTRAY, UNFELT, RIVALS = "unlike its twins", "not felt", "another law as likely"  # kinds of doubt
+UNFELT, RIVALS = "not felt", "another law as likely"  # kinds of doubt
 
 
 @dataclass(frozen=True)
@@ -149,8 +129,8 @@ class Trial:
         return self._misfit.doubt
 
     @property
-    def _misfit(self) -> _Misfit:
-        return _Misfit.of(self.belief, self.strays, self.repeats)
+    def _misfit(self) -> Misfit:
+        return Misfit.of(self.belief, self.strays, self.repeats)
 
     @property
     def unlike(self) -> bool:
@@ -161,8 +141,7 @@ class Trial:
     def slips(self) -> list[Belief]:
         """The nearest rig of each kind that has something off; none where that is slight, or does not explain x."""
         misfit = self._misfit
-        explained = misfit.left <= LOST and misfit.strays <= UNLIKE and misfit.load_swing <= LOADED
-        return self.belief.slips if explained and misfit.unlike else []
+        return self.belief.slips if misfit.explained and misfit.unlike else []
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON: how many, the law believed in, what would be felt, and how far x strays."""
@@ -236,9 +215,9 @@ def try_on_twins(
             "an answer is tried on most of its twins",
             "take the quick answers",
         )
-    misfit = _Misfit.of(belief, *_strays(belief, twins, frequency))
+    misfit = Misfit.of(belief, *strays(belief, np.array([twin.noise for twin in twins]), frequency))
     tried = {}
-    others = {} if misfit.left > LOST else _counted_offsets(belief, frequency)
+    others = {} if misfit.lost else _counted_offsets(belief, frequency)
     for name in ASKED:
         if name in answers and answers[name].known:
             pairs = [(twin.answers.get(name), twin.truth[name]) for twin in twins]
@@ -249,7 +228,7 @@ def try_on_twins(
         answers = {**answers, GIVES: Estimate(GIVES, belief.contact, (0.0, math.inf), math.inf, "N/m", "fit to x")}
     for name, value in FITTED.items():
         if name in answers and (name != GIVES or GIVE in belief.values):
-            apart = [] if misfit.left > LOST else _rival_offsets(belief, value)
+            apart = [] if misfit.lost else _rival_offsets(belief, value)
             tried[name] = _widened(_fitted(answers[name], value, belief, twins, misfit), apart)
     offset = tried[OFFSET].value if OFFSET in tried else 0.0
     tried |= {name: _widened(tried[name], [times * offset]) for name, times in ZERO.items() if name in tried}
@@ -264,88 +243,6 @@ def try_on_twins(
     if (share := felt[SHARE]) is not None and not share.claimed:
         bounded[SHARE] = _widened(bounded[SHARE], [-bounded[SHARE].value]).within(*BOUNDS[SHARE])
     return Trial(count, belief, bounded, felt, misfit.strays, misfit.repeats)
-
-
-@dataclass(frozen=True)
-class _Misfit:
-    """How far a record is from its twins' kind: by its displacement, and by constants that would have to be off."""
-
-    strays: float
-    repeats: float
-    strain: float
-    left: float
-    slip: str
-    feigned: float  # N, as friction
-    share: float  # by which a gain or a constant is off
-    slight: bool
-    load_swing: float
-
-    @classmethod
-    def of(cls, belief: Belief, strays: float, repeats: float) -> _Misfit:
-        """That of a belief's record, with what else as well as its slip would be one."""
-        slip, feigned = " or ".join(rig.slip for rig in belief.slips), _feigned(belief)
-        share = max((abs(math.expm1(belief.values[name])) for name in _off(belief) if name in RATIOS), default=0.0)
-        most = FINER if RICHER & belief.values.keys() else SLIGHT
-        little = feigned < most * belief.kinetic and share < most
-        slight = little and strays <= UNLIKE and belief.left <= LOST
-        return cls(
-            strays, repeats, belief.strain, belief.left, slip, feigned, share, bool(slight), _load_swing(belief.record)
-        )
-
-    @property
-    def unlike(self) -> bool:
-        """Whether the record is not of its twins' kind."""
-        return self.doubt is not None and not self.doubt.lesser
-
-    @property
-    def doubt(self) -> Doubt | None:
-        """What is said of it, where it is too far."""
-        if self.left > LOST:
-            what = f"its nearest twin leaves {100 * self.left:.0f} % of x"
-            why = ": a constant, a unit or a channel is not as stated, or the contact is of no kind that was tried"
-        elif self.strays > UNLIKE:
-            what = f"x strays {self.strays:.2g} times as far from its twins as noise explains"
-            why = ": the contact is of no kind that was tried, or a constant is not as stated"
-            if not self.repeats:
-                why = ", in each cycle another way, as slow noise of a sensor does, which the intervals do not count"
-        elif self.slip:
-            what = f"its nearest twin has {self.slip}"
-            why = ": correct that, or say how sure it is, or the contact is of no kind that was tried"
-        elif self.strain > STRAINED:
-            what = f"its nearest twin has a constant {self.strain:.0f} standard deviations off"
-            why = ": the contact is of no kind that was tried, or that constant is less sure than stated"
-        else:
-            return None
-        if self.load_swing > LOADED:
-            what = f"its normal load swings by {100 * self.load_swing:.2g} %, which that of its twins does not"
-            why = ": no contact whose friction follows a recorded load was tried"
-        if self.slight:
-            why = f", as a force less than {100 * SLIGHT:g} % of the friction, which the intervals count"
-        return Doubt(what + why, ASTRAY, lesser=self.slight)
-
-
-def _load_swing(record: Record) -> float:
-    """Standard deviation of the recorded normal load over its mean; none where none was recorded."""
-    load = record["normal"][np.isfinite(record["normal"])] if "normal" in record else np.ones(1)
-    return float(np.std(load) / abs(np.mean(load))) if load.any() and np.mean(load) else 0.0
-
-
-def _off(belief: Belief) -> set[str]:
-    """What a record's nearest rig has off by more than was stated."""
-    strained = {name for name, sd in belief.unsure.items() if abs(belief.values[name]) > STRAINED * sd}
-    return strained | set(belief.slipped)
-
-
-def _feigned(belief: Belief) -> float:
-    """Root mean square of the force [N] that what is off amounts to."""
-    record, stated, x = belief.record, belief.stated, belief.record["x"]
-    z, driven = (record[name] if name in record else np.zeros(len(record)) for name in ("z", "force"))
-    spring = stated.stiffness * (x - z)
-    inertia = driven - record["friction"] - spring
-    by_x = inertia + stated.stiffness * x
-    forces = {SPRING: spring, MASS: inertia, GAIN: by_x, LATE: np.gradient(by_x) * record.fs, DAMPER: record["v"]}
-    forces |= dict.fromkeys(DRIVE, stated.stiffness * z + driven)
-    return math.hypot(*(belief.values[name] * float(np.std(forces[name])) for name in _off(belief)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -435,7 +332,7 @@ def _share_felt(share: Estimate | None) -> Power | None:
     return Power(share.value, 0.0, float(NormalDist().inv_cdf(1 - CHANCE)) * share.sd)
 
 
-def _tried(quick: Estimate, pairs: list[tuple[Estimate | None, float]], misfit: _Misfit, *, both: bool) -> Estimate:
+def _tried(quick: Estimate, pairs: list[tuple[Estimate | None, float]], misfit: Misfit, *, both: bool) -> Estimate:
     """The answer less its bias, with the interval that held on the twins; with `both` that of the quick one in it."""
     errors = np.array([e.value - true for e, true in pairs if e is not None and e.known and math.isfinite(true)])
     if len(errors) < max(8, ANSWERED * len(pairs)):
@@ -451,12 +348,12 @@ def _tried(quick: Estimate, pairs: list[tuple[Estimate | None, float]], misfit: 
 
 
 def _fitted(
-    quick: Estimate, value: Callable[[Belief], float], belief: Belief, twins: list[_Twin], misfit: _Misfit
+    quick: Estimate, value: Callable[[Belief], float], belief: Belief, twins: list[_Twin], misfit: Misfit
 ) -> Estimate:
     """What the displacement tells through the equation of motion; a bound where the part is not believed in."""
     if misfit.unlike and not quick.known:  # of a contact of another kind the fit tells no more
         return quick
-    if misfit.left > LOST:  # and one that is nowhere near tells nothing
+    if misfit.lost:  # and one that is nowhere near tells nothing
         return _estimate(quick, quick.value, quick.interval, quick.method, [quick.status], misfit)
     part = {LEVEL: KINETIC, FALL: SLOPE, GIVES: GIVE}.get(quick.name, EXCESS)
     reach = 0.0
@@ -529,7 +426,7 @@ def _work_of_drift(belief: Belief, frequency: float) -> float:
     return belief.stated.stiffness * float(np.ptp(line)) / (belief.record.duration * frequency) * float(np.ptp(x)) / 2
 
 
-def _feigned_offsets(answer: Estimate, belief: Belief, misfit: _Misfit) -> list[float]:
+def _feigned_offsets(answer: Estimate, belief: Belief, misfit: Misfit) -> list[float]:
     """By how much twice a force that passes for friction would move an answer either way; none of what is counted.
 
     And twice the share by which a gain or a constant is off: x tells their ratios alone, and the others, and with them
@@ -578,7 +475,7 @@ def _estimate(
     interval: tuple[float, float],
     method: str,
     doubts: Sequence[Doubt | str],
-    misfit: _Misfit,
+    misfit: Misfit,
     checks: tuple[str, ...] = (),
 ) -> Estimate:
     """The answer as tried, with a doubt where the record is not of its twins' kind."""
@@ -587,25 +484,3 @@ def _estimate(
         doubts = [*doubts, Doubt("as small a force may pass for it", ASTRAY)]
     sd = (interval[1] - interval[0]) / (2 * NORMAL_95)
     return Estimate(quick.name, value, interval, sd, quick.unit, method, Status(*doubts), checks or quick.checks)
-
-
-def _strays(belief: Belief, twins: list[_Twin], frequency: float) -> tuple[float, float]:
-    """How much more x strays from its nearest rig than a twin's does from its own, which noise alone parts.
-
-    And how much of that is the same in every cycle: a law or a constant that is wrong is, slow noise is not. Of a
-    motion that is not the same in every cycle, all is counted.
-    """
-    if belief.fit is None:
-        return math.inf, math.inf
-    apart = levelled(np.array([twin.noise for twin in twins]).T)
-    apart -= belief.fit.jacobian @ (belief.fit.gain @ apart)
-    # nine of ten twins stray no further: of a mass that rests between two counts some stray a third more than the mean
-    explained = math.sqrt(float(np.quantile(np.mean(apart**2, axis=0), 0.9)))
-    strays = float(np.std(belief.residual))
-    if not explained:
-        return math.inf, math.inf
-    cycles = (belief.record.time - belief.record.start) * (0.0 if math.isnan(frequency) else frequency)
-    number = (cycles % 1.0 * BINS).astype(np.intp)
-    moved, left = (repeating(number, values)[number] for values in (levelled(belief.record["x"]), belief.residual))
-    same = float(np.std(moved)) > SAME * float(np.std(belief.record["x"]))
-    return strays / explained, (float(np.std(left)) if same else strays) / explained
