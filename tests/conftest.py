@@ -47,7 +47,7 @@ def _figures_where_looked_at(request: pytest.FixtureRequest, monkeypatch: pytest
 
 @pytest.fixture(autouse=True)
 def _loudness_where_heard(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
-    """As where the extra `sound` is not installed, but in tests marked `loudness`: a second of sound takes five."""
+    """As where the extra `sound` is not installed, but in tests marked `loudness`: it takes seconds to load."""
     if request.node.get_closest_marker("loudness") is None:
         monkeypatch.setitem(sys.modules, "mosqito", None)
 

@@ -12,7 +12,8 @@ import stickslip as ss
 from stickslip.bench import Cycle, Device, Fault, Monitor, Sim, Tone, answers, blocks
 from stickslip.bench.replay import Replay
 from stickslip.bench.sim import air_track
-from stickslip.squeak.sound import HEAVY, squeak_record, squeak_rig
+from stickslip.squeak.sound import squeak_record
+from stickslip.squeak.stability import HEAVY, squeak_rig
 
 RIG = {"mass": 2.42, "stiffness": 2310.0, "damping": air_track().damping}
 PULLED = 3.0  # s

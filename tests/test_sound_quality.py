@@ -38,6 +38,20 @@ def test_roughness_and_sharpness_have_their_units() -> None:
     assert smooth.sharpness == pytest.approx(1.0, rel=0.1)
 
 
+def test_bursts_in_noise_sound_as_the_program_itself_says() -> None:
+    metrics = pytest.importorskip("mosqito.sq_metrics", reason="the extra sound is not installed")
+    t, rng = np.arange(int(0.5 * FS)) / FS, np.random.default_rng(0)
+    wave = (np.abs(t - 0.3) < 0.1) * (np.sin(2 * np.pi * 2300 * t) + 0.3 * np.sin(2 * np.pi * 4600 * t))
+    record = ss.Record.of({"sound": 0.1 * wave + 0.01 * rng.standard_normal(len(t))}, fs=FS)
+    quality, sound = ss.squeak.sound_quality(record), record["sound"] - record["sound"].mean()
+    total, specific, _, time = metrics.loudness_zwtv(sound, FS)
+    assert quality.loudness_over_time == pytest.approx(total, rel=1e-9, abs=1e-12)
+    assert quality.time == pytest.approx(time)
+    sharp = np.average(metrics.sharpness_din_from_loudness(total, specific), weights=np.where(total > 0.01, total, 0.0))
+    assert quality.sharpness == pytest.approx(sharp, rel=1e-9)
+    assert quality.roughness == pytest.approx(np.mean(metrics.roughness_dw(sound, FS)[0]), rel=1e-9)
+
+
 def test_a_recording_at_another_rate_is_as_loud() -> None:
     pytest.importorskip("mosqito", reason="the extra sound is not installed")
     t = np.arange(5000) / 10_000

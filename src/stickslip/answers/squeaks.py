@@ -120,7 +120,7 @@ def analyze_squeaks(
 
 
 def _quality(record: Record, squeaks: Squeaks, inquiry: Inquiry) -> SoundQuality | None:
-    """Of a calibrated sound; of a long one, about its loudest burst: the method takes as long as the sound."""
+    """Of a calibrated sound; of a long one, about its loudest burst: the method takes longer for longer ones."""
     if record.channels[squeaks.channel].unit != "Pa" or not squeaks.bursts:
         return None
     if record.duration > HEARD_AT_ONCE:

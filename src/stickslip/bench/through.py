@@ -38,7 +38,8 @@ from stickslip.rig.rig import Rig, Shaker
 from stickslip.rig.sensor import Sensor
 from stickslip.rig.settings import CommissionSettings, RigSettings, read_rig
 from stickslip.solve.simulate import simulate
-from stickslip.squeak.sound import HEAVY, squeak_record, squeak_rig
+from stickslip.squeak.sound import squeak_record
+from stickslip.squeak.stability import HEAVY, squeak_rig
 
 FS = 4000.0  # Hz of the tour's records, as the thesis's: 2 kHz tell a third of the sticks for motion
 SETTLE, SECONDS = 3.0, 8.0  # s that a run is left to itself, and that are read behind them

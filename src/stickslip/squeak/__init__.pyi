@@ -19,7 +19,6 @@ from stickslip.squeak.sound import impulsiveness as impulsiveness
 from stickslip.squeak.sound import sound_pressure as sound_pressure
 from stickslip.squeak.sound import sound_quality as sound_quality
 from stickslip.squeak.sound import squeak_record as squeak_record
-from stickslip.squeak.sound import squeak_rig as squeak_rig
 from stickslip.squeak.spectra import BurstSpectra as BurstSpectra
 from stickslip.squeak.spectra import Clip as Clip
 from stickslip.squeak.spectra import burst_clips as burst_clips
@@ -27,5 +26,6 @@ from stickslip.squeak.spectra import burst_spectra as burst_spectra
 from stickslip.squeak.spectra import write_sound as write_sound
 from stickslip.squeak.stability import SlidingMode as SlidingMode
 from stickslip.squeak.stability import Stability as Stability
+from stickslip.squeak.stability import squeak_rig as squeak_rig
 
 __all__: list[str]

@@ -269,7 +269,7 @@ def find_squeaks(
     --------
     >>> from stickslip.solve.simulate import simulate
     >>> from stickslip.squeak.sound import squeak_record
-    >>> from stickslip.squeak.sound import squeak_rig
+    >>> from stickslip.squeak.stability import squeak_rig
     >>> squeaks = find_squeaks(squeak_record(simulate(squeak_rig("wet", 6.13), duration=1.0), snr=30, rng=1))
     >>> squeaks.kind, all(475 < burst.frequency < 500 for burst in squeaks.of("squeak"))
     ('squeak', True)

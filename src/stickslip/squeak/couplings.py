@@ -187,7 +187,7 @@ def coupling(record: Record, *, squeaks: Squeaks | None = None, lever: float | s
     --------
     >>> from stickslip.solve.simulate import simulate
     >>> from stickslip.squeak.sound import squeak_record
-    >>> from stickslip.squeak.sound import squeak_rig
+    >>> from stickslip.squeak.stability import squeak_rig
     >>> record = squeak_record(simulate(squeak_rig(), duration=1.2), snr=30, rng=1)
     >>> coupled = coupling(record)
     >>> coupled.of("normal_acceleration", "torsion_velocity").coupled

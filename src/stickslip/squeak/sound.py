@@ -1,30 +1,24 @@
-"""Sound: how loud a vibrating surface is at a distance, levels, how it is heard, and what a squeaking rig records.
-
-A virtual squeak rig: rubber on steel, dry or wet, lightly or heavily loaded.
-"""
+"""Sound: how loud a vibrating surface is at a distance, levels, how it is heard, and what a squeaking rig records."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
 from fractions import Fraction
-from types import ModuleType
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from stickslip.arrays import Array
-from stickslip.drives.kinds import HarmonicBase
+from stickslip.compiled import OPTIONS, compiled
 from stickslip.errors import FormatError, ModelError, RecordError, package
 from stickslip.estimate import Plain, plain
-from stickslip.laws.coulomb import LinearSlope
-from stickslip.oscillator import Contact, Structure
+from stickslip.oscillator import Structure
 from stickslip.parameters import finite
 from stickslip.record.channels import Channel, described
 from stickslip.record.record import Record, Step
 from stickslip.squeak.hearing import LOWEST, PULSE, chosen_channel, clipped_rows, filtered, short_time_level
-from stickslip.units import parse_constant
 
 if TYPE_CHECKING:
     from stickslip.solve.trajectory import Trajectory
@@ -34,19 +28,6 @@ REFERENCES = {"Pa": 20e-6, "m/s^2": 1e-6, "m/s": 1e-9, "N": 1e-6}  # ISO 1683
 TIP = 2e-3  # m^2: chosen, the radiating area of the pinching beam's tip
 MICROPHONE = 0.1  # m: chosen; the thesis's stood an inch away, nearer than a point source of this area allows
 A_POLES = (20.598997, 107.65265, 737.86223, 12194.217)  # Hz, IEC 61672-1
-
-MASS, STIFFNESS, BEARING = 1.92, 2310.0, 0.0177  # kg, N/m and damping ratio of the linear bearing (sections 2.2, 6.5)
-FORCING = 5.0  # Hz
-HEAVY = 6.13  # N
-BENDING, TORSION = 185.0, 250.0  # Hz, of the beam without its contacts (section 7.3)
-
-# chosen: the thesis does not give them
-BEAM, INERTIA = 0.02, 5e-6  # kg and kg m^2 that move at the beam's tip
-BENDING_DAMPING, TORSION_DAMPING = 0.017, 0.01
-ENGAGED = 484.0  # Hz of bending alone with both contacts engaged under the heavy load
-HERTZ = 1 / 3  # contact stiffness grows with this power of the load, as that of a sphere does
-ARM, OFFSET = 13.8e-3, -0.95e-3  # m: half the distance of the contacts, and how far their middle is from the axis
-LEVER, SKEW = 1.7e-3, 2.3e-3  # m: height of the contacts over the axis, and how much they differ from it
 
 
 def sound_pressure(
@@ -178,7 +159,7 @@ def squeak_record(
     Examples
     --------
     >>> from stickslip.solve.simulate import simulate
-    >>> from stickslip.squeak.sound import squeak_rig
+    >>> from stickslip.squeak.stability import squeak_rig
     >>> record = squeak_record(simulate(squeak_rig(), duration=0.4), snr=30, rng=1)
     >>> list(record)
     ['x', 'v', 'a', 'z', 'friction', 'normal_acceleration', 'torsion_velocity', 'sound']
@@ -278,99 +259,6 @@ def _later(values: Array, samples: float) -> Array:
     return np.concatenate([np.zeros(int(whole)), shifted])[: len(values)]
 
 
-@dataclass(frozen=True)
-class Surface:
-    """Friction coefficient of both contacts at vanishing speed, and its slope [s/m]."""
-
-    friction: float
-    slope: float
-
-
-# 20 and 8 N (section 7.2); slopes chosen
-SURFACES = {"dry": Surface(20 / HEAVY, 2.3), "wet": Surface(8 / HEAVY, -0.26)}
-
-
-def squeak_rig(surface: str = "wet", load: float | str = HEAVY, *, amplitude: float = 8e-3) -> Structure:
-    r"""A rig that squeaks where it is wet and heavily loaded, and only there.
-
-    A mass on a linear bearing is driven by its base at 5 Hz and rubs on two rubber hemispheres at the tip of a
-    beam, which bends towards the mass and twists: three degrees of freedom (x of the mass, x2 of the tip across it,
-    x3 its angle [rad]), tangential, normal and rotational, as section 8.2 of the thesis asks for. Of chapter 7 are the
-    masses, springs, frequencies and friction levels; inertia, levers, slopes and damping of the beam are chosen so that
-    its four observations hold together: the contacts stiffen with the load until bending and torsion, at 185 and 250 Hz
-    without contact, meet near 490 Hz; water lowers friction to where they couple (dry, friction shifts torsion past
-    bending), while its falling slope alone is too weak. Which of them decides, :func:`stability` says.
-
-    Parameters
-    ----------
-    surface : {"wet", "dry"}
-        Friction of 8 or 20 N under the heavy load, falling or rising with speed.
-    load : float or str
-        Normal load on both contacts together [N]; the thesis has 6.13 and 1.23.
-    amplitude : float
-        Of the mass's motion [m], roughly: the base moves as far as that takes against the friction by harmonic balance.
-        Where friction nearly holds the mass the motion is up to two thirds smaller; to drive it to like motions, as
-        the thesis did, move the base as the mass alone needs it (``stickslip_thesis.chapter7.base_for``).
-
-    Returns
-    -------
-    Structure
-        Driven by a :class:`HarmonicBase`; for steady sliding give it a Belt: ``rig.having(drive=Belt(0.1))``.
-
-    Raises
-    ------
-    ModelError
-        No such surface, or a load or an amplitude that is not positive.
-
-    Examples
-    --------
-    >>> from stickslip.squeak.stability import stability
-    >>> for surface, load in [("dry", 6.13), ("wet", 6.13), ("dry", 1.23), ("wet", 1.23)]:
-    ...     print(surface, load, stability(squeak_rig(surface, load), speed=-0.1).mechanism)
-    dry 6.13 stable
-    wet 6.13 mode coupling
-    dry 1.23 stable
-    wet 1.23 stable
-    """
-    if surface not in tuple(SURFACES):
-        raise ModelError(f"surface = '{surface}'", f"it is {' or '.join(SURFACES)}", "choose one of them")
-    load = parse_constant("load", load, "N")
-    amplitude = finite("amplitude", amplitude, unit="m", positive=True)
-    rubber, turn = SURFACES[surface], 2 * math.pi
-    bends, twists = BEAM * (turn * BENDING) ** 2, INERTIA * (turn * TORSION) ** 2
-    stiffness = BEAM * turn**2 * (ENGAGED**2 - BENDING**2) * (load / HEAVY) ** HERTZ
-    damping = [
-        2 * BEARING * math.sqrt(MASS * STIFFNESS),
-        2 * BENDING_DAMPING * math.sqrt(BEAM * bends),
-        2 * TORSION_DAMPING * math.sqrt(INERTIA * twists),
-    ]
-    contacts = [
-        Contact(
-            LinearSlope(rubber.friction, slope=rubber.slope),
-            [1, 0, LEVER + side * SKEW],
-            normal=[0, 1, OFFSET + side * ARM],
-            stiffness=stiffness / 2,
-            preload=load / 2,
-        )
-        for side in (1, -1)
-    ]
-    return Structure(
-        np.diag([MASS, BEAM, INERTIA]),
-        np.diag(damping),
-        np.diag([STIFFNESS, bends, twists]),
-        contacts=contacts,
-        drive=HarmonicBase(_base(rubber.friction * load, amplitude), frequency=FORCING),
-        acts_on=[1, 0, 0],
-        rotations=[3],
-    )
-
-
-def _base(friction: float, amplitude: float) -> float:
-    """Amplitude of the base that moves the mass so far, by harmonic balance [m]."""
-    detuned = 1 - (2 * math.pi * FORCING) ** 2 * MASS / STIFFNESS
-    return math.hypot(amplitude * detuned, 4 * friction / (math.pi * STIFFNESS))
-
-
 NEEDED = 48_000  # Hz, of the methods
 ROUGH = 0.2  # s, of a roughness's window
 SHORTEST = 0.05  # s, of which a loudness over time can be told
@@ -378,6 +266,10 @@ EXCEEDED = 5.0  # % of the time: N5
 ABOVE = 10.0  # dB over the valleys beside it that a pulse rises
 RESOLVED = 20  # samples in a window, below which noise has pulses
 DEAF = 1e-2  # sone: quieter has no sharpness
+# Of MoSQITo's models, which it keeps in its functions:
+DECAY_RATE, STEPS, TOLD = 2000, 24, 4  # Hz of the loudness, its steps in each sample, and samples for one that is told
+SHORT, LONG, VAR = 0.005, 0.015, 0.075  # s, of ISO 532-1's decay after short and long sounds
+CHANNELS, LOWER, UPPER, SILENT = 47, -27.0, -24.0, 2e-12  # half a bark apart; dB a bark of an excitation's slopes; Pa
 
 
 @dataclass(frozen=True, eq=False)
@@ -500,12 +392,14 @@ def sound_quality(record: Record, *, channel: str = "sound") -> SoundQuality:
             f"its loudness is told from {SHORTEST:g} s on",
             "give a longer record",
         )
-    metrics = _mosqito()
+    package("mosqito", extra="sound", rule="it computes loudness, sharpness and roughness", error=FormatError)
+    from mosqito.sq_metrics import sharpness_din_from_loudness
+
     sound = _at_needed_rate(record[channel] - record[channel].mean(), record.fs)
-    total, specific, _, time = metrics.loudness_zwtv(sound, NEEDED)
-    sharp = np.asarray(metrics.sharpness_din_from_loudness(total, specific))
+    total, specific, time = _loudness(sound)
+    sharp = np.asarray(sharpness_din_from_loudness(total, specific))
     heard = total > DEAF
-    rough = metrics.roughness_dw(sound, NEEDED)[0] if len(sound) >= ROUGH * NEEDED + 1 else [math.nan]
+    rough = _roughness(sound) if len(sound) >= ROUGH * NEEDED + 1 else [math.nan]
     return SoundQuality(
         loudness=float(np.percentile(total, 100 - EXCEEDED)),
         loudest=float(np.max(total)),
@@ -586,8 +480,106 @@ def _at_needed_rate(values: Array, fs: float) -> Array:
     return values if ratio == 1 else np.asarray(resample_poly(values, ratio.numerator, ratio.denominator))
 
 
-def _mosqito() -> ModuleType:
-    package("mosqito", extra="sound", rule="it computes loudness, sharpness and roughness", error=FormatError)
-    from mosqito import sq_metrics
+def _loudness(sound: Array) -> tuple[Array, Array, Array]:
+    """Loudness [sone], that of each tenth of a bark, and time [s], as MoSQITo's `loudness_zwtv` by its own stages.
 
-    return cast(ModuleType, sq_metrics)
+    The decay alone is compiled: MoSQITo steps through it with arrays, which takes three times as long as the sound.
+    """
+    from mosqito.sq_metrics.loudness.loudness_zwst._calc_slopes import _calc_slopes
+    from mosqito.sq_metrics.loudness.loudness_zwst._main_loudness import _main_loudness
+    from mosqito.sq_metrics.loudness.loudness_zwtv._temporal_weighting import _temporal_weighting
+    from mosqito.sq_metrics.loudness.loudness_zwtv._third_octave_levels import _third_octave_levels
+
+    levels, time, _ = _third_octave_levels(sound, NEEDED)
+    core = np.ascontiguousarray(_main_loudness(levels, "free"))
+    remains = np.empty_like(core)
+    _decaying(core, _decay(1 / (DECAY_RATE * STEPS)), remains)
+    total, specific = _calc_slopes(remains)
+    return _temporal_weighting(total)[::TOLD], specific[:, ::TOLD], time[::TOLD]
+
+
+def _decay(step: float) -> Array:
+    """Of two capacitors that discharge into each other: their matrix over a step [s], and what each alone keeps."""
+    middle, distance = (VAR + LONG) / (2 * VAR * SHORT), 1 / (SHORT * VAR)
+    rates = [-middle + side * math.sqrt(middle**2 - distance) for side in (1, -1)]
+    (one, other), (grown, faded) = (VAR * rate + 1 for rate in rates), (math.exp(rate * step) for rate in rates)
+    matrix = [grown - faded, other * grown - one * faded, one * grown - other * faded, one * other * (grown - faded)]
+    kept = [math.exp(-step / LONG), math.exp(-step / VAR)]
+    return np.array([entry / (VAR * (rates[0] - rates[1])) for entry in matrix] + kept)
+
+
+@compiled(**OPTIONS)
+def _decaying(core: Array, decay: Array, remains: Array) -> None:
+    """What remains of each band's core loudness: it rises at once, and falls fast after what was short."""
+    for band in range(core.shape[0]):
+        count = core.shape[1]
+        heard, stored = core[band, count - 1] / STEPS, 0.0  # before the first step MoSQITo has what the last one left
+        for row in range(count):
+            driven = core[band, row]
+            rise = ((core[band, row + 1] if row + 1 < count else 0.0) - driven) / STEPS
+            for step in range(STEPS):
+                # the first capacitor discharges into the second, or both together; never below what drives it
+                falls = heard * decay[2] - stored * decay[3] if heard > stored else heard * decay[4]
+                now = max(falls, driven)
+                # the second one follows the first, from below, and drives it where the sound has ended
+                follows = now
+                if driven < heard:
+                    if heard > stored:
+                        follows = min(now, heard * decay[0] - stored * decay[1])
+                elif not (abs(driven - heard) < 1e-5 and now <= stored):
+                    follows = (stored - driven) * decay[5] + driven
+                heard, stored = now, follows
+                if step == 0:
+                    remains[band, row] = now
+                driven += rise
+
+
+def _roughness(sound: Array) -> Array:
+    """Roughness [asper] of windows of 0.2 s, each half over the next, as MoSQITo's `roughness_dw`.
+
+    All channels of a window at once, and their envelopes' power and agreement by their spectra: MoSQITo goes through
+    every line of every channel by itself, which takes five times as long as the sound.
+    """
+    from mosqito.sq_metrics.roughness.roughness_dw._ear_filter_coeff import _ear_filter_coeff
+    from mosqito.sq_metrics.roughness.roughness_dw._gzi_weighting import _gzi_weighting
+    from mosqito.sq_metrics.roughness.roughness_dw._H_weighting import _H_weighting
+    from mosqito.utils import bark2freq, db2amp, freq2bark
+    from mosqito.utils.LTQ import LTQ
+    from scipy.fft import irfft, rfft
+
+    size = round(ROUGH * NEEDED)
+    half, channel = size // 2, np.arange(CHANNELS)
+    window = 1.42 * np.blackman(size) / np.blackman(size).sum()
+    frequency = np.arange(1, half + 1) * (NEEDED / size)
+    bark = freq2bark(frequency)
+    ear, quiet = db2amp(_ear_filter_coeff(bark)), LTQ(bark, reference="roughness")
+    least = np.interp(bark2freq((channel + 1) / 2), frequency, quiet)
+    envelope, depths = _H_weighting(size, NEEDED)[:, :half], _gzi_weighting((channel + 1) / 2)
+    below, above = np.minimum(channel + 1, CHANNELS - 1), np.maximum(channel - 1, 0)
+    rough = []
+    for begin in range(0, len(sound) - size + 1, half):
+        spectrum = rfft(window * sound[begin : begin + size])[:half] * ear
+        level = 20 * np.log10(np.maximum(np.abs(spectrum), SILENT) / REFERENCES["Pa"])
+        heard = np.flatnonzero(level > quiet)
+        at, loud = bark[heard, None], level[heard, None]
+        # what a line excites in the channel next to each, on its own side: down by the slopes of Terhardt's triangle
+        low, high = np.floor(2 * at) - 1, np.ceil(2 * at) - 1
+        upper = np.minimum(UPPER - 230 / frequency[heard, None] + 0.2 * loud, 0.0)
+        down = np.where(channel < low, LOWER * (at - (below + 1) / 2), upper * ((above + 1) / 2 - at))
+        excites = loud + down > np.where(channel < low, least[below], least[above])
+        share = np.where((channel == low) | (channel == high), 1.0, np.where(excites, 10 ** (down / 20), 0.0))
+        lines = np.zeros((CHANNELS, half + 1), dtype=complex)
+        lines[:, heard] = share.T * spectrum[heard]
+        lines[:, 1:] /= 2
+        # how deep each channel's excitation is modulated, at the rates that sound rough
+        excitation = np.abs(size * irfft(lines, size))
+        mean = excitation.mean(axis=1)
+        swing = rfft(excitation - mean[:, None])[:, :half] * envelope
+        power = np.sum(np.abs(swing) ** 2, axis=1)
+        depth = np.minimum(np.sqrt(2 * power) / (size * np.maximum(mean, np.finfo(float).tiny)), 1.0)
+        # channels a bark apart are rough together as far as their modulations agree
+        shared = np.sum(swing[:-2] * np.conj(swing[2:]), axis=1).real
+        alike = shared / np.sqrt(np.maximum(power[:-2] * power[2:], np.finfo(float).tiny))
+        both = np.concatenate([alike, [1.0, 1.0]]) * np.concatenate([[1.0, 1.0], alike])
+        rough.append(0.25 * np.sum(depths * (depth * both) ** 2))
+    return np.array(rough)

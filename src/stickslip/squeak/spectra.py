@@ -161,20 +161,20 @@ def stretches(record: Record, *, squeaks: Squeaks, size: int) -> Stretches:
 
     Where bursts follow each other without a pause, their loud parts are held against the rest.
     """
-    bursts = squeaks.of("squeak", "squeal") or squeaks.bursts
-    inside = [_rows(record, burst.start, burst.end) for burst in bursts]
-    pauses = _between(record, [_rows(record, burst.start, burst.end) for burst in squeaks.bursts], size)
+    bursts, time = squeaks.of("squeak", "squeal") or squeaks.bursts, record.time
+    inside = [_rows(time, burst.start, burst.end) for burst in bursts]
+    pauses = _between(record, [_rows(time, burst.start, burst.end) for burst in squeaks.bursts], size)
     if len(pauses) >= FEWEST:
         return Stretches(_segments(inside, size), pauses, APART)
-    loud = [_rows(record, *burst.loud) for burst in bursts]
+    loud = [_rows(time, *burst.loud) for burst in bursts]
     rest, within = _between(record, loud, size), _segments(loud, size)
     if len(rest) >= FEWEST and len(within) >= FEWEST:
         return Stretches(within, rest, LOUD)
     return Stretches(_segments(inside, size), [], NOTHING_OUTSIDE)
 
 
-def _rows(record: Record, start: float, end: float) -> tuple[int, int]:
-    first, last = np.searchsorted(record.time, [start, end])
+def _rows(time: Array, start: float, end: float) -> tuple[int, int]:
+    first, last = np.searchsorted(time, [start, end])
     return int(first), int(last)
 
 
