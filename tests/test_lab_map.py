@@ -15,8 +15,8 @@ from starlette.testclient import TestClient
 
 import stickslip as ss
 from labs import received
-from stickslip.lab.drawn import AT_REST, CYCLES, SETTLE
 from stickslip.lab.server import lab_app
+from stickslip.lab.worker import AT_REST, CYCLES, SETTLE
 
 HOME, BEARER = "http://127.0.0.1:8723", {"authorization": "Bearer t"}
 UNIT = {"system": {"mass": 1.0, "stiffness": 1.0}, "law": {"name": "Coulomb", "kinetic": 0.5},

@@ -19,7 +19,7 @@ from starlette.testclient import TestClient
 
 import stickslip as ss
 from labs import received
-from stickslip.lab import drawn
+from stickslip.lab import worker
 from stickslip.lab.server import lab_app
 from stickslip.lab.workers import frame, unframed
 
@@ -79,9 +79,9 @@ def test_the_traces_are_the_exact_motion(client: TestClient, name: str) -> None:
 
 
 def test_sticks_are_marked_where_the_engine_holds() -> None:
-    _, arrays = drawn.run({"state": RIGID}, lambda share: None)
-    run = ss.simulate(drawn.read_case(RIGID).system, cycles=40)
-    held = arrays["kinds"] == drawn.KINDS.index("stick")
+    _, arrays = worker.run({"state": RIGID}, lambda share: None)
+    run = ss.simulate(worker.read_case(RIGID).system, cycles=40)
+    held = arrays["kinds"] == worker.KINDS.index("stick")
     stuck = [piece for piece in run.pieces if piece.mode == "stuck"]
     np.testing.assert_array_equal(arrays["begins"][held], [piece.start for piece in stuck])
     np.testing.assert_allclose(
@@ -94,8 +94,8 @@ def test_sticks_are_marked_where_the_engine_holds() -> None:
 
 
 def test_micro_slips_are_the_short_slips() -> None:
-    _, arrays = drawn.run({"state": STATE}, lambda share: None)
-    run = ss.simulate(drawn.read_case(STATE).system, cycles=40)
+    _, arrays = worker.run({"state": STATE}, lambda share: None)
+    run = ss.simulate(worker.read_case(STATE).system, cycles=40)
     slips = [
         piece
         for piece in run.pieces[1:-1]
@@ -110,7 +110,7 @@ def test_micro_slips_are_the_short_slips() -> None:
 def test_the_spectrum_of_a_pure_tone_is_its_amplitude() -> None:
     state = {"system": {"mass": 1.0, "stiffness": 40.0, "damping": 3.0}, "law": {"name": "Coulomb", "kinetic": 0.0},
              "drive": {"name": "HarmonicForce", "amplitude": 2.0, "frequency": 1.5}, "run": {"cycles": 40}}  # fmt: skip
-    _, arrays = drawn.run({"state": state}, lambda share: None)
+    _, arrays = worker.run({"state": state}, lambda share: None)
     w = 2 * np.pi * 1.5
     exact = 2.0 * w**2 / np.hypot(40 - w**2, 3.0 * w)
     peak = np.argmax(arrays["amplitude"])
@@ -192,12 +192,12 @@ def test_a_long_run_ends_when_another_is_asked(client: TestClient) -> None:
 
 def test_the_wavelet_map_is_the_librarys(client: TestClient) -> None:
     header, arrays = asked(client, "wavelet", RIGID)
-    case = drawn.read_case(RIGID)
-    record = ss.simulate(case.system, cycles=40).record(fs=drawn.MAP / 16.0)
-    level = np.abs(ss.signals.wavelet_overview(record, "a", columns=drawn.COLUMNS, voices=6).values)
-    shown = arrays["levels"].reshape(header["rows"], -1) / 255 * drawn.SPAN - drawn.SPAN
-    seen = shown > -drawn.SPAN
-    np.testing.assert_allclose(shown[seen], (20 * np.log10(level / level.max()))[seen], atol=drawn.SPAN / 255)
+    case = worker.read_case(RIGID)
+    record = ss.simulate(case.system, cycles=40).record(fs=worker.MAP / 16.0)
+    level = np.abs(ss.signals.wavelet_overview(record, "a", columns=worker.COLUMNS, voices=6).values)
+    shown = arrays["levels"].reshape(header["rows"], -1) / 255 * worker.SPAN - worker.SPAN
+    seen = shown > -worker.SPAN
+    np.testing.assert_allclose(shown[seen], (20 * np.log10(level / level.max()))[seen], atol=worker.SPAN / 255)
 
 
 @pytest.mark.parametrize(

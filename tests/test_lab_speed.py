@@ -16,7 +16,7 @@ import pytest
 
 pytest.importorskip("uvicorn", reason="the extra [lab] is not installed")
 import stickslip as ss
-from stickslip.lab import drawn
+from stickslip.lab import worker
 from stickslip.lab.workers import frame
 
 COMPLIANT = ss.systems.scenario_case("THESIS compliant 2.5Hz fk=1.1 Ky=192000 z.0174(k+Ky)").lasting(cycles=40)
@@ -28,7 +28,7 @@ FIRST = ("index.html", "lab.css", "lab.js", "play.js", "controls.js", "stage.js"
 
 def test_the_first_page_is_light() -> None:
     """What a browser loads before anything is chosen, with the catalog; what is opened or asked for loads its part."""
-    catalog, _ = drawn.catalog({}, None)
+    catalog, _ = worker.catalog({}, None)
     page = sum((PAGE / name).stat().st_size for name in FIRST)
     assert page + len(json.dumps(catalog, ensure_ascii=False, separators=(",", ":")).encode()) < 150_000
     assert "Permission is hereby granted" in (PAGE / "vendor" / "uPlot.LICENSE.txt").read_text("utf-8")
@@ -42,7 +42,7 @@ def test_the_answer_to_a_slider_is_not_felt() -> None:
 
     def answered() -> float:
         begun = time.process_time()
-        frame(*drawn.run({"state": STATE}, lambda share: None))
+        frame(*worker.run({"state": STATE}, lambda share: None))
         return time.process_time() - begun
 
     answered()

@@ -14,7 +14,7 @@ from typing import Any
 import pytest
 
 pytest.importorskip("starlette", reason="the extra [lab] is not installed")
-from stickslip.lab import drawn, worker, workers
+from stickslip.lab import worker, workers
 from stickslip.lab.workers import Workers, unframed
 
 CATALOG = json.dumps({"id": 1, "want": "catalog"}).encode()
@@ -69,7 +69,7 @@ def test_a_part_of_a_map_ends_when_no_one_waits_for_it(monkeypatch: pytest.Monke
             time.sleep(0.01)
         return {"finished": True}, {}
 
-    monkeypatch.setitem(drawn.MAPS, "made", answer)
+    monkeypatch.setitem(worker.MAPS, "made", answer)
     (said,) = served(monkeypatch, answer)
     assert said["kind"] == "overtaken"  # and not "finished", as after all its thousand steps
 

@@ -13,7 +13,7 @@ from click.testing import CliRunner
 
 import stickslip as ss
 from stickslip.cli.program import main
-from stickslip.lab.drawn import catalog
+from stickslip.lab.worker import catalog
 from stickslip.laws.base import Exit, Mode, Rigid
 from stickslip.laws.curved import CurvedMode, Sliding, either_side, symbol, tanh
 from stickslip.laws.export import FORMATS

@@ -27,7 +27,7 @@ from stickslip.record.record import DETAILS, Record, Step
 
 # Asked in this order whether a file is theirs; each is a module beside this one, imported when it is its turn.
 FORMATS = (
-    "journal", "tdms", "matlab", "hdf5", "parquet", "uff", "audio", "lvm", "mcap", "rosbag", "mdf",
+    "journal", "tdms", "matlab", "hdf5", "parquet", "uff", "audio", "lvm", "rosbag", "mdf",
     "json_table", "oscilloscope", "text",
 )  # fmt: skip
 

@@ -1,10 +1,11 @@
-"""ROS bags, .bag of ROS 1 and .db3 of ROS 2: the numbers of every topic on the clock of the joints' states.
+"""Bags, .bag of ROS 1, .db3 and MCAP of ROS 2: the numbers of every topic on the clock of the joints' states.
 
-The columns of topics become one table: what was heard last at each sample of the one clock. MCAP and MDF join alike."""
+The columns of topics become one table: what was heard last at each sample of the one clock. MDF joins alike."""
 
 from __future__ import annotations
 
 import dataclasses
+import json
 import sqlite3
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -23,9 +24,9 @@ from stickslip.files.table import LISTED, Budget, Column, Options, Table, option
 NAMES = ("name", "joint_names")  # of a message whose lists have one number for each joint
 LATE = 0.1  # of the clock: a topic that is silent for longer at its beginning would cost these rows
 
-NAME = "ROS bag"
-SUFFIXES = (".bag", ".db3")
-FIRST, SECOND = b"#ROSBAG V2.0", b"SQLite format 3\0"  # as files of ROS 1 and of ROS 2 begin
+NAME = "ROS bag or MCAP"
+SUFFIXES = (".bag", ".db3", ".mcap")
+FIRST, SECOND, MCAP = b"#ROSBAG V2.0", b"SQLite format 3\0", b"\x89MCAP"  # as files of ROS 1, of ROS 2 and MCAP begin
 DEFINED = "SELECT topic_type, encoded_message_definition FROM message_definitions WHERE encoding = 'ros2msg'"
 
 Decode = Callable[[bytes], Any]
@@ -168,22 +169,17 @@ def _seconds(nanoseconds: np.ndarray[Any, Any]) -> Array:
 
 def recognise(path: Path, head: bytes) -> bool:
     """By the mark at the start; a database is ROS's by its suffix."""
-    return head.startswith(FIRST) or (head.startswith(SECOND) and path.suffix.lower() == ".db3")
+    return head.startswith((FIRST, MCAP)) or (head.startswith(SECOND) and path.suffix.lower() == ".db3")
 
 
 def read(path: Path, options: Options) -> Table:
     """The numbers of the topics; what other topics say is read as last heard."""
-    return table_of(path, NAME, _messages(path))
-
-
-def table_of(path: Path, name: str, messages: Iterable[Heard]) -> Table:
-    """The numbers of the topics of a log of that format."""
-    with reading(path, name):
-        streams, left_out = _streams(path, messages)
+    with reading(path, NAME):
+        streams, left_out = _streams(path, _messages(path))
     return joined(path, streams, [f"{topic} ({reason}) is left out" for topic, reason in left_out.items()])
 
 
-def decoder(kind: str, definition: str | None, *, first: bool = False) -> Decode | None:
+def _decoder(kind: str, definition: str | None, *, first: bool = False) -> Decode | None:
     """What turns the bytes of a message into its fields; None for a type that nobody defines.
 
     A definition that stands in the file is parsed by its grammar; without one the type is looked up in ROS 2's own.
@@ -203,14 +199,32 @@ def decoder(kind: str, definition: str | None, *, first: bool = False) -> Decode
 
 def _messages(path: Path) -> Iterator[Heard]:
     with path.open("rb") as file:
-        first = file.read(len(FIRST)) == FIRST
-    return (_first if first else _second)(path)
+        head = file.read(len(FIRST))
+    return (_first if head == FIRST else _mcap if head.startswith(MCAP) else _second)(path)
+
+
+def _mcap(path: Path) -> Iterator[Heard]:
+    """The messages of an MCAP, of either ROS or in JSON."""
+    known: dict[int, Decode | None] = {}
+    with path.open("rb") as file:
+        for schema, channel, message in optional("mcap.reader", extra="logs").make_reader(file).iter_messages():
+            if channel.id not in known:
+                known[channel.id] = _by_schema(channel.message_encoding, schema)
+            yield channel.topic, channel.message_encoding, known[channel.id], message.log_time, message.data
+
+
+def _by_schema(encoding: str, schema: Any) -> Decode | None:
+    if encoding == "json":
+        return json.loads
+    if schema is None or (encoding, schema.encoding) not in (("cdr", "ros2msg"), ("ros1", "ros1msg")):
+        return None
+    return _decoder(schema.name, schema.data.decode(), first=encoding == "ros1")
 
 
 def _first(path: Path) -> Iterator[Heard]:
     """The messages of a bag of ROS 1."""
     with optional("rosbags.rosbag1", extra="logs").Reader(path) as bag:
-        known = {one.id: decoder(one.msgtype, one.msgdef.data, first=True) for one in bag.connections}
+        known = {one.id: _decoder(one.msgtype, one.msgdef.data, first=True) for one in bag.connections}
         for connection, heard, data in bag.messages():
             yield connection.topic, connection.msgtype, known[connection.id], heard, data
 
@@ -222,7 +236,7 @@ def _second(path: Path) -> Iterator[Heard]:
         tables = {name for (name,) in bag.execute("SELECT name FROM sqlite_master WHERE type = 'table'")}
         defined = dict(bag.execute(DEFINED)) if "message_definitions" in tables else {}
         topics = {number: (name, kind) for number, name, kind in bag.execute("SELECT id, name, type FROM topics")}
-        known = {number: decoder(kind, defined.get(kind)) for number, (_, kind) in topics.items()}
+        known = {number: _decoder(kind, defined.get(kind)) for number, (_, kind) in topics.items()}
         for number, heard, data in bag.execute("SELECT topic_id, timestamp, data FROM messages ORDER BY timestamp"):
             topic, kind = topics[number]
             yield topic, kind, known[number], heard, data

@@ -17,8 +17,8 @@ from stickslip.errors import EstimateError
 from stickslip.estimate import Estimate
 from stickslip.law.data import Samples, told
 from stickslip.law.family import Family
+from stickslip.laws.compliant import Dahl
 from stickslip.laws.coulomb import Coulomb, LinearSlope
-from stickslip.laws.lugre import Dahl
 from stickslip.laws.series import ElastoSlip
 from stickslip.laws.state_variable import RateState
 from stickslip.laws.stribeck import Stribeck, Tabulated

@@ -23,11 +23,11 @@ from stickslip.laws.c_code import (
     modes_of,
     python_code,
 )
+from stickslip.laws.compliant import LuGre
 from stickslip.laws.coulomb import Coulomb, LinearSlope
 from stickslip.laws.curved import CurvedLaw, lifted
 from stickslip.laws.formula import one_line, remark, written
 from stickslip.laws.guessing import registered
-from stickslip.laws.lugre import LuGre
 from stickslip.laws.stribeck import FrictionCurve, SpeedCurve, Tabulated
 from stickslip.laws.surfaces import RoughSurface
 from stickslip.parameters import finite

@@ -24,7 +24,7 @@ from stickslip.laws.guessing import FALLS, GRID, LEAST_EXCESS, RIGID, SPEEDS, Hy
 from stickslip.parameters import finite, parameter, parametric
 
 if TYPE_CHECKING:
-    from stickslip.laws.lugre import LuGre
+    from stickslip.laws.compliant import LuGre
 
 Curve = Callable[[Expression], Expression]
 EXPONENTS: Mapping[str, tuple[float, float]] = {"exponent": (0.5, 4.0)}  # most are 0.5 to 2: Armstrong-Helouvry (1994)

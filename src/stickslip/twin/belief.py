@@ -14,9 +14,8 @@ from stickslip.arrays import Array
 from stickslip.balance.motion import driving
 from stickslip.errors import StickslipError
 from stickslip.law.driven import DriveFrom, Sampled, Tones
-from stickslip.laws.compliant import CompliantContact
+from stickslip.laws.compliant import CompliantContact, Dahl, LuGre
 from stickslip.laws.coulomb import Coulomb, LinearSlope
-from stickslip.laws.lugre import Dahl, LuGre
 from stickslip.laws.state_variable import StateVariable
 from stickslip.laws.stribeck import Stribeck
 from stickslip.oscillator import Oscillator
