@@ -93,7 +93,7 @@ def test_chaos_is_told_with_its_exponent() -> None:
     assert orbit.exponent.interval[0] > 0
 
 
-@pytest.mark.parametrize("speed", [0.41, 0.425])
+@pytest.mark.parametrize("speed", [pytest.param(0.41, marks=pytest.mark.soak), 0.425])
 def test_a_smooth_cycle_on_a_belt_has_the_averaged_amplitude(speed: float) -> None:
     """ST-2 (Thomsen and Fidlin 2003): A = 2 sqrt(vb1^2 - vb^2) for small friction, without sticks above vb0."""
     most, least, vm, damping = 0.4, 0.25, 0.5, 0.1

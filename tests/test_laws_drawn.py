@@ -21,7 +21,7 @@ def laws() -> ModuleType:
     [
         ("Coulomb", ["Coulomb", "static"]),
         pytest.param("static", ["Coulomb", "static"], marks=pytest.mark.soak),  # of one family with the first
-        ("Stribeck", ["Coulomb", "Stribeck"]),
+        pytest.param("Stribeck", ["Coulomb", "Stribeck"], marks=pytest.mark.soak),
         ("CompliantContact", ["static", "compliant"]),
     ],
 )

@@ -119,6 +119,7 @@ def test_bristles_whose_static_friction_x_does_not_show_leave_it_open() -> None:
     assert not answer.known or answer.includes(tried.record.truth[answer.name])
 
 
+@pytest.mark.soak
 def test_the_stiffness_of_bristles_counts_what_x_does_not_show_of_their_fall() -> None:
     # a spring that slides leaves x as well explained, with a stiffness a fifth too low and sure within a per cent
     rig = stepped.Rig(
