@@ -174,9 +174,20 @@ def test_too_few_extremes_for_any_method_are_refused():
         ss.analyze_decay(ss.Record.of({"x": values}, fs=fs), method="thesis")
 
 
-def test_a_pendulum_is_read_with_its_sine_and_by_its_own_waveform(dataset):
-    record = ss.read_record(dataset("pendulum_decay") / "pend1.csv", channels={"theta": "#2 [rad]"}, time="#1")
-    findings = ss.analyze_decay(record, restoring="pendulum", stiffness="0.6956 N m/rad")
+@pytest.fixture(scope="module")
+def swings(dataset):
+    """The release of a real pendulum."""
+    return ss.read_record(dataset("pendulum_decay") / "pend1.csv", channels={"theta": "#2 [rad]"}, time="#1")
+
+
+@pytest.fixture(scope="module")
+def pendulum(swings):
+    """What is found of it, as a pendulum."""
+    return ss.analyze_decay(swings, restoring="pendulum", stiffness="0.6956 N m/rad")
+
+
+def test_a_pendulum_is_read_with_its_sine_and_by_its_own_waveform(swings, pendulum):
+    findings = pendulum
     assert findings.decay.best is findings.decay.waveform
     assert findings.decay.thesis is None
     assert set(findings.decay.comparisons[0].name.split(", ")) == {"damping ratio", "extremes alone"}
@@ -187,7 +198,7 @@ def test_a_pendulum_is_read_with_its_sine_and_by_its_own_waveform(dataset):
     assert low < other.value < high
     assert [plate.name for plate in ss.summary(findings).plates] == ["decay", "identified"]
     with pytest.raises(ss.errors.EstimateError, match="hold for a linear spring"):
-        ss.analyze_decay(record, restoring="pendulum", method="thesis")
+        ss.analyze_decay(swings, restoring="pendulum", method="thesis")
 
 
 @pytest.mark.parametrize(
@@ -219,18 +230,15 @@ def test_a_clock_that_runs_unevenly_is_told_by_what_the_waveform_leaves():
         ss.analyze_decay(ss.Record.of({"x": noisy}, fs=fs), method="waveform")
 
 
-def test_the_pendulum_has_a_page(dataset, tmp_path):
-    path = dataset("pendulum_decay") / "pend1.csv"
-    record = ss.read_record(path, channels={"theta": "#2 [rad]"}, time="#1")
-    findings = ss.analyze_decay(record, stiffness=0.2235 * 9.82 * 0.31692)
+def test_the_pendulum_has_a_page(swings, tmp_path):
+    findings = ss.analyze_decay(swings, stiffness=0.2235 * 9.82 * 0.31692)
     assert findings.decay.dry_force.unit == "N m"
     folder = ss.publish(findings, folder=tmp_path / "out")
     assert "not linear" in (folder / "report.html").read_text("utf-8")
 
 
-def test_viscous_damping_alone_leaves_ten_times_the_residual_of_a_real_pendulum(dataset):
-    record = ss.read_record(dataset("pendulum_decay") / "pend1.csv", channels={"theta": "#2 [rad]"}, time="#1")
-    findings = ss.analyze_decay(record, method="waveform", restoring="pendulum", stiffness="0.6956 N m/rad")
+def test_viscous_damping_alone_leaves_ten_times_the_residual_of_a_real_pendulum(pendulum):
+    findings = pendulum
     assert findings.decay.viscous_residual > 10
     story = ss.summary(findings)
     assert f"alone leaves {findings.decay.viscous_residual:.3g} times the residual" in " ".join(story.headline)
