@@ -541,6 +541,13 @@ def test_the_quick_questions_are_there_without_compiler_and_solver() -> None:
     assert not [name for name in loaded if name == "numba" or name.startswith(("stickslip.solve.", "stickslip.twin."))]
 
 
+def test_figures_and_fits_are_there_before_the_compiler_is() -> None:
+    """numba took half a second of every quick answer, whose figures know what a fit of a law is."""
+    code = "import sys, stickslip.figures.friction, stickslip.law.which_law; print('numba' in sys.modules)"
+    told = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert told.stdout.strip() == "False"
+
+
 def _processor_seconds(command: list[object]) -> float:
     """Of a program that has nothing to wait for; another program's load does not add to them."""
     begun = resource.getrusage(resource.RUSAGE_CHILDREN)

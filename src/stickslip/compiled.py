@@ -25,6 +25,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from functools import cache, cached_property, update_wrapper
+from importlib import import_module
 from importlib.machinery import SourceFileLoader
 from importlib.util import module_from_spec, spec_from_loader
 from pathlib import Path
@@ -87,6 +88,18 @@ class Kernel:
     def dispatcher(self) -> Any:
         """What numba makes of it."""
         return _numba().dispatcher(self.py_func, _folder_of(self.py_func), self._options)
+
+
+class Intrinsic:
+    """A function that compiled code alone calls, of a module that imports numba: not before that code is compiled."""
+
+    def __init__(self, module: str, name: str) -> None:
+        self.module, self.name = module, name
+
+    @property
+    def _numba_type_(self) -> Any:
+        """What numba takes it for."""
+        return _numba().type_of(getattr(import_module(self.module), self.name))
 
 
 def compiled(**options: Any) -> Callable[[Callable[..., Any]], Any]:

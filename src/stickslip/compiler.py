@@ -15,6 +15,7 @@ import llvmlite.ir
 import numba
 from numba import cfunc, config, njit, types
 from numba.core import event
+from numba.core.registry import cpu_target
 
 # What compiles faster below goes into numba's own classes, which it may change with any release: for releases that are
 # not known yet there are none, and all is compiled as numba does by itself.
@@ -144,6 +145,11 @@ def address(function: Callable[..., Any], place: Path | None, signature: Any, op
         return lambda function: compilation.timed(lambda: cfunc(signature, **more)(function))
 
     return _keeping(compiler, place, options)(function)
+
+
+def type_of(function: Any) -> Any:
+    """What numba takes a function of its own for."""
+    return cpu_target.typing_context.resolve_value_type(function)
 
 
 def _keeping(

@@ -15,6 +15,23 @@ from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic
 
+ROW = types.float64[::1]
+CODE = types.void(ROW, types.int64, ROW, types.float64, ROW)  # what fills in a series' coefficients
+
+
+@intrinsic  # type: ignore[untyped-decorator]  # numba tells no types
+def coded(_context: Any, address: Any) -> Any:
+    """The function of the kind `CODE` at an address: a number is passed in no time, a function's type is not."""
+    kind = types.FunctionType(CODE)
+
+    def made(context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
+        function = cgutils.create_struct_proxy(kind)(context, builder)
+        function.c_addr = builder.inttoptr(arguments[0], cgutils.voidptr_t)
+        function.py_addr = function.jit_addr = cgutils.voidptr_t(None)
+        return function._getvalue()
+
+    return kind(address), made
+
 
 def straight(text: str) -> Any:
     """Assignments to names and to entries of `s`, of the numbers h and of arrays q and y: a function (q, y, h, s).

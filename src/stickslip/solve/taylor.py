@@ -19,12 +19,9 @@ from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import types
-from numba.core import cgutils
-from numba.extending import intrinsic
 
 from stickslip.arrays import Array, Index, Mask
-from stickslip.compiled import compiled, generated
+from stickslip.compiled import Intrinsic, compiled, generated
 from stickslip.solve.roots import NOISE, NONE, UNSURE, first_rise
 
 # No references are counted: each named array would cost two atomic operations a call.
@@ -35,33 +32,18 @@ LINEAR, PRODUCT, SQUARE, QUOTIENT, POWER, EXP, TANH, SLOPE, LOG, ASINH = range(1
 GROWTH = 6.0  # longest step in units of the one before
 STILL = 1e-10  # a power's base below this is zero: there the power is not analytic
 
-ROW = types.float64[::1]
-CODE = types.void(ROW, types.int64, ROW, types.float64, ROW)  # what fills in coefficients, see `expansion`
 Number = tuple[int, ...]
 HEAD = '''"""Taylor coefficients of one kind of system; written by `stickslip.solve.taylor`."""
 
 from stickslip.compiled import pointer
-from stickslip.solve.straight import straight
-from stickslip.solve.taylor import CODE
+from stickslip.solve.straight import CODE, straight
 
 '''
 SHELL = """
 @pointer(CODE, error_model="numpy")
 def series(q, mode, y, h, s):"""
 
-
-@intrinsic
-def coded(_context: Any, address: Any) -> Any:
-    """The function of the kind `CODE` at an address: a number is passed in no time, a function's type is not."""
-    kind = types.FunctionType(CODE)
-
-    def made(context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
-        function = cgutils.create_struct_proxy(kind)(context, builder)
-        function.c_addr = builder.inttoptr(arguments[0], cgutils.voidptr_t)
-        function.py_addr = function.jit_addr = cgutils.voidptr_t(None)
-        return function._getvalue()
-
-    return kind(address), made
+coded: Any = Intrinsic("stickslip.solve.straight", "coded")
 
 
 class Sums(NamedTuple):
