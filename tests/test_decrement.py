@@ -65,7 +65,7 @@ def test_intervals_hold_under_noise():
     assert np.all(share >= 0.87)  # of 60 intervals of 95 %, fewer than 52 hold with probability 1e-2
 
 
-@pytest.mark.parametrize("order", [0, 2])
+@pytest.mark.parametrize("order", [0, pytest.param(2, marks=pytest.mark.soak)])
 def test_the_pair_of_differences_is_not_chosen_by_its_noise(order):
     """The choice fell on late differences that noise had made large: a damping ratio low by 1.3 deviations."""
     rng, off, inside = np.random.default_rng(31), [], []

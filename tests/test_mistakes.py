@@ -323,7 +323,7 @@ def test_nineteen_samples() -> None:
 
 def decayed(factor: float, *, mass: float = 0.0, clock: float = 1.0) -> Path:
     """A pendulum of 1.3 Hz that dies away, from 0.3 rad."""
-    time = np.arange(4000) / 500
+    time = np.arange(1600) / 200
     turn = 2 * math.pi * 1.3 * time
     angle = 0.3 * np.exp(-0.02 * turn) * np.cos(turn) + 1e-4 * np.random.default_rng(1).standard_normal(time.size)
     path = Path("data") / "release.csv"
@@ -454,6 +454,7 @@ def test_a_mass_that_friction_carries_on_a_shaken_table_is_stated_rightly() -> N
 def test_a_fit_names_the_mistake_and_the_command_that_mends_it(channels, stiffness, mended, tmp_path) -> None:
     named = [word for channel in channels for word in ("--channels", channel)]
     rig = ["--mass", "2.42", "--stiffness", stiffness, "--damping", "0.12", "--laws", "Coulomb"]
-    ran = CliRunner().invoke(main, ["fit", str(EXAMPLE), *named, *rig, "--output", str(tmp_path / "fit")])
+    asked = ["fit", str(EXAMPLE), "--rows", "0:2000", *named, *rig, "--output", str(tmp_path / "fit")]
+    ran = CliRunner().invoke(main, asked)
     assert "probably" in ran.output.lower()
     assert mended in ran.output.replace("\n", " ")

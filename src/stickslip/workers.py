@@ -58,11 +58,7 @@ def workers(count: int, module: str, *, among: bool = False) -> Iterator[Map]:
 
 
 def _shared(
-    processes: ProcessPoolExecutor,
-    count: int,
-    ready: Future[None],
-    function: Callable[[Any], Any],
-    over: Iterable[Any],
+    processes: ProcessPoolExecutor, count: int, ready: Future[None], function: Callable[[Any], Any], over: Iterable[Any]
 ) -> Iterator[Any]:
     """`map` over so many processes, once they are ready, and this one, which takes the last of what they have not.
 

@@ -360,11 +360,7 @@ def doubted(
 
 
 def _reasons(
-    contradiction: str,
-    record: Record,
-    loops: Loops | None,
-    unknown: Doubt | None,
-    refusals: Sequence[StickslipError],
+    contradiction: str, record: Record, loops: Loops | None, unknown: Doubt | None, refusals: Sequence[StickslipError]
 ) -> Iterator[tuple[Doubt | str, Iterable[str]]]:
     """Each doubt with the questions that it concerns, the gravest first."""
     if contradiction:

@@ -153,10 +153,9 @@ def plot_motion(run: Trajectory, *, first: float = 0.0, last: float | None = Non
         own = [row for name, row in wanted if name in ("friction", "load")]
         if contacts_of(run) == 1 or own:
             _shade(ax, run, first, last, own[0] if own else 0)
+    shades = {label for label, *_ in _KINDS.values()}
     for ax in axes:
-        handles = [
-            handle for handle in ax.get_legend_handles_labels()[0] if ax is axes[0] or _shades_alone(run, handle)
-        ]
+        handles = [one for one in ax.get_legend_handles_labels()[0] if ax is axes[0] or one.get_label() in shades]
         if handles and (ax is axes[0] or contacts_of(run) > 1):
             style.legend_above(ax, handles=handles, columns=6)
     axes[-1].set_xlabel("time [s]")
@@ -209,10 +208,6 @@ def _line(run: Trajectory, quantity: Quantity, wanted: list[Quantity]) -> dict[s
     colour = MASSES[row % len(MASSES)] if several and name in ("x", "v") else _COLOURS[name]
     alone = name == "x" and not several and len(wanted) == 1
     return {"color": colour, "linestyle": "--" if name == "z" else "-", "label": None if alone else labels}
-
-
-def _shades_alone(run: Trajectory, handle: Any) -> bool:
-    return handle.get_label() in {label for label, *_ in _KINDS.values()}
 
 
 @style.styled

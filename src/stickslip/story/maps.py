@@ -183,18 +183,12 @@ def of_stability(stability: Stability) -> Story:
 
 def of_basins(basins: Basins) -> Story:
     """Attractors over starts."""
-    return _story(
-        "basins",
-        partial(plot_basins, basins),
-    )
+    return _story("basins", partial(plot_basins, basins))
 
 
 def of_boundary(boundary: Boundary) -> Story:
     """Where the kind of motion changes."""
-    return _story(
-        "boundary",
-        partial(plot_boundary, boundary),
-    )
+    return _story("boundary", partial(plot_boundary, boundary))
 
 
 def of_dither(dither: Dither) -> Story:
