@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import stickslip as ss
+from stickslip.files import table, text
 from stickslip.files.select import split_name
 from stickslip.files.table import Options
 from stickslip.files.text import find_layout
@@ -16,6 +17,19 @@ from stickslip.files.text import find_layout
 T = np.arange(40) / 250
 X = np.round(np.sin(9 * T), 4)
 F = np.round(np.cos(9 * T) * 30, 3)
+
+
+def test_numbers_are_the_same_with_pandas_and_without(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A short file of numbers numpy reads; of random bits, as they are written, it keeps every one."""
+    drawn = np.random.default_rng(0).integers(0, 2**63, size=(3000, 2)).view(np.float64)
+    drawn = drawn[np.isfinite(drawn).all(axis=1)]
+    path = tmp_path / "run.csv"
+    path.write_text("a,b\n" + "".join(f"{one!r}, {other:.25g}\n" for one, other in drawn.tolist()), "utf-8")
+    (block,) = text.read(path, Options()).blocks(["b", "a"], 10_000)
+    monkeypatch.setattr(table, "SHORT", 0)
+    (again,) = text.read(path, Options()).blocks(["b", "a"], 10_000)
+    for name, written in zip("ab", drawn.T, strict=True):
+        assert block[name].tobytes() == again[name].tobytes() == written.tobytes()
 
 
 def rows(delimiter: str = ",", decimal: str = ".", tail: str = "") -> str:

@@ -1,4 +1,4 @@
-"""CSV and other text: the layout is found from the file's beginning, the rows are streamed through pandas."""
+"""CSV and other text: the layout is found from the file's beginning, long ones stream through pandas."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ import numpy as np
 from stickslip.arrays import Array
 from stickslip.errors import MISSTATED, FormatError
 from stickslip.files.select import is_unit, split_name
-from stickslip.files.table import FREE, Block, Column, Options, Table, unique
+from stickslip.files.table import FREE, Block, Column, Options, Table, plain_numbers, slices, unique
 from stickslip.record.metadata import read_beside
 
 if TYPE_CHECKING:
@@ -137,7 +137,6 @@ def _digits(cell: str) -> int:
 NAME = "text"
 SUFFIXES = (".csv", ".txt", ".tsv", ".dat", ".asc", ".prn", ".log", ".out")
 
-
 HEAD = 1 << 18  # bytes looked at to find the layout
 LONGEST_ROW = 1 << 24  # bytes; the parser holds a whole row, and a disk that was full leaves holes of any length
 DAY = 86400.0
@@ -172,6 +171,12 @@ def _blocks(path: Path, layout: Layout, stop: int, names: Sequence[str], size: i
     clocks = {index: _Seconds(path.name, layout.names[index]) for index in indexes.values() if index in layout.clocks}
     with path.open("rb") as file, _explained(path, layout, sorted(set(indexes.values()))):
         file.seek(layout.offset)
+        between = None if layout.delimiter == WHITESPACE else layout.delimiter
+        plain = layout.decimal == "." and not (layout.clocks or layout.comment or layout.thousands)
+        whole = plain_numbers(file, stop - layout.offset, between=between, width=len(layout.names)) if plain else None
+        if whole is not None:
+            yield from slices({name: whole[index] for name, index in indexes.items()})(names, size)
+            return
         for frame in _frames(file, layout, stop, sorted(set(indexes.values())), size):
             if frame[str(len(layout.names))].notna().any():
                 raise ValueError(f"a row has more than {len(layout.names)} cells")
@@ -186,9 +191,8 @@ def _frames(file: BinaryIO, layout: Layout, stop: int, indexes: Sequence[int], s
     width = len(layout.names)
     types: dict[str, Any] = {str(index): str if index in layout.clocks else np.float64 for index in indexes}
     types[str(width)] = str
-    exact: dict[str, Any] = {}
-    if tuple(int(part) for part in pd.__version__.split(".")[:2]) < (3, 1):
-        exact["float_precision"] = "round_trip"  # from 3.1 on this is the default, and asking for it warns
+    known = tuple(int(part) for part in pd.__version__.split(".")[:2]) < (3, 1)  # later it is so, and asking warns
+    exact: dict[str, Any] = {"float_precision": "round_trip"} if known else {}
     between = " " if layout.delimiter == WHITESPACE else layout.delimiter
     titles = between.join(map(str, range(width + 1))) + "\n"
     with pd.read_csv(
@@ -236,11 +240,9 @@ class _Headed(io.RawIOBase):
 @contextmanager
 def _explained(path: Path, layout: Layout, indexes: Sequence[int]) -> Iterator[None]:
     """Turn the parser's complaint into a sentence with the row at fault."""
-    import pandas as pd
-
     try:
         yield
-    except (ValueError, OverflowError, pd.errors.ParserError) as error:
+    except (ValueError, OverflowError) as error:  # a ParserError of pandas is a ValueError
         fault = _first_fault(path, layout, indexes)
         place = f"row {fault[0]} of '{path.name}' reads '{fault[1]}'" if fault else f"'{path.name}': {str(error)[:100]}"
         raise FormatError(
@@ -308,8 +310,7 @@ class _Seconds:
 
 def _day_number(text: str) -> int:
     numbers = [int(part) for part in re.split(r"[-/.]", text)]
-    year, month, day = numbers if numbers[0] > 31 else reversed(numbers)
-    return date(year, month, day).toordinal()
+    return date(*(numbers if numbers[0] > 31 else reversed(numbers))).toordinal()
 
 
 # ---- how a text file is laid out, found from its beginning
