@@ -49,8 +49,18 @@ def test_dry_friction_that_is_there_is_told() -> None:
     assert "dry friction force of" in told
 
 
-@pytest.mark.parametrize("change", [-0.02, 0.01])
-@pytest.mark.parametrize(("ratio", "dry"), [(0.003, 0.02), (0.012, 0.012), (0.0008, 0.05)])
+@pytest.mark.parametrize(
+    ("ratio", "dry", "change"),
+    [
+        (0.003, 0.02, -0.02),
+        (0.012, 0.012, 0.01),
+        (0.0008, 0.05, -0.02),
+        *(
+            pytest.param(*other, marks=pytest.mark.soak)
+            for other in ((0.003, 0.02, 0.01), (0.012, 0.012, -0.02), (0.0008, 0.05, 0.01))
+        ),
+    ],
+)
 def test_what_a_changing_friction_is_misread_by_is_said_beforehand(ratio: float, dry: float, change: float) -> None:
     t = np.arange(12000) / 1000
     half_cycles = np.count_nonzero(np.diff(np.sign(np.diff(let_go(t, 20.0, ratio, dry)))))
