@@ -41,7 +41,7 @@ def test_play_that_is_stated_is_no_friction(seed):
         assert getattr(stated, name).includes(joint.truth[name]), name
 
 
-@pytest.mark.parametrize("seed", [312, 315, 323])
+@pytest.mark.parametrize("seed", [312, 323])
 def test_play_that_nobody_stated_is_named_where_the_torque_seems_too_early(seed):
     """A torque that comes before the motion that it makes was told, and taken out, as a delay of less than none."""
     _, record = by_motor(seed)
@@ -52,6 +52,23 @@ def test_play_that_nobody_stated_is_named_where_the_torque_seems_too_early(seed)
     assert "earlier" not in " ".join(ss.summary(findings).headline)
     plain = joints.drawn(seed, torque=True).record
     assert "--play" not in regress_joint(plain).level.status
+
+
+@pytest.mark.parametrize(("early", "named"), [(2.5e-3, False), (20e-3, True)])
+def test_a_torque_that_is_logged_as_it_is_set_and_held_is_no_play(early, named):
+    """It comes half of what it is held for early: 6 of 6 logs of another integrator were told to have play."""
+    t = np.arange(6000) / 200
+    (q, _, _), (place, v, a) = (
+        [sum(s * (6.283 * f) ** k * np.sin(6.283 * f * at + k * np.pi / 2) for s, f in ((1.2, 0.2), (0.4, 0.7)))
+         for k in range(3)] for at in (t, t + early)
+    )  # fmt: skip
+    torque = 0.02 * a + 0.03 * v + 1.5 * np.sin(place) + (0.06 + 0.1 * np.abs(1.5 * np.sin(place))) * np.sign(v)
+    noise = np.random.default_rng(0).normal(0, 0.01, t.size)
+    log = ss.Record.of({"theta": q, "force": torque + noise}, fs=200, units={"force": "N m"})
+    assert ("--play" in regress_joint(log).level.status) == named
+    stated = regress_joint(log, play="0.01 deg").level.status
+    assert "--play" not in stated, "the advice led in a circle"
+    assert ("more play than is stated" in stated) == named
 
 
 def test_several_logs_are_told_by_it_too():

@@ -349,16 +349,14 @@ def delay_of(data: JointData) -> Estimate | None:
         return None
     if not loop and not _heard(data.earlier(late), fit, terms):
         return None
-    name = WORDS["lag" if loop else "late"]
-    sd = (1.0 if loop else STRAYS) * Telling(data, fit, terms, True, "ok", ()).sum({"late": 1.0}, name).sd
-    sd = math.hypot(sd, NEAR / fs)
+    name, strays = (WORDS["lag"], 1.0) if loop else (WORDS["late"], STRAYS)
+    sd = math.hypot(strays * Telling(data, fit, terms, True, "ok", ()).sum({"late": 1.0}, name).sd, NEAR / fs)
     late, sd = (late, sd) if abs(late) <= LATEST else (0.0, LATEST)  # beyond that it is some other fault's
-    if loop and (
-        sd > LOOP[1] or not damps_error(punctual(data, None), fit, terms)
-    ):  # as much is known of any controller
+    if loop and (sd > LOOP[1] or not damps_error(punctual(data, None), fit, terms)):  # as much is known of any
         return None
     borne = any(log.bodies is not None for log in data.logs)  # friction that grows with their torque passes for that
-    status = Status(too_early(-late)) if not (loop or borne) and late < -EARLY * sd else Status()
+    early = not (loop or borne) and late + 1 / fs < -EARLY * sd  # what is set at a sample and held is early by half
+    status = Status(too_early(-late, "play" in data.stated)) if early else Status()
     return Estimate.normal(name, late, sd=sd, unit="s", method="the balance of torque, read later", status=status)
 
 

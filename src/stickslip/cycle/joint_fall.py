@@ -22,8 +22,10 @@ from stickslip.statistics import FEW_INDEPENDENT, LeastSquares, correlation_time
 
 EXPONENTS = (1.0, 1.5, 2.0)  # Tustin's, Gauss's and one between: a log hardly tells them apart, so all are counted
 SPEEDS = 12  # of each exponent
+POWERS = ((0.0, 1.5), (0.0, 2.0), (0.0, 3.0))  # of the speed, by which drag may grow: grease's, air's, and one beyond
 BENT = 0.5  # of the fastest sliding: a likeliest curve that falls slower is a bend of the line, as rising friction has
 LEAST = 2.0  # deviations of the speed's noise
+ALONG = 200  # speeds at which friction along a curve is compared
 ROUNDS = 2  # about the load part and gravity's torque that the likeliest curve leaves
 LIKELY = 8.0  # halves of chi squared above the least, within which curves are told apart finer
 NEGLIGIBLE = 1e-3  # of the likeliest curve's weight
@@ -141,7 +143,7 @@ class _Balance:
         slides = log.sliding
         place = log.reference if steered and log.reference is not None else log.position
         carried = np.abs(self.pull[0] * np.sin(place) + self.pull[1] * np.cos(place))
-        excess = [slides.side * np.exp(-((speed / fall) ** exponent)) for fall, exponent in curves]
+        excess = [slides.side * _shape(speed, curve) for curve in curves]
         columns = [[slides.at(one)] for one in excess]
         if "load" in self.terms and log.borne is not None:
             borne = np.abs(log.borne[steered]) / slides.weights
@@ -150,6 +152,28 @@ class _Balance:
             carried = carried - carried[slides.rows].mean()
             columns = [[column, slides.at(one * carried)] for one, (column,) in zip(excess, columns, strict=True)]
         return np.stack([np.column_stack(pair) for pair in columns])
+
+    def drop(self, fit: LeastSquares, curve: Array) -> float:
+        """By how many deviations friction along a curve is lower at some speed than at a slower one."""
+        logs = zip(self.data.logs, self.speeds, strict=True)
+        seen = np.concatenate([speed[log.sliding.rows] for log, (speed, _) in logs])
+        speed = np.linspace(seen.min(), seen.max(), ALONG)
+        row, parts = np.zeros(len(fit.coefficients)), [len(self.terms), self.terms.index("viscous")]
+        columns = np.column_stack([_shape(speed, curve), speed])
+        rubs = columns @ fit.coefficients[parts]
+        low = int(np.argmin(rubs - np.maximum.accumulate(rubs)))
+        row[parts] = columns[int(np.argmax(rubs[: low + 1]))] - columns[low]
+        lower = fit.combined(row, "", "", "")
+        return lower.value / lower.sd if row.any() else 0.0
+
+    def rises(self) -> bool:
+        """Whether drag, that grows with a power of the speed, explains as much as any curve that falls: beside a line
+        that is too steep it looks like an excess at rest.
+        """
+        solved, place = self.solved(np.concatenate([self.seen, POWERS])), len(self.seen)
+        best, left = solved.likeliest(self.terms)
+        _, variance = _sureness(solved.fit(best), len(self.terms))
+        return bool(min(left[place:]) < min(left[:place]) + SURELY**2 * variance)
 
     def solved(self, curves: Array) -> _Solved:
         """The balance solved with each curve, and without any."""
@@ -196,6 +220,12 @@ class _Solved:
         return replace(least_squares(design, self.torque, instruments=known, noise=self.noise), cyclic=True)
 
 
+def _shape(speed: Array, curve: Array) -> Array:
+    """How the excess goes with the speed: it falls, or of no Stribeck speed grows by that power."""
+    fall, exponent = curve
+    return np.asarray(np.exp(-((speed / fall) ** exponent)) if fall else speed**exponent)
+
+
 def speed_of(log: Log, *, steered: bool = False) -> tuple[Array, float]:
     """Speed of a log, or of its reference, and the deviation of its noise."""
     position = log.reference if steered and log.reference is not None else log.turned
@@ -227,9 +257,14 @@ def falling(data: JointData, fit: LeastSquares, terms: tuple[str, ...], pull: tu
 
 
 def bends(data: JointData, fit: LeastSquares, terms: tuple[str, ...], pull: tuple[float, float]) -> bool:
-    """Whether friction is surely no line over the speed: a curve beside it, that falls or rises, is surely there."""
+    """Whether friction is surely no line over the speed: a curve beside it, or drag, is surely there."""
     balance = _balance(data, fit, terms, pull)
-    solved, place = balance.solved(balance.seen), len(terms)
+    return any(_curved(balance, curves) for curves in (balance.seen, np.array(POWERS)))
+
+
+def _curved(balance: _Balance, curves: Array) -> bool:
+    """Whether the likeliest of some curves, that falls or rises, is surely there."""
+    solved, place = balance.solved(curves), len(balance.terms)
     for number in np.argsort([solved.left(design)[1] for design in solved.designs]):
         try:
             curved = solved.fit(int(number))
@@ -258,13 +293,16 @@ def _balance(data: JointData, fit: LeastSquares, terms: tuple[str, ...], pull: t
 
 def _allowed(balance: _Balance) -> Fall | None:
     """The curves that the log allows, where one surely falls and is no bend."""
-    curves = balance.seen
+    curves, rises = balance.seen, balance.rises()
     place, fastest = len(balance.terms), curves.max(axis=0)[0]
     for finer in (False,) * ROUNDS + (True,) * FINER:
         solved = balance.solved(curves)
         best, left = solved.likeliest(balance.terms)
-        sure, variance = _sureness(solved.fit(best), place)
+        fit = solved.fit(best)
+        sure, variance = _sureness(fit, place)
         if sure < SURELY or curves[best, 0] > BENT * fastest:
+            return None
+        if rises and balance.drop(fit, curves[best]) < SURELY:
             return None
         balance = balance.about(solved.left(solved.designs[best])[0])
         curves = _finer(curves, left / variance) if finer else curves
@@ -448,11 +486,12 @@ def _surely(value: float, sd: float) -> bool:
     return abs(value) > SURELY * sd
 
 
-def too_early(ahead: float) -> Doubt:
-    """What a torque means that seems to come before the motion that it makes."""
+def too_early(ahead: float, stated: bool) -> Doubt:
+    """What a torque means that seems to come before the motion that it makes, where play was stated or was not."""
+    play = "there may be more play than is stated" if stated else 'there may be play (state it: --play "1 deg")'
     words = (
         f"the torque seems to come {1e3 * ahead:.2g} ms before the motion that it makes: between encoder and link "
-        'there may be play (state it: --play "1 deg"), or the position comes late'
+        f"{play}, or the position comes late"
     )
     return Doubt(words, AHEAD)
 

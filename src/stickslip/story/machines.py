@@ -13,6 +13,7 @@ from stickslip.answers.arm import Joint
 from stickslip.answers.findings import Comparison, Findings
 from stickslip.answers.machines import joint_law
 from stickslip.cycle.joint import LAWS, JointFriction
+from stickslip.cycle.joint_fall import ALONG
 from stickslip.cycle.joint_fit import SURELY, is_late
 from stickslip.cycle.joint_logs import JointLogs
 from stickslip.cycle.tribometer import DEFINITIONS
@@ -225,8 +226,8 @@ def _of_one_joint(findings: Findings) -> Iterator[str]:
 
 
 def _laws(joints: Sequence[JointFriction]) -> Iterator[str]:
-    """Which of the laws M1 to M6 all logs leave, where they carry a load."""
-    if any(joint.load is None for joint in joints):
+    """Which of the laws M1 to M6 all logs leave, where they carry a load, and no doubt is of what would deny one."""
+    if any(joint.load is None or not (stands(joint.load.status) and stands(joint.level.status)) for joint in joints):
         return
     left = [law for law in LAWS if all(law in joint.laws for joint in joints)]
     *others, last = [law for law in LAWS if law not in left] or [""]
@@ -278,8 +279,12 @@ def _fall(joint: JointFriction, said: set[str]) -> Iterator[str]:
     """How its friction falls with the speed, or from which speed on none does."""
     if joint.static is not None and joint.stribeck_speed is not None:
         static, speed = joint.static, joint.stribeck_speed
+        moved = np.linspace(np.abs(joint.speed).min(), np.abs(joint.speed).max(), ALONG)
+        excess = (static.value - joint.level.value) * np.exp(-((moved / speed.value) ** (joint.exponent or 1.0)))
+        falls = np.any(np.diff(joint.viscous.value * moved + excess) < 0)
+        what = "friction" if falls else "friction but the viscous part"
         yield (
-            f"Its friction falls with the speed: at rest it is {value_of(static)} (95 %: {interval_of(static)})"
+            f"Its {what} falls with the speed: at rest it is {value_of(static)} (95 %: {interval_of(static)})"
             f"{_in_doubt(static, said)}, and falls within {value_of(speed)} (95 %: {interval_of(speed)}), the Stribeck "
             "speed."
         )
