@@ -71,6 +71,17 @@ def test_the_plain_law_is_as_good_where_it_is_the_law() -> None:
         assert one.plain == pytest.approx(one.error, rel=0.1)
 
 
+def test_logs_of_several_payloads_are_said_to_be_unlike() -> None:
+    """Their gravity was pooled without a word, with the advice to carry another payload."""
+    some = [log(number, inertia=heavy, sine=25 * heavy) for number, heavy in enumerate((0.02, 0.04, 0.06))]
+    alike = [log(number) for number in range(3)]
+    for logs, unlike in ((some, True), (alike, False)):
+        comparison = ss.answers.compare_joints([ss.answers.analyze_joint(one) for one in logs])
+        said = " ".join(ss.summary(comparison).headline)
+        assert ("inertia and gravity differ" in said) == unlike
+        assert "e+0" not in said
+
+
 def test_logs_of_different_sources_are_refused() -> None:
     torque = log(0)
     by_current = ss.Record.of({"theta": torque["theta"], "current": torque["force"]}, fs=200.0)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+import math
 from collections.abc import Iterator, Sequence
 from functools import partial
 from pathlib import Path
@@ -150,14 +152,32 @@ def of_joints(comparison: Comparison) -> Story:
     return Story(
         f"{len(logs)} logs of a joint",
         list(_together(comparison)),
-        list(map(Caution, _untold(comparison.together, "These logs do"))),
+        [] if _unlike(comparison) else list(map(Caution, _untold(comparison.together, "These logs do"))),
         tables=[table],
         draw=lambda: plates_together(logs),
         data=lambda: {"predictions": data},
     )
 
 
+def _unlike(comparison: Comparison) -> list[str]:
+    """What the logs, each by itself, tell of another payload than others."""
+    names = {"inertia": "inertia", "sine": "gravity", "cosine": "gravity"}
+    pairs = list(itertools.combinations([log.joint for log in comparison.findings], 2))
+    unlike = []
+    for name, what in names.items():
+        told = [(getattr(one, name), getattr(other, name)) for one, other in pairs]
+        known = [(one, other) for one, other in told if one is not None and other is not None]
+        if any(abs(one.value - other.value) > SURELY * math.hypot(one.sd, other.sd) for one, other in known):
+            unlike.append(what)
+    return list(dict.fromkeys(unlike))
+
+
 def _together(comparison: Comparison) -> Iterator[str]:
+    if unlike := _unlike(comparison):
+        yield (
+            f"The logs' {' and '.join(unlike)} differ by more than their intervals allow, as of several payloads: what "
+            "they tell together is not to be trusted, what each tells by itself is."
+        )
     together, logs = comparison.together, comparison.together.predictions
     parts = [f"{value_of(together.forward)} forward and {value_of(together.back)} back"]
     parts.append(f"{value_of(together.viscous)} of viscous friction")
@@ -167,10 +187,14 @@ def _together(comparison: Comparison) -> Iterator[str]:
     yield from _laws([log.joint for log in comparison.findings])
     missed, plain = (sorted(getattr(one, name) for one in logs) for name in ("error", "plain"))
     yield (
-        f"The torque of each log is predicted by the others but for {100 * missed[0]:.2g} to {100 * missed[-1]:.2g} % "
+        f"The torque of each log is predicted by the others but for {_share(missed[0])} to {_share(missed[-1])} % "
         "of how far it varies; by Coulomb and viscous friction alone but for "
-        f"{100 * plain[0]:.2g} to {100 * plain[-1]:.2g} %."
+        f"{_share(plain[0])} to {_share(plain[-1])} %."
     )
+
+
+def _share(part: float) -> str:
+    return f"{float(f'{100 * part:.2g}'):g}"
 
 
 def _of_one_joint(findings: Findings) -> Iterator[str]:
