@@ -35,6 +35,7 @@ TRUTHS = {
     "stribeck": {**BOTH, "rise": 0.3, "stribeck_speed": 0.05 * W},
     "micro-slip": {"damping_ratio": 0.005, "micro_slip": 0.05, "exponent": 0.5},
     "curved spring": {**BOTH, "curvature": -0.02},
+    "elastic contact": {**BOTH, "presliding": 2e-3, "relaxation": 0.01},
 }
 TERMS = {
     "quadratic": {},

@@ -16,6 +16,8 @@ CASES = {
     "stribeck": {"damping_ratio": 0.01, "dry_displacement": 0.02, "rise": 0.3, "stribeck_speed": 0.05 * W},
     "micro-slip": {"damping_ratio": 0.01, "micro_slip": 0.05, "exponent": 0.4},
     "curved spring": {"damping_ratio": 0.01, "dry_displacement": 0.02, "curvature": 0.1},
+    "elastic contact": {"damping_ratio": 0.01, "dry_displacement": 0.05, "presliding": 0.01, "relaxation": 0.02},
+    "stiff contact": {"damping_ratio": 0.002, "dry_displacement": 0.03, "presliding": 0.001},
     "worn": {"damping_ratio": 0.01, "dry_displacement": 0.02, "wear": 0.05},
     "worn smooth": {"dry_displacement": 0.02, "wear": -0.03, "rise": 0.3, "stribeck_speed": 0.05 * W},
 }
@@ -28,14 +30,18 @@ def parameters(**values: float) -> np.ndarray:
 
 def by_scipy(p: np.ndarray, pendulum: bool) -> np.ndarray:
     """The same motion, half cycle after half cycle, by scipy's eighth-order rule."""
-    w, zeta, dry, rest, first, start, q, rise, speed, slip, exponent, curve, wear = p
+    w, zeta, dry, rest, first, start, q, rise, speed, slip, exponent, curve, wear, presliding, relaxation = p
     side, amplitude, history = np.sign(first), abs(first), -slip * abs(first) ** (1 + exponent)
-    x, slid = np.full(TIMES.size, rest + first), 0.0
+    x, slid, bent = np.full(TIMES.size, rest + first), 0.0, -dry
 
     def spring(u: float) -> float:
         return (np.sin(u) if pendulum else u) + curve * u**3
 
-    while start < TIMES[-1] and abs(spring(amplitude) + history) > dry * (1 + rise) * (1 + wear * slid / abs(first)):
+    def leaves() -> bool:
+        holds = dry * (1 + rise) * (1 + wear * slid / abs(first))
+        return presliding > 0 or abs(spring(amplitude) + history) > holds
+
+    while start < TIMES[-1] and leaves():
         top, held = amplitude, history
 
         def rates(_: float, state: np.ndarray, top: float = top, held: float = held, slid: float = slid) -> list[float]:
@@ -43,7 +49,9 @@ def by_scipy(p: np.ndarray, pendulum: bool) -> np.ndarray:
             joint = 2 * slip * max((top - u) / 2, 0.0) ** (1 + exponent)
             friction = dry * (1 + rise * np.exp(-y / speed)) if speed else dry
             friction *= 1 + wear * (slid + top - u) / abs(first)
-            return [-y, w * w * (friction - spring(u) - held - joint) + 2 * zeta * w * y + q * y * y]
+            bends = y * (dry - state[2]) / presliding if presliding else 0.0  # Dahl's equation; LuGre's damping
+            friction = state[2] + relaxation * bends if presliding else friction
+            return [-y, w * w * (friction - spring(u) - held - joint) + 2 * zeta * w * y + q * y * y, bends]
 
         def turning(_: float, state: np.ndarray) -> float:
             return state[1]
@@ -52,7 +60,7 @@ def by_scipy(p: np.ndarray, pendulum: bool) -> np.ndarray:
         run = solve_ivp(
             rates,
             (0, 10),
-            [top, -1e-300],
+            [top, -1e-300, bent],
             method="DOP853",
             rtol=1e-12,
             atol=1e-14,
@@ -60,12 +68,13 @@ def by_scipy(p: np.ndarray, pendulum: bool) -> np.ndarray:
             dense_output=True,
             max_step=0.1 / w,
         )
-        length, end = run.t_events[0][0], run.y_events[0][0][0]
+        length, (end, _, borne) = run.t_events[0][0], run.y_events[0][0]
         rows = (start < TIMES) & (start + length >= TIMES)
         if rows.any():
             x[rows] = rest + side * run.sol(TIMES[rows] - start)[0]
         history = -history - 2 * slip * ((top - end) / 2) ** (1 + exponent)
         amplitude, side, start, slid = -end, -side, start + length, slid + top - end
+        bent = -borne
         x[start < TIMES] = rest + side * amplitude
     return x
 

@@ -45,6 +45,7 @@ def test_the_model_is_chosen_from_the_record_alone(damping: float, dry: float, m
         "stribeck",
         "curved spring",
         "micro-slip",
+        "elastic contact",
     }
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from stickslip.answers.findings import BY_DECREMENTS, Comparison, Findings, Inquiry, record_name, require_several
 from stickslip.answers.mistakes import mistakes_of_decay
 from stickslip.decay.answer import DecayFit, rig_units
-from stickslip.decay.choice import COLOURED
+from stickslip.decay.choice import COLOURED, Choice
 from stickslip.decay.decrement import Decrement, decrement
 from stickslip.decay.extremes import EnvelopeDecay, extreme_decay, hilbert_decay, linear_decrement, log_decrement
 from stickslip.decay.fit_decay import LEFT_OVER, fit_decay
@@ -29,6 +29,7 @@ from stickslip.units import parse_constant
 
 EXTREMES = "extremes alone"
 LOST = 0.1  # of the motion: a fit that leaves more of it does not follow it
+NEARER = 8.0  # times less left than by viscous and dry friction: an Iwan chain left 14, two clocks that can not be trusted 3 and 4
 CLEAR = 1e-3  # p-value below which a motion's rejection is no chance of one true motion in twenty
 CHANCE = 0.01  # of a record without dry friction to be told to have some
 ONE_IN_100 = 2.33 / 1.96  # by which the lower end of 95 % lies farther off where one in a hundred lies beyond it
@@ -377,8 +378,15 @@ def _by_waveform(
     if waveform is not None:
         return waveform, motion, None
     # a clock that can not be trusted leaves a motion that is neither kept nor followed down to the noise
-    likely = motion is not None and (motion.choice.chosen.kept or motion.choice.chosen.whiteness >= COLOURED)
+    likely = motion is not None and _is_followed(motion.choice)
     return None, motion if likely else None, inquiry.refusals[-1]
+
+
+def _is_followed(choice: Choice) -> bool:
+    """Whether the motion chosen is kept, follows down to the noise, or far nearer than viscous and dry friction do."""
+    chosen, fits = choice.chosen, {candidate.name: candidate.fitted for candidate in choice.candidates}
+    nearer = "both" in fits and chosen.fitted.cost * NEARER**2 < fits["both"].cost
+    return chosen.kept or chosen.whiteness >= COLOURED or nearer
 
 
 def _followed(fit: DecayFit, restoring: Restoring) -> DecayFit:

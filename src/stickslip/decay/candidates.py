@@ -22,15 +22,21 @@ HOPELESS = 4.0  # times what viscous damping with dry friction leaves
 EVALUATIONS = 60  # of one search
 PRECISION = 1e-6  # of the range: no record is better, no residual below it says anything
 CONVERGED = 1e-8  # relative change of the sum of squares, and of the parameters
-LOWEST = {"damping_ratio": 0.0, "dry_displacement": 0.0, "quadratic": 0.0, "rise": 0.0, "micro_slip": 0.0, "wear": -0.5}
+LOWEST = {
+    "damping_ratio": 0.0, "dry_displacement": 0.0, "quadratic": 0.0, "rise": 0.0, "micro_slip": 0.0, "wear": -0.5,
+    "relaxation": 0.0,
+}  # fmt: skip
 # lowest and highest; speeds in units of the first speed
 SHAPES = {"stribeck_speed": (0.02, 1.0), "exponent": (0.1, 1.0)}
+PRESLIDING = (1e-5, 0.2)  # lowest and highest, in units of the first amplitude
 ADDED = ("quadratic", "rise", "micro_slip")
 CLEAR = 10.0  # effect over noise above which the shape of a term is known
 HIGHEST = {"damping_ratio": 0.95, "rise": 1.0, "wear": 0.5}  # by half in a first amplitude is no wear any more
 NEARLY, STEEP, STEEPEST = 0.99, 1.01, 4.0  # of the highest rise: from where, and up to which, one beyond is searched
 STRIBECK_SPEEDS = (0.05, 0.3)  # of the first speed, at which a slope is looked for
 EXPONENT = 0.5  # of the micro-slip that is looked for
+STIFFER = (100.0, 20.0, 4.0)  # a contact than the spring, from which one that yields is searched
+FADING = 0.1  # damping ratio of its ringing there
 NUMBERS = {name: number for number, name in enumerate(PARAMETERS)}
 
 
@@ -97,7 +103,7 @@ class Fitted:
     ----------
     motion : Motion
         The candidate.
-    parameters : ndarray, shape (13,)
+    parameters : ndarray, shape (15,)
         In the order of ``PARAMETERS``.
     half_cycles : int
         That it makes within the record.
@@ -194,8 +200,7 @@ def fit_candidates(names: tuple[str, ...], blocks: BlockMeans, start: Array) -> 
             starts = [*_starts(motion, base), *([_followed(motion, blocks, first)] if name == CURVED else [])]
             tries = [fit_motion(motion, blocks, s, hopeless=hopeless) for s in starts]
         for other in fitted.values():
-            within = set(other.motion.terms) < set(motion.terms) and other.motion.sticks_early <= motion.sticks_early
-            if within and other.cost < min(candidate.cost for candidate in tries):
+            if motion.contains(other.motion) and other.cost < min(candidate.cost for candidate in tries):
                 shaped = _shaped(motion, other.parameters.copy(), share=1e-3)
                 tries += [fit_motion(motion, blocks, s, hopeless=hopeless) for s in shaped]
         fitted[name] = min(tries, key=lambda candidate: candidate.cost)
@@ -226,7 +231,7 @@ def fit_motion(
         The candidate; what it does not free stays as in `start`.
     blocks : BlockMeans
         The data.
-    start : ndarray, shape (13,)
+    start : ndarray, shape (15,)
         Where the search begins.
     half_cycles : int, optional
         It stays after so many, whatever drives it on.
@@ -237,7 +242,7 @@ def fit_motion(
     -------
     Fitted
     """
-    if half_cycles is not None or "dry_displacement" not in motion.terms:
+    if half_cycles is not None or not motion.stops:
         return _search(motion, blocks, start, half_cycles)
     number = blocks.motion(start)[2]
     tried = {number: _search(motion, blocks, start, number)}
@@ -310,7 +315,7 @@ def _units(start: Array) -> Array:
     measures = {
         "angular_frequency": w, "dry_displacement": length, "rest": length, "amplitude": length, "release": 1 / w,
         "quadratic": 1 / length, "stribeck_speed": w * length, "micro_slip": length**-exponent,
-        "curvature": length**-2,
+        "curvature": length**-2, "presliding": length, "relaxation": 1 / w,
     }  # fmt: skip
     return np.array([measures.get(name, 1.0) for name in PARAMETERS])
 
@@ -319,8 +324,9 @@ def _bounds(motion: Motion, start: Array) -> tuple[Array, Array]:
     """Lowest and highest value of each free parameter."""
     low, high = [], []
     for name in motion.free:
-        unit = first_speed(start) if name == "stribeck_speed" else 1.0
-        ends = SHAPES.get(name, (LOWEST.get(name, -math.inf), highest(name, start)))
+        unit = {"stribeck_speed": first_speed(start), "presliding": abs(start[NUMBERS["amplitude"]])}.get(name, 1.0)
+        ends = (LOWEST.get(name, -math.inf), highest(name, start))
+        ends = PRESLIDING if name == "presliding" else SHAPES.get(name, ends)
         low.append(unit * ends[0])
         high.append(unit * ends[1])
     return np.array(low), np.array(high)
@@ -362,9 +368,29 @@ def _shaped(motion: Motion, start: Array, *, share: float = 1.0) -> list[Array]:
     for name, value in little.items():
         if name in motion.terms and start[NUMBERS[name]] == 0:
             start[NUMBERS[name]] = share * value
-    if "stribeck_speed" not in motion.terms or start[NUMBERS["stribeck_speed"]] > 0:
-        return [start]
-    starts = [start.copy() for _ in STRIBECK_SPEEDS]
-    for guess, ratio in zip(starts, STRIBECK_SPEEDS, strict=True):
-        guess[NUMBERS["stribeck_speed"]] = ratio * speed
-    return starts
+    if "stribeck_speed" in motion.terms and start[NUMBERS["stribeck_speed"]] == 0:
+        return [_with(start, stribeck_speed=ratio * speed) for ratio in STRIBECK_SPEEDS]
+    if "presliding" in motion.terms and start[NUMBERS["presliding"]] == 0:
+        return [yielding(start, stiffer) for stiffer in STIFFER]
+    return [start]
+
+
+def yielding(parameters: Array, stiffer: float) -> Array:
+    """The same on a contact that yields with a stiffness so many times the spring's, its ringing damped a little."""
+    rate = parameters[NUMBERS["angular_frequency"]] * math.sqrt(1 + stiffer)
+    least = PRESLIDING[0] * abs(parameters[NUMBERS["amplitude"]])
+    presliding = max(float(parameters[NUMBERS["dry_displacement"]] / stiffer), least)
+    return _with(parameters, presliding=presliding, relaxation=2 * FADING / rate * (1 + 1 / stiffer))
+
+
+def rigid(parameters: Array) -> Array:
+    """The same on a contact that does not yield."""
+    return _with(parameters, presliding=0.0, relaxation=0.0)
+
+
+def _with(parameters: Array, **values: float) -> Array:
+    """A copy with some parameters changed."""
+    changed = parameters.copy()
+    for name, value in values.items():
+        changed[NUMBERS[name]] = value
+    return changed

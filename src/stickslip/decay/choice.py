@@ -16,6 +16,7 @@ from stickslip.decay.candidates import (
     EXPONENT,
     HOPELESS,
     NUMBERS,
+    STIFFER,
     STRIBECK_SPEEDS,
     BlockMeans,
     Fitted,
@@ -23,6 +24,7 @@ from stickslip.decay.candidates import (
     fit_candidates,
     fit_motion,
     highest,
+    yielding,
 )
 from stickslip.decay.motions import MOTIONS, Restoring
 from stickslip.errors import EstimateError
@@ -43,6 +45,7 @@ SEEN = {
     "micro_slip": "a joint in micro-slip",
     "curvature": "a spring that is not straight",
     "static": "static above kinetic friction",
+    "presliding": "a contact that yields before it slides",
 }
 
 
@@ -250,7 +253,19 @@ class Choice:
         if not tried or any(tested.kept for tested in tried):
             return ""
         best = min(tried, key=lambda tested: tested.fitted.motion.size)
-        return self.worn or f"{best.against} is seen beside {best.fitted.motion.words}"
+        return self.worn or f"{self._missing(best)} is seen beside {best.fitted.motion.words}"
+
+    def _missing(self, poor: Candidate) -> str:
+        """What a candidate lacks, in words: by the one with more terms that leaves least, if that is less than half.
+
+        The term seen most clearly is named to first order: of a contact that yields, air damping.
+        """
+        terms = set(poor.fitted.motion.terms)
+        richer = [candidate for candidate in self.candidates if terms < set(candidate.fitted.motion.terms)]
+        nearest = min(richer, key=lambda candidate: candidate.fitted.cost, default=poor)
+        if nearest.fitted.cost * NEAR**2 > poor.fitted.cost:
+            return poor.against
+        return next((SEEN[name] for name in nearest.fitted.motion.terms if name not in terms), poor.against)
 
     def candidate(self, name: str) -> Candidate:
         """The candidate of a name in ``MOTIONS``."""
@@ -506,12 +521,13 @@ def _directions(fitted: Fitted, best: Fitted) -> list[tuple[str, Array]]:
     """How the weighted motion would move with each named term that the candidate lacks."""
     terms, blocks = fitted.motion.terms, fitted.blocks
     dry = "dry_displacement" in terms
+    half_cycles = fitted.half_cycles if fitted.motion.stops else None
 
     def column(name: str, **shape: float) -> Array:
         parameters = fitted.parameters.copy()
         for other, value in shape.items():
             parameters[NUMBERS[other]] = value
-        jacobian = blocks.motion(parameters, free=(name,), half_cycles=fitted.half_cycles if dry else None)[1]
+        jacobian = blocks.motion(parameters, free=(name,), half_cycles=half_cycles)[1]
         return blocks.weighted(jacobian)[:, 0]
 
     wanted = ("damping_ratio", "dry_displacement", "quadratic", "curvature")
@@ -522,7 +538,13 @@ def _directions(fitted: Fitted, best: Fitted) -> list[tuple[str, Array]]:
         speed = first_speed(fitted.parameters)
         directions += [("rise", column("rise", stribeck_speed=share * speed)) for share in STRIBECK_SPEEDS]
     near = fitted.cost < HOPELESS * best.cost
-    if dry and near and fitted.half_cycles > 1 and not fitted.motion.sticks_early:
+    if fitted.motion.stops and fitted.value("dry_displacement") > 0:
+        # no derivative: from rigid on, a motion goes with the root of the pre-sliding displacement
+        rigid = blocks.motion(fitted.parameters, half_cycles=half_cycles)[0]
+        for stiffer in STIFFER:
+            moved = blocks.motion(yielding(fitted.parameters, stiffer))[0] - rigid
+            directions.append(("presliding", blocks.weighted(moved)))
+    if fitted.motion.stops and near and fitted.half_cycles > 1 and not fitted.motion.sticks_early:
         earlier = fit_motion(fitted.motion, blocks, fitted.parameters, half_cycles=fitted.half_cycles - 1)
         directions.append(("static", fitted.residual - earlier.residual))
     return directions

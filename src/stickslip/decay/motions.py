@@ -6,11 +6,12 @@ Between two turning points every candidate's equation is smooth. In the directio
 from rest counted positive at the half cycle's beginning, ``A`` its value there and ``y = -u'`` the speed,
 
     u'' = -w^2 [r(u) + h + 2 kappa ((A - u) / 2)^(1 + p)] + w^2 x_k (1 + sigma exp(-y / v_s)) (1 + eta s / |a|)
-          + 2 zeta w y + q y^2,
+          - w^2 (x_k - b) exp(-(A - u) / l) (1 - tau y / l) + 2 zeta w y + q y^2,
 
 s the way slid since the release and a the first amplitude: friction that changes as it wears. The term in kappa is a
 Masing branch of the backbone ``x - kappa x^(1 + p)`` (a joint in micro-slip, Segalman 2005); ``h`` is what the branches
-before have left. Gragg's extrapolated midpoint rule (order eight) carries state and sensitivities; the turning point is
+before have left. That in l is a contact that yields before it slides (Dahl 1968; with tau LuGre's, Canudas de Wit 1995):
+its friction bears ``b`` at the turning point, against the motion that begins there, and x_k some l later. Gragg's extrapolated midpoint rule (order eight) carries state and sensitivities; the turning point is
 found to rounding; samples lie on quintics through position, speed and acceleration.
 """
 
@@ -31,17 +32,20 @@ RESTORING: tuple[str, ...] = get_args(Restoring)
 
 PARAMETERS = (
     "angular_frequency", "damping_ratio", "dry_displacement", "rest", "amplitude", "release",
-    "quadratic", "rise", "stribeck_speed", "micro_slip", "exponent", "curvature", "wear",
+    "quadratic", "rise", "stribeck_speed", "micro_slip", "exponent", "curvature", "wear", "presliding", "relaxation",
 )  # fmt: skip
 ALWAYS = ("angular_frequency", "rest", "amplitude", "release")
 
 FREQUENCY, DAMPING, DRY, REST, AMPLITUDE, RELEASE = range(6)
-QUADRATIC, RISE, SPEED, SLIP, EXPONENT, CURVATURE, WEAR = range(6, 13)
-WIDTH = 13
+QUADRATIC, RISE, SPEED, SLIP, EXPONENT, CURVATURE, WEAR, PRESLIDING, RELAXATION = range(6, 15)
+WIDTH = len(PARAMETERS)
 
 STEP = 0.2  # of a radian of the small motion
 ROWS = 4  # of extrapolation: midpoint rules of 2, 4, 6 and 8 steps
 LEAST = 1e-12  # of the first amplitude: where a motion that never stops is left
+BORNE = 40.0  # pre-sliding displacements after which a contact bears all it can, to rounding
+FINEST = 1e-7  # of the first amplitude: a shorter pre-sliding displacement is not resolved, or rounding would stop it
+YIELDING = 0.5  # of one: greatest step at a turning point; 1 leaves 1e-6 of the amplitude, this 1e-9
 
 
 @dataclass(frozen=True)
@@ -69,6 +73,17 @@ class Motion:
     def free(self) -> tuple[str, ...]:
         """Every free parameter."""
         return (*ALWAYS, *self.terms)
+
+    @property
+    def stops(self) -> bool:
+        """Whether it comes to rest at a turning point, after a whole number of half cycles."""
+        return "dry_displacement" in self.terms and "presliding" not in self.terms
+
+    def contains(self, other: Motion) -> bool:
+        """Whether it is the other where its further terms are none; one that never stops is none that does."""
+        return (
+            set(other.terms) < set(self.terms) and other.sticks_early <= self.sticks_early and other.stops <= self.stops
+        )
 
     @property
     def size(self) -> int:
@@ -109,6 +124,11 @@ MOTIONS = {
             ("damping_ratio", "dry_displacement", "curvature"),
             "viscous damping and dry friction, spring that is not straight",
         ),
+        Motion(
+            "elastic contact",
+            ("damping_ratio", "dry_displacement", "presliding", "relaxation"),
+            "viscous damping and dry friction of a contact that yields before it slides",
+        ),
     )
 }
 
@@ -136,14 +156,17 @@ def free_decay(
     micro-slip: its branch is Masing's, of the backbone ``-kappa x^(1 + p)`` (Segalman 2005), so the energy that it
     takes per cycle goes with the amplitude to the power 2 + p, and with it the natural frequency falls.
 
+    With a pre-sliding displacement l the contact yields before it slides, with the stiffness ``k x_k / l`` (Dahl), and
+    bears ``tau`` times the rate of that beside (LuGre); it never holds, and what is left rings on it.
+
     Parameters
     ----------
     times : array_like, shape (n,)
         Instants [s], rising.
-    parameters : array_like, shape (12,) or (13,)
+    parameters : array_like, shape (12,) to (15,)
         In the order of ``PARAMETERS``: w [rad/s], zeta, x_k, rest position, first amplitude from there (signed),
         release [s], q [1/length], sigma, v_s, kappa [length^-p], p, g [1/length^2]; eta, by which x_k grows over a way
-        of the first amplitude, 0 where left out.
+        of the first amplitude; l [length], tau [s]; 0 where left out.
     free : tuple of str
         Parameters whose sensitivities are wanted.
     restoring : {"linear", "pendulum"}
@@ -173,7 +196,7 @@ def free_decay(
         apart = np.asarray(spread, dtype=float)
         instants = np.stack([instants - apart, instants + apart], axis=1).ravel()
     active = np.array([PARAMETERS.index(name) for name in free], dtype=np.int64)
-    work = np.empty((14, 2 + 2 * len(active)))
+    work = np.empty((15, 2 + 2 * len(active)))
     x, jacobian = np.empty(len(instants)), np.empty((len(instants), len(active)))
     most = -1 if half_cycles is None else half_cycles
     values = np.zeros(WIDTH)
@@ -185,12 +208,12 @@ def free_decay(
 
 
 @compiled(**OPTIONS)
-def _rates(state, p, active, sine, branch, worn, out):
+def _rates(state, p, active, sine, branch, worn, bent, out):
     """Rates of ``state = (u, u', du/dp_j, du'/dp_j, ...)``; `branch` holds A, h and their sensitivities, `worn` the
-    way slid before A and its.
+    way slid before A and its, `bent` what a contact that yields bears at A and its.
 
-    With k = `active.size` parameters, state, branch and `out` are (2 + 2 k,), worn (1 + k,), `p` (WIDTH,), in s and
-    the record's unit of length.
+    With k = `active.size` parameters, state, branch and `out` are (2 + 2 k,), worn and bent (1 + k,) or longer, `p`
+    (WIDTH,), in s and the record's unit of length.
     """
     w, u, y = p[FREQUENCY], state[0], -state[1]
     square = w * w
@@ -213,6 +236,16 @@ def _rates(state, p, active, sine, branch, worn, out):
     # Slopes of u'' by u and by y; y = -u', so that the second counts with the other sign below.
     by_u = -square * ((math.cos(u) if sine else 1.0) + 3 * p[CURVATURE] * u * u - slope + fresh * grown)
     by_y = -square * fade + 2 * p[DAMPING] * w + 2 * p[QUADRATIC] * y
+    # yielding: what the contact does not bear yet goes with exp(-way / l), less what its damping bears
+    length, way = p[PRESLIDING], branch[0] - u
+    lacking, yields, unborne, stiffness = p[DRY] - bent[0], 0.0, 0.0, 0.0
+    if 0 < length and way < BORNE * length:
+        yields = math.exp(-way / length)
+        unborne = yields * (1 - p[RELAXATION] * y / length)
+        dry -= lacking * unborne
+        stiffness = lacking * unborne / length
+        by_u -= square * stiffness
+        by_y += square * lacking * yields * p[RELAXATION] / length
     out[0] = state[1]
     out[1] = square * (dry - spring) + 2 * p[DAMPING] * w * y + p[QUADRATIC] * y * y
     # Sensitivities: by the parameter itself, then by A, h and the way slid, which the turns before have moved.
@@ -224,7 +257,7 @@ def _rates(state, p, active, sine, branch, worn, out):
         elif name == DAMPING:
             direct = 2 * w * y
         elif name == DRY:
-            direct = square * level * (1 + p[RISE] * decay)
+            direct = square * (level * (1 + p[RISE] * decay) - unborne)
         elif name == QUADRATIC:
             direct = y * y
         elif name == RISE:
@@ -241,8 +274,14 @@ def _rates(state, p, active, sine, branch, worn, out):
             direct = square * fresh * slid / first if level > 0 else 0.0
         elif name == AMPLITUDE and grown != 0:
             direct = -square * fresh * grown * slid / p[AMPLITUDE]
+        elif name == PRESLIDING and yields > 0:
+            direct = -square * lacking * (unborne * way + yields * p[RELAXATION] * y) / length**2
+        elif name == RELAXATION and yields > 0:
+            direct = square * lacking * yields * y / length
         if grown != 0:
             direct += square * fresh * grown * (worn[1 + j] + branch[2 + 2 * j])
+        if yields > 0:
+            direct += square * (unborne * bent[1 + j] + stiffness * branch[2 + 2 * j])
         du, dv = state[2 + 2 * j], state[3 + 2 * j]
         out[2 + 2 * j] = dv
         out[3 + 2 * j] = (
@@ -253,7 +292,7 @@ def _rates(state, p, active, sine, branch, worn, out):
 @compiled(**OPTIONS)
 def _advance(state, length, p, active, sine, branch, rates, work, out):
     """One step of Gragg's rule of `length` [s], extrapolated; `rates` holds the rates at its beginning, `work` is
-    (14, 2 + 2 k) as :func:`decay` parts it."""
+    (15, 2 + 2 k) as :func:`decay` parts it."""
     size = 2 + 2 * active.size
     rows = ROWS
     old, now, slopes = work[rows], work[rows + 1], work[rows + 2]
@@ -266,7 +305,7 @@ def _advance(state, length, p, active, sine, branch, rates, work, out):
             old[i] = state[i]
             now[i] = state[i] + short * rates[i]
         for _ in range(1, count):
-            _rates(now, p, active, sine, branch, work[13], slopes)
+            _rates(now, p, active, sine, branch, work[13], work[14], slopes)
             for i in range(size):
                 next_ = old[i] + 2 * short * slopes[i]
                 old[i] = now[i]
@@ -320,7 +359,7 @@ def _rest(sample, p, active, side, branch, x, jacobian):
 
 
 @compiled(**OPTIONS)
-def _first_branch(p, active, side, branch, worn, moved):
+def _first_branch(p, active, side, branch, worn, bent, moved):
     """The branch from the first turning point, on the virgin backbone, and how its beginning `moved` (k,) by each
     parameter [s a unit]; the other arrays as in :func:`_rates`."""
     amplitude = abs(p[AMPLITUDE])
@@ -328,11 +367,13 @@ def _first_branch(p, active, side, branch, worn, moved):
     power = math.exp((1 + p[EXPONENT]) * log) if amplitude > 0 else 0.0
     # virgin backbone x - kappa x^(1 + p): h = -kappa A^(1 + p)
     branch[0], branch[1], worn[0] = amplitude, -p[SLIP] * power, 0.0
+    bent[0] = -p[DRY]  # it was pulled there, against all that the contact bears
     for j in range(active.size):
         name = active[j]
         # A = side * amplitude, h by amplitude, kappa and p; nothing was slid before
         branch[2 + 2 * j] = side if name == AMPLITUDE else 0.0
         branch[3 + 2 * j] = worn[1 + j] = 0.0
+        bent[1 + j] = -1.0 if name == DRY else 0.0
         if name == SLIP:
             branch[3 + 2 * j] = -power
         elif name == EXPONENT:
@@ -343,14 +384,16 @@ def _first_branch(p, active, side, branch, worn, moved):
 
 
 @compiled(**OPTIONS)
-def _next_branch(p, active, branch, worn, state, rates, moved):
+def _next_branch(p, active, branch, worn, bent, state, rates, moved):
     """The branch from the turning point that was reached, and how its beginning moves; arrays as in
     :func:`_first_branch`."""
     depth = 0.5 * (branch[0] - state[0])
     log = math.log(depth) if depth > 0 else 0.0
     power = math.exp((1 + p[EXPONENT]) * log) if depth > 0 else 0.0
     slope = p[SLIP] * (1 + p[EXPONENT]) * power / depth if depth > 0 else 0.0
-    # Sensitivities first: they need A and h of the branch before.
+    way, length, lacking = branch[0] - state[0], p[PRESLIDING], p[DRY] - bent[0]
+    yields = math.exp(-way / length) if 0 < length and way < BORNE * length else 0.0
+    # Sensitivities first: they need A, h and b of the branch before.
     for j in range(active.size):
         # u' = 0 at the turn: it comes later by -(du'/dp) / u''; A itself does not change by that, being an extreme
         if rates[1] > 0:
@@ -361,11 +404,20 @@ def _next_branch(p, active, branch, worn, state, rates, moved):
         elif active[j] == EXPONENT:
             change += 2 * p[SLIP] * power * log
         branch[3 + 2 * j] = -branch[3 + 2 * j] - change
-        worn[1 + j] += branch[2 + 2 * j] - state[2 + 2 * j]
+        further = branch[2 + 2 * j] - state[2 + 2 * j]
+        worn[1 + j] += further
+        # b changes its sign with the direction: -(x_k - (x_k - b) exp(-way / l))
+        bent[1 + j] *= -yields
+        if active[j] == DRY:
+            bent[1 + j] -= 1 - yields
+        if yields > 0:
+            stretch = way / length if active[j] == PRESLIDING else 0.0
+            bent[1 + j] -= lacking * yields * (further - stretch) / length
         branch[2 + 2 * j] = -state[2 + 2 * j]
     # u changes its sign with the direction, and so does h, less what this branch took
     branch[1] = -branch[1] - 2 * p[SLIP] * power
-    worn[0] += branch[0] - state[0]
+    worn[0] += way
+    bent[0] = lacking * yields - p[DRY]
     branch[0] = -state[0]
 
 
@@ -376,8 +428,16 @@ def _step(p, active, sine, work):
     length = STEP / p[FREQUENCY]
     if p[SPEED] > 0:
         length = min(length, 0.3 * (p[SPEED] + 0.3 * abs(state[1])) / abs(rates[1]))
+    way, presliding = branch[0] - state[0], p[PRESLIDING]
+    if 0 < presliding and way < BORNE * presliding:
+        presliding = max(presliding, FINEST * abs(p[AMPLITUDE]))
+        # yielding: the contact's own oscillation, and its exponential; longer as less is lacking
+        length = min(length, STEP / (p[FREQUENCY] * math.sqrt(1 + (p[DRY] - work[14, 0]) / presliding)))
+        reach = YIELDING * (presliding + 0.3 * way)
+        speed = abs(state[1])
+        length = min(length, 2 * reach / (speed + math.sqrt(speed * speed + 2 * abs(rates[1]) * reach)))
     _advance(state, length, p, active, sine, branch, rates, work, end)
-    _rates(end, p, active, sine, branch, work[13], end_rates)
+    _rates(end, p, active, sine, branch, work[13], work[14], end_rates)
     if end[1] < 0:
         return length, False
     share = state[1] / (state[1] - end[1])
@@ -388,12 +448,12 @@ def _step(p, active, sine, work):
     length *= share
     for _ in range(2):  # on the motion itself
         _advance(state, length, p, active, sine, branch, rates, work, end)
-        _rates(end, p, active, sine, branch, work[13], end_rates)
+        _rates(end, p, active, sine, branch, work[13], work[14], end_rates)
         if end_rates[1] > 0:
             length -= end[1] / end_rates[1]
     _advance(state, length, p, active, sine, branch, rates, work, end)
     end[1] = 0.0
-    _rates(end, p, active, sine, branch, work[13], end_rates)
+    _rates(end, p, active, sine, branch, work[13], work[14], end_rates)
     return length, True
 
 
@@ -409,9 +469,11 @@ def _read(sample, share, length, p, active, side, work, x, jacobian):
 
 
 @compiled(**OPTIONS)
-def _leaves(p, sine, most, branch, way):
+def _leaves(p, sine, most, branch, bent, way):
     """Whether the mass leaves its turning point."""
     pull = _turning_spring(branch, p, sine)
+    if p[PRESLIDING] > 0:  # a contact that yields holds nothing
+        return pull - bent > LEAST * abs(p[AMPLITUDE])
     level = 1 + p[WEAR] * way / abs(p[AMPLITUDE]) if p[WEAR] != 0 else 1.0
     if most < 0 and (abs(pull) <= p[DRY] * (1 + p[RISE]) * level or branch[0] < LEAST * abs(p[AMPLITUDE])):
         return False
@@ -422,25 +484,25 @@ def _leaves(p, sine, most, branch, way):
 def decay(times, p, active, sine, most, work, x, jacobian):
     """Fill `x` (n,) and `jacobian` (n, active.size) at rising `times`; return the number of half cycles begun.
 
-    `most` half cycles at the most, -1 for as many as the dry friction lets it make; `work` is (14, 2 + 2 active), `p`
+    `most` half cycles at the most, -1 for as many as the dry friction lets it make; `work` is (15, 2 + 2 active), `p`
     (WIDTH,), times in s.
     """
     count, size = times.size, 2 + 2 * active.size
     branch, state, rates, end, end_rates, moved = work[7], work[8], work[9], work[10], work[11], work[12]
-    worn = work[13]
+    worn, bent = work[13], work[14]
     side = 1.0 if p[AMPLITUDE] >= 0 else -1.0
     start, sample, half_cycles = p[RELEASE], 0, 0
-    _first_branch(p, active, side, branch, worn, moved)
+    _first_branch(p, active, side, branch, worn, bent, moved)
     # Hold: until the release.
     while sample < count and times[sample] <= start:
         _rest(sample, p, active, side, branch, x, jacobian)
         sample += 1
     # Half cycle: from a turning point that the mass leaves, step by step onto the next.
-    while sample < count and half_cycles != most and _leaves(p, sine, most, branch, worn[0]):
+    while sample < count and half_cycles != most and _leaves(p, sine, most, branch, bent[0], worn[0]):
         half_cycles += 1
         for i in range(size):
             state[i] = branch[i] if i % 2 == 0 else 0.0
-        _rates(state, p, active, sine, branch, worn, rates)
+        _rates(state, p, active, sine, branch, worn, bent, rates)
         if rates[1] >= 0:
             break
         turned = False
@@ -456,7 +518,7 @@ def decay(times, p, active, sine, most, work, x, jacobian):
         if not turned:
             break
         side = -side
-        _next_branch(p, active, branch, worn, state, rates, moved)
+        _next_branch(p, active, branch, worn, bent, state, rates, moved)
     while sample < count:  # at rest
         _rest(sample, p, active, side, branch, x, jacobian)
         sample += 1

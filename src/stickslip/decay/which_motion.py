@@ -10,7 +10,7 @@ from types import MappingProxyType
 import numpy as np
 
 from stickslip.arrays import Array
-from stickslip.decay.candidates import ALWAYS, Fitted
+from stickslip.decay.candidates import ALWAYS, Fitted, rigid
 from stickslip.decay.choice import Candidate, Choice, choose, choose_fitted, interval_of, kept_by_all, lack_of_fit
 from stickslip.decay.motions import MOTIONS, RESTORING, Restoring, free_decay
 from stickslip.decay.release import CLIPPED, LOST, RingDown, find_releases
@@ -34,6 +34,8 @@ TERMS = {
     "micro_slip": ("micro-slip at the first amplitude", "1"),
     "exponent": ("exponent of micro-slip", "1"),
     "curvature": ("curvature of the spring", "1/{}^2"),
+    "presliding": ("pre-sliding displacement", "{}"),
+    "relaxation": ("contact damping over contact stiffness", "s"),
 }  # names and units of a motion's terms, {} the displacement's
 
 
@@ -295,10 +297,14 @@ def static_between(candidate: Candidate, ring_down: RingDown) -> Estimate:
 
     Both are places of the candidate's motion, which hold where it leaves noise alone.
     """
-    fitted = candidate.fitted
+    fitted, turns = candidate.fitted, candidate.fitted.half_cycles
     error = SURE * candidate.level / math.sqrt(max(1.0, ring_down.fs / ring_down.frequency / 2))
-    low = max(_pull(fitted, fitted.half_cycles) - error, 0.0) if ring_down.stopped else 0.0
-    high = _pull(fitted, fitted.half_cycles - 1) + error
+    if not fitted.motion.stops and fitted.value("presliding") > 0:  # it rings where a rigid contact would stay
+        error += fitted.value("presliding")
+        fitted = replace(fitted, parameters=rigid(fitted.parameters))
+        turns = fitted.blocks.motion(fitted.parameters)[2]
+    low = max(_pull(fitted, turns) - error, 0.0) if ring_down.stopped else 0.0
+    high = _pull(fitted, turns - 1) + error
     status = "" if ring_down.stopped else NO_REST
     return static_in(low, high, ring_down.unit, Status(status, lack_of_fit(candidate)))
 

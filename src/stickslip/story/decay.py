@@ -227,6 +227,8 @@ def _dying(decay: Decay) -> str:
         terms = [term for term in decay.motion.terms if rubs or term.name != dry.name]
         told = f"by {forces}: {listed([_with_interval(term) for term in terms])}."
         hidden = "" if len(terms) == len(decay.motion.terms) else f" {_hidden(dry, 'dry friction')}"
+        if not decay.motion.choice.chosen.kept:
+            return f"Nearest comes dying away {told[:-1]}; but more than noise is left over.{hidden}"
         return f"The motion dies away {'as it would ' if hidden else ''}{told}{hidden}"
     if decay.undecided:
         ratio, dry = decay.whichever
@@ -237,8 +239,11 @@ def _dying(decay: Decay) -> str:
     if decay.denied and decay.whichever:
         ratio, dry = decay.whichever
         reach = f"the damping ratio is {_reach(ratio)} and the dry friction displacement {_reach(dry)}"
-        tried = len(decay.motion.candidates) if decay.motion is not None else 0
-        which = f"Whichever of {tried} motions it was" if tried else "Whichever motion it was"
+        candidates = decay.motion.choice.candidates if decay.motion is not None else ()
+        kept = [candidate.fitted.motion.words for candidate in candidates if candidate.kept]
+        if len(kept) == 1:
+            return f"Nearest comes {kept[0]}, though more than noise is left over: by that {reach}."
+        which = f"Whichever of {len(candidates)} motions it was" if candidates else "Whichever motion it was"
         return f"{which}, {reach}: read as viscous and dry friction, which the record speaks against."
     if decay.denied or curved:
         return f"Read as viscous and dry friction, which the record speaks against, it shows {shown}."
@@ -326,7 +331,8 @@ def _both(ratio: Estimate, dry: Estimate) -> str:
 
 
 def _with_interval(estimate: Estimate) -> str:
-    return f"a {estimate.name} of {value_of(estimate)} (95 %: {interval_of(estimate)})"
+    article = "an" if estimate.name[0] in "aeiou" else "a"
+    return f"{article} {estimate.name} of {value_of(estimate)} (95 %: {interval_of(estimate)})"
 
 
 def _hidden(estimate: Estimate, kind: str) -> str:
