@@ -230,6 +230,22 @@ def test_a_clock_that_runs_unevenly_is_told_by_what_the_waveform_leaves():
         ss.analyze_decay(ss.Record.of({"x": noisy}, fs=fs), method="waveform")
 
 
+def test_a_chain_of_sliders_is_no_viscous_friction():
+    """Viscous and dry friction leave 14 %, and the extremes told a damping ratio of 0.017, sure, for 0.003."""
+    yields = np.linspace(0.045, 0.55, 12)
+    law = ss.laws.ElastoSlip(stiffnesses=(0.08 / 12,) * 12, forces=tuple(0.08 / 12 * yields))
+    start = {"x": 1.0, **{f"anchor{number}": 1.0 - bent for number, bent in enumerate(yields)}}
+    x = ss.simulate(ss.Oscillator(mass=1.0, stiffness=1.0, damping=0.006, law=law), duration=150.0, start=start)
+    noisy = x.record(fs=20.0)["x"]
+    noisy = noisy + 3e-4 * np.random.default_rng(3).standard_normal(len(noisy))
+    findings = ss.analyze_decay(ss.Record.of({"x": noisy}, fs=20.0), method="waveform")
+    assert findings.decay.best is findings.decay.motion
+    assert findings.decay.motion.model == "micro-slip"
+    assert findings.decay.best.damping_ratio.interval[1] < 0.006
+    assert findings.decay.best.damping_ratio.status != "ok"
+    assert " ".join(ss.summary(findings).headline).startswith("Nearest comes")
+
+
 def test_the_pendulum_has_a_page(swings, tmp_path):
     findings = ss.analyze_decay(swings, stiffness=0.2235 * 9.82 * 0.31692)
     assert findings.decay.dry_force.unit == "N m"

@@ -29,7 +29,7 @@ from stickslip.units import parse_constant
 
 EXTREMES = "extremes alone"
 LOST = 0.1  # of the motion: a fit that leaves more of it does not follow it
-NEARER = 8.0  # times less left than by viscous and dry friction: an Iwan chain left 14, two clocks that can not be trusted 3 and 4
+NEARER = 8.0  # times less left than by viscous and dry friction: an Iwan chain left 14, two unsound clocks 3 and 4
 CLEAR = 1e-3  # p-value below which a motion's rejection is no chance of one true motion in twenty
 CHANCE = 0.01  # of a record without dry friction to be told to have some
 ONE_IN_100 = 2.33 / 1.96  # by which the lower end of 95 % lies farther off where one in a hundred lies beyond it

@@ -10,9 +10,10 @@ from rest counted positive at the half cycle's beginning, ``A`` its value there 
 
 s the way slid since the release and a the first amplitude: friction that changes as it wears. The term in kappa is a
 Masing branch of the backbone ``x - kappa x^(1 + p)`` (a joint in micro-slip, Segalman 2005); ``h`` is what the branches
-before have left. That in l is a contact that yields before it slides (Dahl 1968; with tau LuGre's, Canudas de Wit 1995):
-its friction bears ``b`` at the turning point, against the motion that begins there, and x_k some l later. Gragg's extrapolated midpoint rule (order eight) carries state and sensitivities; the turning point is
-found to rounding; samples lie on quintics through position, speed and acceleration.
+before have left. That in l is a contact that yields before it slides (Dahl 1968; with tau LuGre's, Canudas de Wit
+1995): its friction bears ``b`` at the turning point, against the motion that begins there, and x_k some l later.
+Gragg's extrapolated midpoint rule (order eight) carries state and sensitivities; the turning point is found to
+rounding; samples lie on quintics through position, speed and acceleration.
 """
 
 from __future__ import annotations
@@ -239,7 +240,7 @@ def _rates(state, p, active, sine, branch, worn, bent, out):
     # yielding: what the contact does not bear yet goes with exp(-way / l), less what its damping bears
     length, way = p[PRESLIDING], branch[0] - u
     lacking, yields, unborne, stiffness = p[DRY] - bent[0], 0.0, 0.0, 0.0
-    if 0 < length and way < BORNE * length:
+    if length > 0 and way < BORNE * length:
         yields = math.exp(-way / length)
         unborne = yields * (1 - p[RELAXATION] * y / length)
         dry -= lacking * unborne
@@ -392,7 +393,7 @@ def _next_branch(p, active, branch, worn, bent, state, rates, moved):
     power = math.exp((1 + p[EXPONENT]) * log) if depth > 0 else 0.0
     slope = p[SLIP] * (1 + p[EXPONENT]) * power / depth if depth > 0 else 0.0
     way, length, lacking = branch[0] - state[0], p[PRESLIDING], p[DRY] - bent[0]
-    yields = math.exp(-way / length) if 0 < length and way < BORNE * length else 0.0
+    yields = math.exp(-way / length) if length > 0 and way < BORNE * length else 0.0
     # Sensitivities first: they need A, h and b of the branch before.
     for j in range(active.size):
         # u' = 0 at the turn: it comes later by -(du'/dp) / u''; A itself does not change by that, being an extreme
@@ -429,7 +430,7 @@ def _step(p, active, sine, work):
     if p[SPEED] > 0:
         length = min(length, 0.3 * (p[SPEED] + 0.3 * abs(state[1])) / abs(rates[1]))
     way, presliding = branch[0] - state[0], p[PRESLIDING]
-    if 0 < presliding and way < BORNE * presliding:
+    if presliding > 0 and way < BORNE * presliding:
         presliding = max(presliding, FINEST * abs(p[AMPLITUDE]))
         # yielding: the contact's own oscillation, and its exponential; longer as less is lacking
         length = min(length, STEP / (p[FREQUENCY] * math.sqrt(1 + (p[DRY] - work[14, 0]) / presliding)))

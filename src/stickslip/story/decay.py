@@ -310,7 +310,7 @@ def _chosen(decay: Decay) -> Iterator[str]:
     dry = decay.whichever[1]
     force = decay.as_force(dry, "")
     also = f", its {'torque' if force.unit == 'N m' else 'force'} {_reach(force)}" if force is not None else ""
-    if decay.denied:
+    if decay.denied or dry.interval == (0.0, 0.0):
         return
     which = "Whichever of them it is" if kept else "By all that leave at most twice the least residual"
     yield f"{which}, the dry friction displacement is {_reach(dry)}{also}."
