@@ -37,6 +37,7 @@ from stickslip.story.story import (
 
 MOSTLY = 0.5  # of the time: a bound above it tells nothing
 RARELY = 0.005  # of the time
+LIKELY = 3.0  # times the difference: wider intervals of the two directions tell nothing of it
 SAME = 0.05  # forward and back differ noticeably beyond this part of the level
 LOOSE = 3.0  # times the sliding friction: a bound on the static one that is wider tells nothing worth a claim
 ALIKE = 0.02  # a static friction that differs from the sliding one by less is about as large
@@ -183,11 +184,18 @@ def _of_directions(forward: Estimate | None, back: Estimate | None, what: str = 
         return
     apart = abs(forward.value - back.value)
     (low, high), (least, most) = forward.interval, back.interval
-    if apart > SAME * abs(forward.value + back.value) / 2 and (low > most or least > high):
+    if apart <= SAME * abs(forward.value + back.value) / 2:
+        return
+    if low > most or least > high:
         alike = "" if what else "; a zero offset of a sensor or a sloping rig looks the same"
         yield (
             f"The two directions differ{what and ' ' + what}: {value_of(forward)} forward and {value_of(back)} "
             f"back{alike}."
+        )
+    elif not what and max(high - low, most - least) < apart * LIKELY:  # the offset itself is told
+        yield (
+            "Friction unlike in its directions and a zero of a sensor that is off look the same: forward and back hold "
+            "where it is one of them, not where one hides the other."
         )
 
 
