@@ -179,6 +179,21 @@ def test_python_along_a_motion_is_the_friction_of_the_exact_solver(name: str) ->
     assert np.sqrt(np.mean((values - wanted) ** 2)) < 0.01 * np.abs(wanted).max()
 
 
+@pytest.mark.parametrize("name", ["Dahl", "LuGre"])
+def test_python_of_a_stiff_contact_holds_at_the_rate_of_a_record(name: str) -> None:
+    """By Euler's rule the friction grew to 1e145 N, without a word, over a record of 2 kHz."""
+    t = np.arange(2000) / 2000
+    x, v = 2e-3 * np.sin(10 * np.pi * t), 2e-3 * 10 * np.pi * np.cos(10 * np.pi * t)
+    contact = run_as_it_stands(name)["Friction"](x[0], v[0])
+    values = np.array([contact.step(place, speed, 1 / 2000) for place, speed in zip(x, v, strict=True)])
+    fine = run_as_it_stands(name)["Friction"](x[0], v[0])
+    t = np.arange(200_000) / 200_000
+    x, v = 2e-3 * np.sin(10 * np.pi * t), 2e-3 * 10 * np.pi * np.cos(10 * np.pi * t)
+    wanted = np.array([fine.step(place, speed, 5e-6) for place, speed in zip(x, v, strict=True)])
+    assert np.abs(values).max() < 1.05 * np.abs(wanted).max()
+    assert np.sqrt(np.mean((values - wanted[::100]) ** 2)) < 0.1 * np.abs(wanted).max()
+
+
 def built(law: object, folder: Path, *more: str, main: str = "") -> Path:
     if CC is None:
         pytest.skip("no C compiler on this machine (cc, gcc or clang)")

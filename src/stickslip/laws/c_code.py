@@ -73,8 +73,18 @@ BASES = {  # exponents of SI's base units
 }  # fmt: skip
 UNITS = [f"    <Unit name='{name}'><BaseUnit {powers}/></Unit>" for name, powers in BASES.items()]
 GO_ON = """\
+        # exponential Euler: it holds however fast the memory fades, and is exact where its rate is linear in it
+        ended = {}
         for name, rate in self.rates(x, v, OTHERS).items():
-            setattr(self, name, getattr(self, name) + dt * rate)
+            now = getattr(self, name)
+            little = 1e-6 * max(abs(now), abs(dt * rate))
+            setattr(self, name, now + little)
+            fading = dt * (self.rates(x, v, OTHERS)[name] - rate) / little if little else 0.0
+            setattr(self, name, now)
+            share = (exp(min(fading, 1.0)) - 1) / fading if abs(fading) > 1e-6 else 1.0
+            ended[name] = now + dt * rate * share
+        for name, now in ended.items():
+            setattr(self, name, now)
 """
 
 
