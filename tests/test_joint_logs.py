@@ -79,6 +79,10 @@ def test_logs_of_several_payloads_are_said_to_be_unlike() -> None:
         comparison = ss.answers.compare_joints([ss.answers.analyze_joint(one) for one in logs])
         said = " ".join(ss.summary(comparison).headline)
         assert ("inertia and gravity differ" in said) == unlike
+        assert comparison.unlike == (("inertia", "gravity") if unlike else ())
+        assert (comparison.together.inertia is None) == unlike
+        for name in ("forward", "back", "viscous", "load"):
+            assert getattr(comparison.together, name).value == pytest.approx(TRUTH[name], rel=0.05)
         assert "e+0" not in said
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
@@ -14,7 +15,8 @@ from stickslip.answers.arm import axis_record
 from stickslip.answers.findings import Comparison, Findings, Inquiry, flagged, record_name, require_several, with_doubt
 from stickslip.answers.mistakes import require_torque
 from stickslip.cycle.joint import JointFriction, regress_joint
-from stickslip.cycle.joint_logs import joint_backlash, joint_breakaway, regress_joint_logs
+from stickslip.cycle.joint_fit import SURELY
+from stickslip.cycle.joint_logs import JointLogs, joint_backlash, joint_breakaway, regress_joint_logs
 from stickslip.cycle.static_peak import static_coefficient
 from stickslip.cycle.sticks import find_sticks
 from stickslip.cycle.tribometer import DEFINITIONS, friction_coefficients
@@ -26,8 +28,10 @@ from stickslip.record.record import Record, Step, require_record
 from stickslip.rig.settings import RigSettings
 from stickslip.signals.derivatives import differentiate
 from stickslip.signals.interpolate import without_delays
-from stickslip.statistics import mean_of_cycles
+from stickslip.statistics import mean_of_cycles, weighted_mean
 
+PAYLOAD = {"inertia": "inertia", "sine": "gravity", "cosine": "gravity"}  # what goes with what a joint carries
+SHARED = ("forward", "back", "viscous", "load", "damping", "warming", "thinning", "delay")
 # A joint has no twins: swept through its turns without a rest it was told to stand still 1.0 to 2.3 % of the time.
 TURNS = Doubt("a joint that never rests may seem to stand still as well where it turns", UNTRIED)
 
@@ -170,7 +174,9 @@ def compare_joints(
     Returns
     -------
     Comparison
-        Its results: ``together``, a :class:`~stickslip.cycle.JointLogs`, and each of its numbers by name.
+        Its results: ``together``, a :class:`~stickslip.cycle.JointLogs`, and each of its numbers by name; ``unlike``,
+        which of inertia and gravity differ surely, as of several payloads: the friction is then the mean of what each
+        log tells, and inertia and gravity are each log's own.
 
     Raises
     ------
@@ -193,8 +199,33 @@ def compare_joints(
     """
     require_several(findings)
     together = regress_joint_logs([one.record for one in findings], gravity=gravity, **constants)
+    unlike = _unlike_payloads([one.joint for one in findings])
+    if unlike:
+        together = _payloads_apart(together, [one.joint for one in findings])
     numbers = {name: value for name, value in vars(together).items() if isinstance(value, Estimate)}
-    return Comparison(tuple(findings), results={**numbers, "together": together})
+    return Comparison(tuple(findings), results={**numbers, "together": together, "unlike": unlike})
+
+
+def _unlike_payloads(joints: Sequence[JointFriction]) -> tuple[str, ...]:
+    """Of inertia and gravity, what logs tell surely otherwise than others do, each by itself."""
+    unlike = []
+    for name, what in PAYLOAD.items():
+        told = [estimate for estimate in (getattr(joint, name) for joint in joints) if estimate is not None]
+        pairs = itertools.combinations(told, 2)
+        if any(abs(one.value - other.value) > SURELY * math.hypot(one.sd, other.sd) for one, other in pairs):
+            unlike.append(what)
+    return tuple(dict.fromkeys(unlike))
+
+
+def _payloads_apart(together: JointLogs, joints: Sequence[JointFriction]) -> JointLogs:
+    """The friction that logs of unlike payloads share: the mean of what each tells, its doubtful ones left out."""
+    shared: dict[str, Any] = dict.fromkeys(PAYLOAD)
+    for name in SHARED:
+        told = [estimate for estimate in (getattr(joint, name) for joint in joints) if estimate is not None]
+        sure = [estimate for estimate in told if stands(estimate.status)]
+        status = "ok" if sure or not told else told[0].status
+        shared[name] = weighted_mean(sure or told, of="logs", status=status) if told else None
+    return replace(together, **shared, left_out=())
 
 
 def episodes(record: Record) -> Iterator[Record]:

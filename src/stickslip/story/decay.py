@@ -238,7 +238,8 @@ def _dying(decay: Decay) -> str:
         )
     if decay.denied and decay.whichever:
         ratio, dry = decay.whichever
-        reach = f"the damping ratio is {_reach(ratio)} and the dry friction displacement {_reach(dry)}"
+        rubbing = "" if dry.interval == (0.0, 0.0) else f" and the dry friction displacement {_reach(dry)}"
+        reach = f"the damping ratio is {_reach(ratio)}{rubbing}"
         candidates = decay.motion.choice.candidates if decay.motion is not None else ()
         kept = [candidate.fitted.motion.words for candidate in candidates if candidate.kept]
         if len(kept) == 1:

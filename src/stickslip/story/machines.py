@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
-import math
 from collections.abc import Iterator, Sequence
 from functools import partial
 from pathlib import Path
@@ -84,8 +82,12 @@ def _of_one_test(findings: Findings) -> Iterator[str]:
     if any(abs(one.value - plateau.value) > APART * plateau.value for one in others if one.known):
         rest = ", ".join(f"{value_of(one)} {one.name.rpartition(', ')[2]}" for one in others if one.known)
         yield f"By other definitions it is {rest}: say which when you quote it."
-    if findings.static is not None:
-        yield f"The static coefficient is {value_of(findings.static)} (95 %: {interval_of(findings.static)})."
+    static = findings.static
+    if static is not None and plateau.known and static.interval[0] <= plateau.interval[1]:
+        most = value_of(static, static.interval[1])
+        yield f"No static coefficient above the kinetic one is told: it would be at most {most} (95 %)."
+    elif static is not None:
+        yield f"The static coefficient is {value_of(static)} (95 %: {interval_of(static)})."
     wear = tribometer.wear_in
     if wear is not None:
         change, way = wear.change, "above" if wear.change.value > 0 else "below"
@@ -131,6 +133,35 @@ def of_joint(findings: Findings) -> Story:
 def of_joints(comparison: Comparison) -> Story:
     """Several logs of one joint."""
     logs = list(zip(comparison.findings, comparison.together.predictions, strict=True))
+    data = [{"name": log.name, "error": one.error, "plain": one.plain} for log, one in logs]
+    return Story(
+        f"{len(logs)} logs of a joint",
+        list(_together(comparison)),
+        list(map(Caution, _untold(comparison.together, "These logs do"))),
+        tables=[_payloads(comparison) if comparison.unlike else _predicted(comparison)],
+        draw=lambda: plates_together(logs),
+        data=lambda: {"predictions": data},
+    )
+
+
+def _payloads(comparison: Comparison) -> Table:
+    """What logs of unlike payloads tell, each by itself."""
+    joints = [(log.name, log.joint) for log in comparison.findings]
+    rows = [
+        (name, *("" if one is None else f"{value_of(one)} ({interval_of(one)})" for one in _carried(joint)))
+        for name, joint in joints
+    ]
+    return Table(
+        "Each log by itself", ("log", "sliding friction", "inertia", "gravity, sine part", "cosine part"), rows
+    )
+
+
+def _carried(joint: JointFriction) -> tuple[Estimate | None, ...]:
+    return joint.level, joint.inertia, joint.sine, joint.cosine
+
+
+def _predicted(comparison: Comparison) -> Table:
+    """How far each log is predicted by the others."""
     rows = [
         (
             log.name,
@@ -139,44 +170,22 @@ def of_joints(comparison: Comparison) -> Story:
             f"{100 * one.error:.2f} %",
             f"{100 * one.plain:.2f} %",
         )
-        for log, one in logs
+        for log, one in zip(comparison.findings, comparison.together.predictions, strict=True)
     ]
-    table = Table(
+    return Table(
         "Each log by the others",
         ("log", "sliding friction", "95 %", "missed", "by a plain law"),
         rows,
         "Missed: what the others do not predict of the torque while it slides, over how far the torque varies (norms). "
         "The plain law is Coulomb and viscous friction, alike both ways, beside inertia and gravity.",
     )
-    data = [{"name": log.name, "error": one.error, "plain": one.plain} for log, one in logs]
-    return Story(
-        f"{len(logs)} logs of a joint",
-        list(_together(comparison)),
-        [] if _unlike(comparison) else list(map(Caution, _untold(comparison.together, "These logs do"))),
-        tables=[table],
-        draw=lambda: plates_together(logs),
-        data=lambda: {"predictions": data},
-    )
-
-
-def _unlike(comparison: Comparison) -> list[str]:
-    """What the logs, each by itself, tell of another payload than others."""
-    names = {"inertia": "inertia", "sine": "gravity", "cosine": "gravity"}
-    pairs = list(itertools.combinations([log.joint for log in comparison.findings], 2))
-    unlike = []
-    for name, what in names.items():
-        told = [(getattr(one, name), getattr(other, name)) for one, other in pairs]
-        known = [(one, other) for one, other in told if one is not None and other is not None]
-        if any(abs(one.value - other.value) > SURELY * math.hypot(one.sd, other.sd) for one, other in known):
-            unlike.append(what)
-    return list(dict.fromkeys(unlike))
 
 
 def _together(comparison: Comparison) -> Iterator[str]:
-    if unlike := _unlike(comparison):
+    if comparison.unlike:
         yield (
-            f"The logs' {' and '.join(unlike)} differ by more than their intervals allow, as of several payloads: what "
-            "they tell together is not to be trusted, what each tells by itself is."
+            f"The logs' {' and '.join(comparison.unlike)} differ by more than their intervals allow, as of several "
+            "payloads: each keeps its own, and the friction is the mean of what each tells."
         )
     together, logs = comparison.together, comparison.together.predictions
     parts = [f"{value_of(together.forward)} forward and {value_of(together.back)} back"]
@@ -185,6 +194,8 @@ def _together(comparison: Comparison) -> Iterator[str]:
         parts.append(f"{value_of(together.load)} of {BY_GRAVITY}")
     yield f"Together the logs tell Coulomb friction of {', '.join(parts)}."
     yield from _laws([log.joint for log in comparison.findings])
+    if comparison.unlike:
+        return
     missed, plain = (sorted(getattr(one, name) for one in logs) for name in ("error", "plain"))
     yield (
         f"The torque of each log is predicted by the others but for {_share(missed[0])} to {_share(missed[-1])} % "
