@@ -11,6 +11,7 @@ import stickslip as ss
 from stickslip.cli.program import main
 from stickslip.cycle import regress_joint, regress_joint_logs
 from stickslip.errors import RecordError
+from stickslip.estimate import kinds
 
 TRUTH = {"inertia": 0.02, "forward": 0.07, "back": 0.05, "load": 0.2, "viscous": 0.03, "sine": 0.5, "cosine": -0.2}
 
@@ -84,6 +85,21 @@ def test_logs_of_several_payloads_are_said_to_be_unlike() -> None:
         for name in ("forward", "back", "viscous", "load"):
             assert getattr(comparison.together, name).value == pytest.approx(TRUTH[name], rel=0.05)
         assert "e+0" not in said
+
+
+@pytest.mark.parametrize(("growth", "sweep"), [(0.0, False), (0.4, False), (0.5, True)])
+def test_friction_that_changes_along_a_log_is_said_or_that_it_would_be_hidden(growth: float, sweep: bool) -> None:
+    """A sweep hid a rise by half in the viscous friction, and was sure; of tones of one speed it is a mean."""
+    t = np.arange(8000) / 200
+    phase = np.pi * (0.1 * t + 0.045 * t**2)  # of 0.05 to 1.85 Hz
+    tones = np.sin(1.3 * t) + 0.4 * np.sin(4.1 * t), 1.3 * np.cos(1.3 * t) + 1.64 * np.cos(4.1 * t)
+    q, v = (np.sin(phase), np.pi * (0.1 + 0.09 * t) * np.cos(phase)) if sweep else tones
+    weight = 0.5 * np.sin(q)
+    grown = 0.06 * (1 + growth * (t / t[-1] - 0.5)) + 0.1 * np.abs(weight)
+    torque = 0.02 * np.gradient(v, t) + 0.03 * v + np.sign(v) * grown + weight
+    noise = np.random.default_rng(7).normal(0, 0.01, t.size)
+    level = regress_joint(ss.Record.of({"theta": q, "force": torque + noise}, fs=200.0, units={"force": "N m"})).level
+    assert ("ages" in kinds(level.status)) == (growth > 0)
 
 
 def test_logs_of_different_sources_are_refused() -> None:
