@@ -481,8 +481,9 @@ def _ages(data: JointData, fit: LeastSquares, terms: tuple[str, ...]) -> str:
     """
     logs = [replace(log, temperature=np.linspace(-0.5, 0.5, len(log.position)), about=0.0) for log in data.logs]
     change, sd = _beside(replace(data, logs=tuple(logs)), terms, "warming")
-    level = (coefficient(fit, terms, "forward") + coefficient(fit, terms, "back")) / 2
-    if not level > 0 or not math.isfinite(sd):
+    both = fit.combined([float(term in ("forward", "back")) / 2 for term in terms], "", "", "")
+    level = both.value
+    if both.interval[0] <= 0 or not math.isfinite(sd):  # none that could change
         return ""
     if _surely(change, sd):
         way = "grows" if change > 0 else "falls"
