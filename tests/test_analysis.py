@@ -238,6 +238,15 @@ def test_a_coefficient_over_records_is_no_surer_than_the_scale_that_weighed_them
     assert weighed.sd == pytest.approx(np.hypot(exact.sd, 0.02 * exact.value))
 
 
+@pytest.mark.parametrize("swing", [0.0, 0.3])
+def test_a_load_that_swings_is_said_beside_its_mean(swing: float) -> None:
+    load = 4.0 * (1 + swing * np.sin(2 * np.pi * 1.1 * TIME))
+    samples = {"x": sliding()["x"], "friction": sliding()["friction"], "normal": load}
+    said = " ".join(ss.summary(analyze(ss.Record.of(samples, fs=FS))).headline)
+    assert "Under a normal load of 4 N" in said
+    assert ("which swings by 21 % (r.m.s.)" in said) == bool(swing)
+
+
 def test_records_left_out_of_the_coefficient_are_named() -> None:
     variants = [replace(analyze(sliding(0.3 * n, normal=n)), name=f"load {n}") for n in (2.0, 4.0)]
     turning = ss.Record.of(

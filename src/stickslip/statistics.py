@@ -285,6 +285,13 @@ def mean_of_cycles(
     return Estimate.normal(name, present.mean(), sd=sd, unit=unit, method=method, **more)
 
 
+def relative_swing(values: Array) -> float:
+    """Standard deviation over the mean of what is finite; none of none, and of what has no mean."""
+    finite = values[np.isfinite(values)]
+    mean = abs(float(np.mean(finite))) if len(finite) else 0.0
+    return float(np.std(finite)) / mean if mean else 0.0
+
+
 def disagreement(estimates: Sequence[Estimate]) -> float:
     """How far estimates of one quantity differ, over what their own standard deviations allow: 1 where they agree."""
     values, sds = _values(estimates)

@@ -20,6 +20,7 @@ from stickslip.estimate import Estimate, stands
 from stickslip.figures.friction import plates_of, plates_together
 from stickslip.figures.maps import plates_of_map
 from stickslip.record.record import RIG_UNITS
+from stickslip.statistics import relative_swing
 from stickslip.story import scope
 from stickslip.story.story import (
     Caution,
@@ -37,6 +38,7 @@ from stickslip.story.story import (
 
 MOSTLY = 0.5  # of the time: a bound above it tells nothing
 RARELY = 0.005  # of the time
+STEADY = 0.01  # of its mean, by which a recorded load may swing unsaid: from there on no twin's friction is like it
 LIKELY = 3.0  # times the difference: wider intervals of the two directions tell nothing of it
 SAME = 0.05  # forward and back differ noticeably beyond this part of the level
 LOOSE = 3.0  # times the sliding friction: a bound on the static one that is wider tells nothing worth a claim
@@ -221,8 +223,10 @@ def _of_loops(findings: Findings) -> Iterator[str]:
     if not loops.level.known:
         return
     if findings.coefficient is not None and findings.normal is not None:
+        swing = relative_swing(findings.record["normal"]) if "normal" in findings.record else 0.0
+        swings = f", which swings by {100 * swing:.2g} % (r.m.s.)," if swing > STEADY else ""
         yield (
-            f"Under a normal load of {value_of(findings.normal)} that is a friction coefficient of "
+            f"Under a normal load of {value_of(findings.normal)}{swings} that is a friction coefficient of "
             f"{value_of(findings.coefficient)}."
         )
     yield from _of_directions(loops.forward, loops.back)

@@ -9,8 +9,7 @@ import numpy as np
 
 from stickslip.arrays import Array
 from stickslip.estimate import Doubt
-from stickslip.record.record import Record
-from stickslip.statistics import BINS, repeating
+from stickslip.statistics import BINS, relative_swing, repeating
 from stickslip.twin.belief import DAMPER, DRIVE, GAIN, GIVE, LATE, MASS, RATE, SPEED, SPRING, Belief, levelled
 
 STRAINED = 4.0  # standard deviations by which a constant may be off before that is said
@@ -42,7 +41,7 @@ class Misfit:
     feigned: float  # N, as friction
     share: float  # by which a gain or a constant is off
     slight: bool
-    load_swing: float
+    load_swing: float  # standard deviation of a recorded normal load over its mean
 
     @classmethod
     def of(cls, belief: Belief, strays: float, repeats: float) -> Misfit:
@@ -52,9 +51,8 @@ class Misfit:
         most = FINER if RICHER & belief.values.keys() else SLIGHT
         little = feigned < most * belief.kinetic and share < most
         slight = little and strays <= UNLIKE and belief.left <= LOST
-        return cls(
-            strays, repeats, belief.strain, belief.left, slip, feigned, share, bool(slight), _load_swing(belief.record)
-        )
+        swing = relative_swing(belief.record["normal"]) if "normal" in belief.record else 0.0
+        return cls(strays, repeats, belief.strain, belief.left, slip, feigned, share, bool(slight), swing)
 
     @property
     def lost(self) -> bool:
@@ -96,12 +94,6 @@ class Misfit:
         if self.slight:
             why = f", as a force less than {100 * SLIGHT:g} % of the friction, which the intervals count"
         return Doubt(what + why, ASTRAY, lesser=self.slight)
-
-
-def _load_swing(record: Record) -> float:
-    """Standard deviation of the recorded normal load over its mean; none where none was recorded."""
-    load = record["normal"][np.isfinite(record["normal"])] if "normal" in record else np.ones(1)
-    return float(np.std(load) / abs(np.mean(load))) if load.any() and np.mean(load) else 0.0
 
 
 def _off(belief: Belief) -> set[str]:
