@@ -80,6 +80,12 @@ def _write_fmu(case: Case, path: Path) -> None:
         raise click.BadParameter("an FMU holds one mass; give an oscillator", param_hint="--fmu")
     values = {name: getattr(system, name) for name in ("mass", "stiffness", "damping", "damper")}
     ss.laws.export_fmu(system.law, path, **values)
+    belt = system.drive.speed if isinstance(system.drive, ss.drives.Belt) else 0.0
+    # a mass on a belt starts with it where nothing else is said
+    begins = {"x": case.start.get("x", 0.0), "v": case.start.get("v", belt), "face_speed": belt}
+    states = ", ".join(f"{name} = {value:g}" for name, value in begins.items() if value)
+    told = f"; to start as here, set {states} in it" if states else ""
+    say(f"{path} holds the mass and its friction, without the drive: force and z are its inputs{told}", err=True)
 
 
 def _list_scenarios(*, as_json: bool, everything: bool) -> None:
