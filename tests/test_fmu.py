@@ -158,7 +158,7 @@ def test_the_command_writes_a_unit(tmp_path: Path) -> None:
     words = ["simulate", "FD-4", "--duration", "1", "--fmu", str(unit_file), "--output", str(out)]
     told = CliRunner().invoke(main, words)
     assert told.exit_code == 0, told.output
-    assert "without the drive: force and z are its inputs; to start as here, set x = 1 in it" in told.output
+    assert "without the drive: force and z are its inputs; to start as here, set x = 1.25 in it" in told.output
     told = run(unit_file, "CoSimulation", stop_time=1.0, start_values={"x": 1.0})
     assert told["x"][0] == 1.0
     several = CliRunner().invoke(main, ["simulate", "MC-1", "--fmu", str(unit_file), "--json"])
