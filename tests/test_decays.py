@@ -244,6 +244,7 @@ def test_a_chain_of_sliders_is_no_viscous_friction():
     assert findings.decay.best.damping_ratio.interval[1] < 0.006
     assert findings.decay.best.damping_ratio.status != "ok"
     assert " ".join(ss.summary(findings).headline).startswith("Nearest comes")
+    assert "micro-slip" in ss.summary(findings).scope.model, "the page draws that motion"
 
 
 def test_the_pendulum_has_a_page(swings, tmp_path):

@@ -362,5 +362,6 @@ def _terms(chosen: Candidate, unit: str) -> tuple[Estimate, ...]:
         name, per = TERMS[parameter]
         scale = abs(chosen.fitted.value("amplitude")) ** chosen.fitted.value("exponent")
         factor = scale if parameter == "micro_slip" else 1.0
-        terms.append(chosen.estimate(parameter, name=name, unit=per.format(unit), factor=factor))
+        estimate = chosen.estimate(parameter, name=name, unit=per.format(unit), factor=factor)
+        terms.append(estimate.within(0.0) if parameter == "relaxation" else estimate)  # a contact drives nothing
     return tuple(term for term in terms if term.sd > 0)

@@ -17,8 +17,9 @@ from stickslip.decay.candidates import CURVED
 from stickslip.decay.choice import SIZE
 from stickslip.decay.decrement import Decrement
 from stickslip.decay.fit_decay import LEFT_OVER, UNSHARED
+from stickslip.decay.motions import free_decay
 from stickslip.decay.release import CAUGHT
-from stickslip.decay.which_motion import beginning
+from stickslip.decay.which_motion import DecayMotion, beginning
 from stickslip.estimate import Estimate, kinds
 from stickslip.figures.decay import plates_of, plates_together
 from stickslip.record.record import Record
@@ -75,16 +76,30 @@ def _remedies(findings: Findings) -> list[str]:
 
 
 def _scope(findings: Findings) -> Scope | None:
-    """The record with the fitted waveform over it, where there is one."""
-    fit = findings.decay.waveform
-    if fit is None:
-        return None
-    question = ["decay", "--channel", fit.channel]
+    """The record with the motion chosen over it, or the fitted waveform of all releases, where there is one."""
+    decay, record = findings.decay, findings.record
+    channel, fit = decay.releases.ring_downs[0].channel, decay.waveform
+    question = ["decay", "--channel", channel]
     if findings.settings["restoring"] != "linear":
         question += ["--restoring", findings.settings["restoring"]]
-    swings = [_at_samples(findings.record, *release) for release in zip(fit.time, fit.fitted, strict=True)]
+    if decay.motion is not None and decay.best is decay.motion and len(decay.releases.ring_downs) == 1:
+        words = decay.motion.choice.chosen.fitted.motion.words
+        return of_fit(record, {channel: _chosen_motion(record, decay.motion)}, question, words)
+    if fit is None:
+        return None
+    swings = [_at_samples(record, *release) for release in zip(fit.time, fit.fitted, strict=True)]
     time, fitted = (np.concatenate(parts) for parts in zip(*swings, strict=True))
-    return of_fit(findings.record, {fit.channel: (time, fitted)}, question, fit.model)
+    return of_fit(record, {channel: (time, fitted)}, question, fit.model)
+
+
+def _chosen_motion(record: Record, motion: DecayMotion) -> tuple[Array, Array]:
+    """The samples of a record within its release, and the motion chosen there."""
+    chosen = motion.choice.chosen.fitted
+    zero = motion.release_time.value - chosen.value("release")  # the record's time at that of the fit
+    begin, end = zero + chosen.blocks.times[0], zero + chosen.blocks.times[-1]
+    time = record.time[(record.time >= begin) & (record.time <= end)]
+    restoring = chosen.blocks.restoring
+    return time, free_decay(time - zero, chosen.parameters, restoring=restoring, half_cycles=chosen.half_cycles)[0]
 
 
 def _at_samples(record: Record, centres: Array, means: Array) -> tuple[Array, Array]:

@@ -139,7 +139,7 @@ def of_joints(comparison: Comparison) -> Story:
         list(_together(comparison)),
         list(map(Caution, _untold(comparison.together, "These logs do"))),
         tables=[_payloads(comparison) if comparison.unlike else _predicted(comparison)],
-        draw=lambda: plates_together(logs),
+        draw=lambda: [] if comparison.unlike else plates_together(logs),
         data=lambda: {"predictions": data},
     )
 
